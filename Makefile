@@ -1,0 +1,37 @@
+# Set-up is a stamp: it runs again when pyproject.toml changes. torch comes first, as the CPU build that installs fast.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+export OMP_NUM_THREADS ?= 2
+
+.PHONY: study test check format bench clean
+
+study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
+	$(BIN)/shipid study run quick
+
+test: $(STAMP)           ## all tests
+	$(BIN)/pytest
+
+check: $(STAMP)          ## format, lint, types, layers
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(STAMP)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(STAMP)          ## timings: never in tests
+	$(BIN)/python -m tests.benchmarks
+
+clean:
+	rm -rf $(VENV) results .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+$(STAMP): pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@

@@ -1,0 +1,1 @@
+"""From logs to windows: a dataset and its schema, declared imports and repairs, checks, cutting, public sets."""

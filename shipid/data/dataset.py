@@ -1,0 +1,206 @@
+"""The dataset: recorded or simulated runs as one table, its schema, and its Parquet file."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from shipid.errors import DataError, choices
+
+Array = NDArray[np.float64]
+
+REQUIRED = {"t": "s", "north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
+OPTIONAL = {"z": "m", "phi": "rad", "theta": "rad", "w": "m/s", "p": "rad/s", "q": "rad/s"} | {
+    "V_w": "m/s",
+    "beta_w": "rad",
+}
+SIGNALS = {"n": "rev/s", "alpha": "rad", "delta": "rad"}
+ANGLES = ("psi", "phi", "theta", "beta_w")
+BREAK = "break"
+"""Name of the flag on a row that nothing connects to the row before it."""
+
+_COMMAND = re.compile(r"[A-Za-z_]\w*\.(" + "|".join(SIGNALS) + ")")
+_KEY = b"shipid"
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Runs of one vessel: a table that has passed `check_schema`, and where it came from.
+
+    Parameters
+    ----------
+    frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
+        (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w` and the
+        rest of `OPTIONAL`. SI units, radians; time increases within a run; no NaN.
+    metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
+        has a clock of its own (simulation) and `"shared"` where all lie on one recording (the default).
+    """
+
+    frame: pd.DataFrame
+    metadata: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        check_schema(self.frame, self.metadata)
+
+    @property
+    def commands(self) -> list[str]:
+        """Names of the command columns, in the order of the table."""
+        return [str(name) for name in self.frame.columns if is_command(str(name))]
+
+    @property
+    def runs(self) -> list[str]:
+        """Names of the runs, in the order of the table."""
+        return [str(name) for name in self.frame["run"].unique()]
+
+
+def is_command(name: str) -> bool:
+    """Tell whether a column is a command, `<component>.<signal>`."""
+    return _COMMAND.fullmatch(name) is not None
+
+
+def unit_of(name: str) -> str | None:
+    """SI unit of a column by its name; None if no column may have this name."""
+    if is_command(name):
+        return SIGNALS[name.rpartition(".")[2]]
+    return (REQUIRED | OPTIONAL).get(name)
+
+
+def units_of(names: Iterable[str]) -> dict[str, str]:
+    """SI unit of every column that has one."""
+    return {name: unit for name in names if (unit := unit_of(name)) is not None}
+
+
+def flag_bit(metadata: dict[str, Any], name: str) -> int:
+    """Value of a named flag in the column `flags`; 0 where the dataset does not use it."""
+    names = metadata.get("flags", [])
+    return 1 << names.index(name) if name in names else 0
+
+
+def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Unbroken stretches of every run, as (run, rows): a new one starts at each row flagged `break`."""
+    bit = flag_bit(dataset.metadata, BREAK)
+    for name, rows in dataset.frame.groupby("run", sort=False):
+        broken = (rows["flags"].to_numpy() & bit) != 0
+        starts = np.flatnonzero(broken[1:]) + 1
+        for first, last in zip([0, *starts], [*starts, len(rows)], strict=True):
+            yield str(name), rows.iloc[first:last]
+
+
+def sample(rows: pd.DataFrame, instants: Array) -> dict[str, NDArray[Any]]:
+    """Every column of one unbroken stretch at given instants [s] (any shape): name -> array of that shape.
+
+    States and wind are linear between rows (angles unwrapped first); commands and flags keep the value of the last
+    row at or before the instant, because an order holds until the next one.
+    """
+    t = rows["t"].to_numpy()
+    slack = 1e-9 * max(1.0, float(np.abs(t).max()))  # t0 + 3 * 0.1 must find the row written as 0.3
+    last = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(t) - 1)
+    result: dict[str, NDArray[Any]] = {}
+    for name in map(str, rows.columns):
+        if name in ("run", "t"):
+            continue
+        values = rows[name].to_numpy()
+        if name == "flags" or is_command(name):
+            result[name] = values[last]
+        else:
+            result[name] = np.interp(instants, t, np.unwrap(values) if name in ANGLES else values)
+    return result
+
+
+def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
+    """Raise DataError unless the table holds what `Dataset` promises."""
+    if len(frame) == 0:
+        raise DataError("the dataset has no rows")
+    names = [str(name) for name in frame.columns]
+    for name in ("run", "flags", *REQUIRED):
+        if name not in names:
+            raise DataError(f"missing column; there are: {', '.join(names)}", path=name)
+    for name in names:
+        if names.count(name) > 1:
+            raise DataError("this column stands twice", path=name)
+        _check_column(name, frame[name])
+    for name, other in (("V_w", "beta_w"), ("beta_w", "V_w")):
+        if name in names and other not in names:
+            raise DataError(f"wind needs V_w and beta_w: {other} is missing", path=name)
+    if int(frame["flags"].max()) >= 1 << len(metadata.get("flags", [])) or int(frame["flags"].min()) < 0:
+        raise DataError("a bit is set that metadata['flags'] does not name", path="flags")
+    units = metadata.get("units", {})
+    for name, unit in units_of(names).items():
+        if units.get(name, unit) != unit:
+            raise DataError(f"metadata['units'] says {units[name]!r}, must be {unit!r}", path=name)
+    for run, t in frame.groupby("run", sort=False)["t"]:
+        backwards = np.flatnonzero(np.diff(t.to_numpy()) <= 0)
+        if len(backwards):
+            at = t.to_numpy()[backwards[0] + 1]
+            raise DataError(f"run {run!r}: time does not increase at t = {at:g} s", path="t")
+
+
+def _check_column(name: str, column: pd.Series[Any]) -> None:
+    unit = unit_of(name)
+    if name == "run":
+        right, wanted = pd.api.types.is_string_dtype(column.dtype), "text"
+    elif name == "flags":
+        right, wanted = pd.api.types.is_integer_dtype(column.dtype), "integers"
+    elif unit is None:
+        raise DataError(
+            f"unknown column: {choices(name, [*REQUIRED, *OPTIONAL, 'run', 'flags'])} "
+            f"(or a command, <component>.<signal>, signals {', '.join(SIGNALS)})",
+            path=name,
+        )
+    else:
+        right, wanted = column.dtype == np.float64, f"float64 in {unit}"
+    if not right:
+        raise DataError(f"holds {column.dtype}, must hold {wanted}", path=name)
+    bad = ~np.isfinite(column.to_numpy()) if unit is not None else column.isna().to_numpy()
+    if bad.any():
+        raise DataError(
+            f"{int(bad.sum())} values are not finite, the first in row {int(np.argmax(bad))}; fill or cut them first",
+            path=name,
+        )
+
+
+def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
+    """Write a dataset as Parquet (zstd), metadata as JSON in its schema; the file appears whole or not at all."""
+    target = Path(file)
+    metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
+    table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
+            pyarrow.parquet.write_table(table, Path(folder) / target.name, compression="zstd")
+            os.replace(Path(folder) / target.name, target)
+    except OSError as error:
+        raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
+    return target
+
+
+def read_dataset(file: str | os.PathLike[str]) -> Dataset:
+    """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column."""
+    try:
+        table = pyarrow.parquet.read_table(file)
+    except pyarrow.ArrowInvalid:
+        raise DataError("not a Parquet file: make one from a log with `shipid data import`", file=file) from None
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or 'no such file'})", file=file) from None
+    stored = (table.schema.metadata or {}).get(_KEY)
+    if stored is None:
+        raise DataError("a Parquet file, but not a dataset of shipid: no metadata under 'shipid'", file=file)
+    try:
+        return Dataset(table.to_pandas(), json.loads(stored))
+    except DataError as error:
+        raise DataError(error.message, file=file, path=error.path) from None
+    except json.JSONDecodeError as error:
+        raise DataError(f"damaged metadata: {error}", file=file) from None

@@ -1,0 +1,207 @@
+"""Repairs of a recorded log: each one declared with a reason, counted, flagged row by row, and possible to switch off.
+
+A repair is a document (its parameters) and a function (its formula): `(rows, repair) -> Outcome`. Rows are the
+whole log in SI units, with columns `t` and `flags`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from shipid.data.dataset import BREAK
+
+Mask = NDArray[np.bool_]
+Columns = Annotated[tuple[str, ...], Field(min_length=1)]
+Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
+
+
+class Strict(BaseModel):
+    """Base of every part of a mapping: unknown keys are refused, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Repair(Strict):
+    """What every repair declares: its kind, why it is right, and whether it is on."""
+
+    kind: str
+    reason: str = Field(min_length=1)
+    enabled: bool = True
+    columns: tuple[str, ...] = ()
+
+
+class WrapInterpolation(Repair):
+    """A channel in 0..360 deg was interpolated linearly across 360/0; steps above `threshold` [`unit`] betray it."""
+
+    columns: Columns
+    threshold: float = Field(gt=0)
+    unit: str = "rad"
+
+
+class Despike(Repair):
+    """Values further than `threshold` [`unit`] from the median of a centred `window` [s] are replaced."""
+
+    columns: Columns
+    window: float = Field(gt=0)
+    threshold: float = Field(gt=0)
+    unit: str | None = None
+
+
+class Scale(Repair):
+    """Columns carry a known wrong factor: multiply them by `factor`."""
+
+    columns: Columns
+    factor: float
+
+
+class HeadingOffset(Repair):
+    """The heading reads `offset` [`unit`] low: psi + offset, and (u, v) turn so that the path stays."""
+
+    offset: float
+    unit: str = "rad"
+
+
+class LeverArm(Repair):
+    """Position and velocity were logged `x` [m] forward of the vessel's origin: both move to the origin."""
+
+    x: float
+
+
+class Break(Repair):
+    """Time is missing inside `intervals` of the log's clock: rows strictly inside go, the run is broken there."""
+
+    intervals: tuple[Interval, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Rows after a repair, which of them it `touched`, and what it found."""
+
+    rows: pd.DataFrame
+    touched: Mask
+    count: int
+    note: str
+
+
+def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
+    """Values with the missing ones interpolated linearly in time from the finite rest."""
+    known = ~missing & np.isfinite(values)
+    filled = np.where(missing, np.nan, values)
+    if known.any():
+        filled[missing] = np.interp(t[missing], t[known], values[known])
+    return filled
+
+
+def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
+    """Drop both neighbours of every step |d psi| > threshold, unwrap the rest, interpolate the dropped.
+
+    Both, because the last true sample before and the first after cannot be told from false ones.
+    """
+    t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
+    healed: dict[str, NDArray[np.float64]] = {}
+    for name in repair.columns:
+        values = rows[name].to_numpy().copy()
+        false = np.abs(np.diff(values)) > repair.threshold
+        dropped = np.append(false, False) | np.insert(false, 0, False)
+        known = ~dropped & np.isfinite(values)
+        values[known] = np.unwrap(values[known])
+        healed[name] = interpolate_at(t, values, dropped)
+        touched |= dropped
+        count += int(false.sum())
+    return Outcome(rows.assign(**healed), touched, count, f"{int(touched.sum())} rows interpolated")
+
+
+def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
+    """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
+
+    Windows do not reach over a break, where a jump is no spike.
+    """
+    t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
+    width = 2 * int(round(repair.window / 2 / float(np.median(np.diff(t))))) + 1
+    stretch = np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
+    healed = {}
+    for name in repair.columns:
+        pieces = rows[name].groupby(stretch)
+        median = pieces.transform(lambda piece: piece.rolling(width, center=True, min_periods=1).median())
+        spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
+        healed[name] = interpolate_at(t, rows[name].to_numpy(), spikes)
+        touched |= spikes
+        count += int(spikes.sum())
+    return Outcome(rows.assign(**healed), touched, count, f"median of {width} rows")
+
+
+def scale(rows: pd.DataFrame, repair: Scale) -> Outcome:
+    """x <- factor x, for every column named."""
+    scaled = {name: repair.factor * rows[name] for name in repair.columns}
+    return _all_rows(rows.assign(**scaled), f"times {repair.factor:g}")
+
+
+def turn_heading(rows: pd.DataFrame, repair: HeadingOffset) -> Outcome:
+    """psi <- psi + d; (u, v) <- R(-d) (u, v), so that R(psi) (u, v), the velocity over ground, does not change."""
+    c, s = np.cos(repair.offset), np.sin(repair.offset)
+    u, v = rows["u"], rows["v"]
+    turned = rows.assign(psi=rows["psi"] + repair.offset, u=c * u + s * v, v=c * v - s * u)
+    return _all_rows(turned, f"{np.degrees(repair.offset):+.2f} deg")
+
+
+def move_origin(rows: pd.DataFrame, repair: LeverArm) -> Outcome:
+    """v <- v - x r; north <- north - x cos(psi); east <- east - x sin(psi): rigid body, u does not change."""
+    moved = rows.assign(
+        v=rows["v"] - repair.x * rows["r"],
+        north=rows["north"] - repair.x * np.cos(rows["psi"]),
+        east=rows["east"] - repair.x * np.sin(rows["psi"]),
+    )
+    return _all_rows(moved, f"sensor {repair.x:g} m forward of the origin")
+
+
+def break_runs(rows: pd.DataFrame, repair: Break) -> Outcome:
+    """Remove rows strictly inside each interval; the first row after it is touched, and so a break."""
+    t = rows["t"].to_numpy()
+    removed = np.zeros(len(t), dtype=bool)
+    for start, end in repair.intervals:
+        removed |= (t > start) & (t < end)
+    kept = t[~removed]
+    touched = np.zeros(len(kept), dtype=bool)
+    for _, end in repair.intervals:
+        touched |= np.arange(len(kept)) == np.searchsorted(kept, end)
+    note = f"{int(removed.sum())} rows removed"
+    return Outcome(rows.loc[~removed].reset_index(drop=True), touched, len(repair.intervals), note)
+
+
+def _all_rows(rows: pd.DataFrame, note: str) -> Outcome:
+    return Outcome(rows, np.ones(len(rows), dtype=bool), len(rows), note)
+
+
+REPAIRS: dict[str, tuple[type[Repair], Callable[[pd.DataFrame, Any], Outcome]]] = {
+    "wrap_interpolation": (WrapInterpolation, heal_wrap),
+    BREAK: (Break, break_runs),
+    "despike": (Despike, despike),
+    "scale": (Scale, scale),
+    "heading_offset": (HeadingOffset, turn_heading),
+    "lever_arm": (LeverArm, move_origin),
+}
+FLAGS = ("interpolated", *REPAIRS)
+"""Names of the bits of the column `flags` of an imported log, lowest first."""
+
+
+def apply_repairs(
+    rows: pd.DataFrame, repairs: Iterable[Repair], without: Iterable[str] = ()
+) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+    """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off."""
+    off, records = set(without), []
+    for repair in repairs:
+        count, note = 0, "switched off"
+        if repair.enabled and repair.kind not in off:
+            outcome = REPAIRS[repair.kind][1](rows, repair)
+            bit = 1 << FLAGS.index(repair.kind)
+            flags = outcome.rows["flags"].to_numpy() | np.where(outcome.touched, bit, 0)
+            rows, count, note = outcome.rows.assign(flags=flags), outcome.count, outcome.note
+        records.append({"kind": repair.kind, "column": ", ".join(repair.columns), "count": count, "note": note})
+    return rows, records

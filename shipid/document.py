@@ -1,0 +1,154 @@
+"""Plain nested data: read TOML, find the bundled documents, get / replace / match by dotted path, digest."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from shipid.errors import DocumentError, choices
+
+Document = dict[str, Any]
+
+
+def bundled_folder(kind: str) -> Path:
+    """Folder of the documents that come with shipid: `models`, `studies` or `studies/mappings`."""
+    package = Path(__file__).parent
+    installed = package / "_bundled" / kind
+    return installed if installed.is_dir() else package.parent / kind
+
+
+def bundled(kind: str) -> dict[str, Path]:
+    """Name -> file of every bundled document of a kind, sorted by name."""
+    return {file.stem: file for file in sorted(bundled_folder(kind).glob("*.toml"))}
+
+
+def find(name: str, kind: str, relative_to: Path | None = None) -> Path:
+    """File of a document: a bundled name, or a path if it contains a slash or ends in `.toml`.
+
+    A relative path is tried from the folder of the document that names it, then from the working folder.
+    """
+    if "/" in name or "\\" in name or name.endswith(".toml"):
+        for folder in filter(None, (relative_to, Path())):
+            if (folder / name).is_file():
+                return folder / name
+        raise DocumentError("no such file", file=name)
+    available = bundled(kind)
+    if name not in available:
+        label = {"models": "vessel", "studies": "study", "studies/mappings": "mapping"}[kind]
+        raise DocumentError(
+            f"no {label} of this name comes with shipid: {choices(name, available)}; "
+            "a file of your own needs a slash or the ending .toml",
+            path=name,
+        )
+    return available[name]
+
+
+def read(file: Path | str) -> Document:
+    """Read a TOML document; refuses duplicate keys, bad syntax and bad encoding with one line each."""
+    try:
+        text = Path(file).read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
+    except OSError as error:
+        raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DocumentError(f"not valid TOML: {error}", file=file) from None
+
+
+def digest(document: Any) -> str:
+    """SHA-256 (first 16 hex digits) of the canonical JSON form: the same for any order of keys."""
+    canonical = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=True)
+    return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+
+def leaves(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every leaf, in document order; entries of a list are addressed by index."""
+    items: Any
+    if isinstance(document, Mapping):
+        items = document.items()
+    elif isinstance(document, list):
+        items = enumerate(document)
+    else:
+        yield prefix, document
+        return
+    for key, value in items:
+        yield from leaves(value, f"{prefix}.{key}" if prefix else str(key))
+
+
+def get(document: Any, path: str) -> Any:
+    """Value at a dotted path; KeyError names the part that is missing."""
+    value = document
+    for part in path.split("."):
+        if isinstance(value, list) and part.isdecimal() and int(part) < len(value):
+            value = value[int(part)]
+        elif isinstance(value, Mapping) and part in value:
+            value = value[part]
+        else:
+            raise KeyError(f"{path}: there is no {part!r}")
+    return value
+
+
+def replace(document: Any, changes: Mapping[str, Any]) -> Any:
+    """A copy of the document with the values at the given dotted paths replaced or added."""
+    result = copy.deepcopy(document)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        node = result
+        for part in parents:
+            node = node[int(part)] if isinstance(node, list) else node.setdefault(part, {})
+        if isinstance(node, list):
+            node[int(last)] = value
+        else:
+            node[last] = value
+    return result
+
+
+def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
+    """Paths that match a pattern in which `*` stands for any run of characters, dots included."""
+    expression = re.compile(".*".join(re.escape(piece) for piece in pattern.split("*")))
+    return [path for path in paths if expression.fullmatch(path)]
+
+
+def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
+    """Validate plain data by a pydantic model; the first complaint becomes one line with path, value and remedy."""
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        parts = [str(part) for part in first["loc"]]
+        path = ".".join(([prefix] if prefix else []) + parts)
+        if first["type"] == "extra_forbidden":
+            message = f"unknown key: {choices(parts[-1], _fields(model, parts[:-1]))}"
+        elif first["type"] == "missing":
+            message = "missing"
+        else:
+            shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
+            message = shown + first["msg"].removeprefix("Value error, ")
+        raise DocumentError(message, file=file, path=path) from None
+
+
+def _fields(model: Any, parts: list[str]) -> list[str]:
+    """Keys that a pydantic model allows at a place inside it; what cannot be followed has none."""
+    for part in parts:
+        if part.isdecimal() or not hasattr(model, "model_fields"):
+            continue
+        by_key = {field.alias or name: field for name, field in model.model_fields.items()}
+        if part not in by_key:
+            return []
+        candidates = [by_key[part].annotation]
+        while candidates and not hasattr(candidates[0], "model_fields"):
+            candidates = [*get_args(candidates[0]), *candidates[1:]]
+        if not candidates:
+            return []
+        model = candidates[0]
+    return [field.alias or name for name, field in model.model_fields.items()]

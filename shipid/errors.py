@@ -1,0 +1,57 @@
+"""The error tree: everything a user can mend, in one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from os import PathLike
+
+
+class ShipidError(Exception):
+    """Something the user can mend: where it stands, what is wrong, what would be right.
+
+    Parameters
+    ----------
+    message : what is wrong and what would be right, one sentence.
+    file : the document or log that holds it.
+    path : dotted path, column or row inside the file.
+    """
+
+    def __init__(self, message: str, *, file: str | PathLike[str] | None = None, path: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = None if file is None else str(file)
+        self.path = path
+
+    def __str__(self) -> str:
+        parts = [part for part in (self.file, self.path, self.message) if part]
+        return ": ".join(" ".join(part.split()) for part in parts)
+
+    def __reduce__(self) -> tuple[object, ...]:  # workers send errors home
+        return (_rebuild, (type(self), self.message, self.file, self.path))
+
+
+class DocumentError(ShipidError):
+    """A TOML document (vessel, study, mapping, patch) that cannot be read as what it claims to be."""
+
+
+class DataError(ShipidError):
+    """A log or dataset that does not hold what its mapping or schema says."""
+
+
+class ResultError(ShipidError):
+    """A results folder or a saved predictor that is missing, foreign or damaged."""
+
+
+def _rebuild(cls: type[ShipidError], message: str, file: str | None, path: str | None) -> ShipidError:
+    return cls(message, file=file, path=path)
+
+
+def choices(value: str, valid: Iterable[str], limit: int = 12) -> str:
+    """Say what would have been right: `did you mean 'x'?` or the list of valid names."""
+    names = sorted(valid)
+    close = get_close_matches(value, names, n=1)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    shown = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")
+    return f"valid: {shown}" if names else "nothing is defined there"

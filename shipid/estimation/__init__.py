@@ -1,0 +1,1 @@
+"""From windows to better models: a compensator, its training, its tuning."""

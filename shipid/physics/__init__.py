@@ -1,0 +1,63 @@
+"""Symbols in, symbols out: every force on a ship as a pure CasADi function.
+
+The signature is the schema: positional arguments are signals, keyword-only arguments are parameters (with unit), a
+`**` table is open and checked by its grammar. To add a term: write the function, name it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from shipid.physics import hull, thruster, wind
+
+
+@dataclass(frozen=True)
+class Term:
+    """A member of the sum of forces.
+
+    function : signals (and component arrays) in, wrench (6) [N, N m] out.
+    components : for a sum over components, a function from structural numbers to one array per component argument;
+        `function` is then written for one component.
+    """
+
+    function: Callable[..., Any]
+    components: Callable[..., Mapping[str, Any]] | None = None
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A term with memory on a signal: `output(state)` replaces it, `advance(signal, state, dt)` moves the state."""
+
+    output: Callable[..., Any]
+    advance: Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Names and units of what a term may ask for by a positional argument."""
+
+    motion: tuple[str, ...] = ("eta", "nu", "nu_r", "psi")
+    commands: Mapping[str, str] = field(default_factory=lambda: {"n": "rev/s", "alpha": "rad", "delta": "rad"})
+    environment: Mapping[str, str] = field(
+        default_factory=lambda: {"V_w": "m/s", "beta_w": "rad", "V_c": "m/s", "beta_c": "rad"}
+    )
+
+
+SIGNALS = Signals()
+
+TERMS: dict[str, Term] = {
+    "hull.derivatives": Term(hull.derivatives),
+    "hull.prime_derivatives": Term(hull.prime_derivatives),
+    "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
+    "hull.resistance": Term(hull.resistance),
+    "wind.table": Term(wind.table),
+    "wind.blendermann": Term(wind.blendermann),
+    "thruster.azimuth": Term(thruster.azimuth),
+    "thruster.tunnel": Term(thruster.tunnel),
+}
+
+ACTUATORS: dict[str, Memory] = {
+    "first_order": Memory(thruster.first_order_output, thruster.first_order_advance),
+}

@@ -1,0 +1,69 @@
+"""Kinematics and relative motion (Fossen 2021, ch. 2 and 10): planar motion is the case phi = theta = 0."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+
+def vector(*entries: float | SX) -> SX:
+    """Column vector of the given scalars; zeros stay structural so that they cost nothing downstream."""
+    return ca.vertcat(*(SX(1, 1) if isinstance(entry, int | float) and entry == 0 else entry for entry in entries))
+
+
+def skew(a: SX) -> SX:
+    """S(a), with S(a) b = a x b, for a (3)."""
+    return ca.vertcat(
+        ca.horzcat(SX(1, 1), -a[2], a[1]),
+        ca.horzcat(a[2], SX(1, 1), -a[0]),
+        ca.horzcat(-a[1], a[0], SX(1, 1)),
+    )
+
+
+def rotation(phi: SX, theta: SX, psi: SX) -> SX:
+    """R(phi, theta, psi) [3 x 3]: body to north-east-down, angles in rad (Fossen 2021, eq. 2.31)."""
+    c_phi, s_phi, c_theta, s_theta = ca.cos(phi), ca.sin(phi), ca.cos(theta), ca.sin(theta)
+    c_psi, s_psi = ca.cos(psi), ca.sin(psi)
+    return ca.vertcat(
+        ca.horzcat(
+            c_psi * c_theta, -s_psi * c_phi + c_psi * s_theta * s_phi, s_psi * s_phi + c_psi * c_phi * s_theta
+        ),
+        ca.horzcat(
+            s_psi * c_theta, c_psi * c_phi + s_phi * s_theta * s_psi, -c_psi * s_phi + s_theta * s_psi * c_phi
+        ),
+        ca.horzcat(-s_theta, c_theta * s_phi, c_theta * c_phi),
+    )
+
+
+def kinematics(eta: SX, nu: SX) -> SX:
+    """eta_dot = J(eta) nu: eta = [north, east, down, phi, theta, psi] (m, rad), nu (6) in m/s, rad/s.
+
+    With phi = theta = 0 this is eq. (1) of the method, eta_dot = R(psi) nu. Singular at theta = 90 deg
+    (Fossen 2021, eq. 2.40).
+    """
+    phi, theta, psi = eta[3], eta[4], eta[5]
+    p, q, r = nu[3], nu[4], nu[5]
+    tangential = ca.sin(phi) * q + ca.cos(phi) * r
+    angles = vector(
+        p + tangential * ca.tan(theta),
+        ca.cos(phi) * q - ca.sin(phi) * r,
+        tangential / ca.cos(theta),
+    )
+    return ca.vertcat(rotation(phi, theta, psi) @ nu[:3], angles)
+
+
+def current(eta: SX, nu: SX, V_c: SX, beta_c: SX) -> tuple[SX, SX]:
+    """A steady uniform current in body axes, nu_c (6), and its rate d(nu_c)/dt = -omega x nu_c.
+
+    V_c in m/s, beta_c in rad: the direction the current sets towards, clockwise from north. In the plane the rate
+    is [r v_c, -r u_c, 0] (method eq. 3; Fossen 2021, sec. 10.3).
+    """
+    towards = vector(V_c * ca.cos(beta_c), V_c * ca.sin(beta_c), 0)
+    linear = rotation(eta[3], eta[4], eta[5]).T @ towards
+    rate = -skew(nu[3:]) @ linear
+    return ca.vertcat(linear, SX(3, 1)), ca.vertcat(rate, SX(3, 1))
+
+
+def force_at(x: SX, y: SX, z: SX, F_x: SX, F_y: SX) -> SX:
+    """Wrench (6) about the origin of a horizontal force (F_x, F_y) [N] at the point (x, y, z) [m]."""
+    return vector(F_x, F_y, 0, -z * F_y, z * F_x, x * F_y - y * F_x)

@@ -1,0 +1,133 @@
+"""Names that are formulas: a coefficient's name gives its monomial, its unit and its prime scaling.
+
+`Y_vvr` is v^2 r, `X_u|u|` is u|u|, `Y_|r|v` is |r| v, `N_vdot` multiplies the sway acceleration. The same grammar
+reads the polynomials of a thruster in J and J_y.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import SX
+
+AXES = "XYZKMN"
+MOTIONS = "uvwpqr"
+POSITIVE = object()  # marks a parameter that must be greater than zero
+
+
+@dataclass(frozen=True)
+class Monomial:
+    """One coefficient's formula: a force or moment axis and its factors, each a symbol, bare or absolute."""
+
+    axis: str
+    factors: tuple[tuple[str, bool], ...]
+
+    @property
+    def order(self) -> int:
+        """Number of factors."""
+        return len(self.factors)
+
+    @property
+    def canonical(self) -> tuple[str, tuple[tuple[str, bool], ...]]:
+        """The same for names that mean the same: order of factors does not matter and |x||x| = xx."""
+        moduli = [symbol for symbol, absolute in self.factors if absolute]
+        pairs = {symbol: moduli.count(symbol) // 2 * 2 for symbol in moduli}
+        plain = [(symbol, False) for symbol, absolute in self.factors if not absolute]
+        plain += [(symbol, False) for symbol, count in pairs.items() for _ in range(count)]
+        plain += [(symbol, True) for symbol, count in pairs.items() if moduli.count(symbol) > count]
+        return self.axis, tuple(sorted(plain))
+
+    def value(self, symbols: Mapping[str, SX]) -> SX:
+        """Product of the factors."""
+        product = SX(1)
+        for symbol, absolute in self.factors:
+            product *= ca.fabs(symbols[symbol]) if absolute else symbols[symbol]
+        return product
+
+
+def monomial(name: str, alphabet: str, axes: str = AXES) -> Monomial:
+    """Read a name; ValueError says what it should look like."""
+    axis, _, body = name.rpartition("_")
+    tokens = re.fullmatch(rf"(?:[{alphabet}]|\|[{alphabet}]\|)+", body)
+    if tokens is None or (axis not in axes or len(axis) != 1 if axes else axis):
+        start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
+        example = "Y_v|r|" if axes else "J|y|"
+        raise ValueError(
+            f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
+        )
+    found = re.findall(rf"[{alphabet}]|\|[{alphabet}]\|", body)
+    return Monomial(axis, tuple((token.strip("|"), token.startswith("|")) for token in found))
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """An open table of coefficients: which names it takes and the unit that follows from each name."""
+
+    check_name: Callable[[str], Monomial]
+    unit: Callable[[str], str]
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raise ValueError at the first unknown name, or the second name of one monomial."""
+        seen: dict[object, str] = {}
+        for name in names:
+            formula = self.check_name(name).canonical
+            if formula in seen:
+                raise ValueError(f"{name!r} and {seen[formula]!r} name the same monomial: keep one")
+            seen[formula] = name
+
+
+def derivative(name: str) -> Monomial:
+    """A hull derivative's formula from its name (SNAME 1950); acceleration derivatives are refused."""
+    if name.endswith("dot"):
+        raise ValueError(f"{name!r} is an acceleration derivative: it belongs in [added_mass]")
+    return monomial(name, MOTIONS)
+
+
+def acceleration_derivative(name: str) -> Monomial:
+    """An added-mass derivative's formula from its name, such as `Y_rdot`."""
+    if not re.fullmatch(rf"[{AXES}]_[{MOTIONS}]dot", name):
+        raise ValueError(f"{name!r} is not an added-mass derivative: write it like 'X_udot' or 'N_vdot'")
+    return Monomial(name[0], ((name[2], False),))
+
+
+def kg_unit(metre: int, second: int) -> str:
+    """`kg m^a s^b` in words."""
+    powers = [f"{symbol}^{power}" if power != 1 else symbol for symbol, power in (("m", metre), ("s", second)) if power]
+    return " ".join(["kg", *powers])
+
+
+def derivative_unit(name: str) -> str:
+    """SI unit of a hull derivative; radians count as 1."""
+    formula = derivative(name)
+    linear = sum(symbol in "uvw" for symbol, _ in formula.factors)
+    return kg_unit((1 if formula.axis in "XYZ" else 2) - linear, formula.order - 2)
+
+
+def acceleration_unit(name: str) -> str:
+    """SI unit of an added-mass derivative: kg, kg m or kg m^2."""
+    return kg_unit((name[0] in "KMN") + (name[2] in "pqr"), 0)
+
+
+def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
+    """Factor from a derivative in the prime system to SI: 1/2 rho L^a U^(2 - order) (SNAME 1950).
+
+    Force = 1/2 rho L^2 U^2, moment = 1/2 rho L^3 U^2, motions u/U, v/U, r L/U; so a = 2 or 3 plus the number of
+    angular factors. U [m/s] is the instantaneous speed and cancels for second-order derivatives.
+    """
+    formula = derivative(name)
+    angular = sum(symbol in "pqr" for symbol, _ in formula.factors)
+    length = (2 if formula.axis in "XYZ" else 3) + angular
+    return rho / 2 * L**length * U ** (2 - formula.order)
+
+
+def thrust_monomial(name: str) -> Monomial:
+    """A thruster coefficient's formula: factors J, y (for J_y) and t (for tanh(|J_y| / width)); `1` is the constant."""
+    return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
+
+
+DERIVATIVES = Grammar(derivative, derivative_unit)
+ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
+THRUST = Grammar(thrust_monomial, lambda name: "-")

@@ -1,0 +1,85 @@
+"""Hull forces in calm water: named derivatives, strip cross-flow drag, straight-ahead resistance."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from shipid.physics.frames import vector
+from shipid.physics.grammar import AXES, DERIVATIVES, MOTIONS, POSITIVE, derivative, prime_scale
+
+SPEED_FLOOR = 0.01  # m/s: keeps 1/U of higher-order prime derivatives finite at rest
+
+
+def derivatives(nu_r: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
+    """Wrench (6) = sum over names of value x monomial(nu_r), on the force side (SNAME 1950).
+
+    nu_r (6) [m/s, rad/s] is the velocity through the water; each value has the SI unit that its name implies.
+    """
+    motions = dict(zip(MOTIONS, ca.vertsplit(nu_r), strict=True))
+    wrench = [SX(1, 1)] * 6
+    for name, value in values.items():
+        formula = derivative(name)
+        axis = AXES.index(formula.axis)
+        wrench[axis] = wrench[axis] + value * formula.value(motions)
+    return ca.vertcat(*wrench)
+
+
+def prime_derivatives(
+    nu_r: SX,
+    *,
+    L_pp: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+    **values: Annotated[SX, DERIVATIVES, "prime"],
+) -> SX:
+    """Wrench (6) of derivatives in the prime system: value x 1/2 rho L^a U^(2-order) x monomial (SNAME 1950).
+
+    L_pp [m] is the reference length, U the instantaneous speed through the water with a floor of 0.01 m/s.
+    """
+    U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
+    return derivatives(nu_r, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()})
+
+
+def strips(*, strips: int) -> dict[str, np.ndarray]:
+    """Midpoints of equal strips as a fraction of the length, and the fraction that each strip covers."""
+    return {"fraction": (np.arange(strips) + 0.5) / strips, "share": np.full(strips, 1.0 / strips)}
+
+
+def cross_flow(
+    nu_r: SX,
+    fraction: SX,
+    share: SX,
+    *,
+    C_d: Annotated[SX, "-"],
+    x_aft: Annotated[SX, "m"],
+    x_fwd: Annotated[SX, "m"],
+    T: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of cross-flow drag on one strip of the hull: dY = -1/2 rho T C_d (v + x r)|v + x r| dx, dN = x dY.
+
+    Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7). x_aft, x_fwd, T [m]; never adds energy for C_d > 0.
+    """
+    x = x_aft + (x_fwd - x_aft) * fraction
+    across = nu_r[1] + x * nu_r[5]
+    dY = -rho / 2 * T * C_d * (x_fwd - x_aft) * share * across * ca.fabs(across)
+    return vector(0, dY, 0, 0, 0, x * dY)
+
+
+def resistance(
+    nu_r: SX,
+    *,
+    R_0: Annotated[SX, "kg m^-1"] = 0.0,
+    R_1: Annotated[SX, "kg m^-2 s"] = 0.0,
+    R_2: Annotated[SX, "kg m^-3 s^2"] = 0.0,
+    R_3: Annotated[SX, "kg m^-4 s^3"] = 0.0,
+    R_4: Annotated[SX, "kg m^-5 s^4"] = 0.0,
+) -> SX:
+    """Wrench (6) of straight-ahead resistance: X = -(R_0 + R_1|u| + R_2 u^2 + R_3|u|^3 + R_4 u^4) u|u| [N]."""
+    u = nu_r[0]
+    a = ca.fabs(u)
+    polynomial = R_0 + a * (R_1 + a * (R_2 + a * (R_3 + a * R_4)))
+    return vector(-polynomial * u * a, 0, 0, 0, 0, 0)

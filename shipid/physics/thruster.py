@@ -1,0 +1,107 @@
+"""Thrusters and their actuators: azimuth units from K_x, K_y polynomials, tunnel units, first-order lags."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import casadi as ca
+from casadi import SX
+
+from shipid.physics.frames import force_at
+from shipid.physics.grammar import POSITIVE, THRUST, thrust_monomial
+
+SHAFT_FLOOR = 1e-3  # rev/s: J = u / (n D) stays finite at n = 0
+
+
+def polynomial(coefficients: Mapping[str, SX], J: SX, J_y: SX, width: SX) -> SX:
+    """Sum of named monomials in J, y = J_y and t = tanh(|J_y| / width)."""
+    symbols = {"J": J, "y": J_y, "t": ca.tanh(ca.fabs(J_y) / width)}
+    return sum((value * thrust_monomial(name).value(symbols) for name, value in coefficients.items()), SX(1, 1))
+
+
+def azimuth(
+    nu_r: SX,
+    n: SX,
+    alpha: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX, "m"],
+    z: Annotated[SX, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    k_T: Annotated[SX, "-"],
+    k_astern: Annotated[SX, "-"],
+    K_x: Annotated[Mapping[str, SX], THRUST],
+    K_y: Annotated[Mapping[str, SX], THRUST],
+    J_t: Annotated[SX, "-", POSITIVE],
+    J_min: Annotated[SX, "-"],
+    J_max: Annotated[SX, "-"],
+    Jy_max: Annotated[SX, "-"],
+    k_over: Annotated[SX, "-"],
+    k_over2: Annotated[SX, "-"],
+    k_under: Annotated[SX, "-"],
+    k_side: Annotated[SX, "-"],
+    k_sideJ: Annotated[SX, "-"],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of an azimuth thruster: F = R(alpha) k_T rho n^2 D_p^4 [K_x(J, J_y), K_y(J, J_y)].
+
+    n [rev/s], alpha [rad, > 0 turns the thrust to starboard]; J, J_y from the water velocity at the unit in its own
+    axes, J = u'/(|n| D_p), turned when astern. The polynomials are used inside J_min..J_max and |J_y| < Jy_max and
+    continued beyond (k_over, k_over2 over-running; k_under; k_side, k_sideJ side drag); astern thrust is k_astern
+    of ahead. Finite at n = 0, where the over-running drag remains.
+    """
+    along, across = nu_r[0] - nu_r[5] * y, nu_r[1] + nu_r[5] * x
+    c, s = ca.cos(alpha), ca.sin(alpha)
+    ahead = n >= 0
+    speed = ca.fmax(ca.fabs(n), SHAFT_FLOOR)
+    sense = ca.if_else(ahead, 1, -1)
+    J = sense * (c * along + s * across) / (speed * D_p)
+    J_y = (c * across - s * along) / (speed * D_p)
+    J_c = ca.fmin(ca.fmax(J, J_min), J_max)
+    Jy_c = ca.fmin(ca.fmax(J_y, -Jy_max), Jy_max)
+    over, under, side = J - ca.fmin(J, J_max), J - ca.fmax(J, J_min), J_y - Jy_c
+    K_x_ = polynomial(K_x, J_c, Jy_c, J_t) - over * (k_over + k_over2 * over) - k_under * under
+    K_y_ = polynomial(K_y, J_c, Jy_c, J_t) - (k_side + k_sideJ * ca.fmax(J_c, 0)) * side
+    scale = k_T * rho * speed**2 * D_p**2 * D_p**2
+    F_x = scale * sense * ca.if_else(ahead, 1, k_astern) * K_x_
+    F_y = scale * K_y_
+    return force_at(x, y, z, c * F_x - s * F_y, s * F_x + c * F_y)
+
+
+def tunnel(
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    z: Annotated[SX, "m"] = 0.0,
+    F_1: Annotated[SX, "N s"],
+    F_2: Annotated[SX, "N s^2"],
+    F_3: Annotated[SX, "N s^3"],
+) -> SX:
+    """Wrench (6) of a transverse tunnel thruster at zero ship speed: Y = F_1 n + F_2 n|n| + F_3 n^3, n [rev/s]."""
+    F_y = n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
+    return force_at(SX(x), SX(1, 1), SX(z), SX(1, 1), F_y)
+
+
+def first_order_output(state: SX) -> SX:
+    """The actual value that a lagged command has reached."""
+    return state
+
+
+def first_order_advance(
+    command: SX,
+    state: SX,
+    dt: SX,
+    *,
+    T: Annotated[SX, "s", POSITIVE],
+    rate: Annotated[SX, "1/s of the command", POSITIVE],
+) -> SX:
+    """First-order lag over dt [s], solved exactly: a+ = c + (a - c) exp(-dt / T), the change limited to rate x dt.
+
+    T [s] time constant, rate in the command's unit per second. Exact for a held command while the limit does not
+    bind, so a step of 1 s with T = 0.5 s does not oscillate.
+    """
+    change = (command - state) * (1 - ca.exp(-dt / T))
+    return state + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
+
+

@@ -1,0 +1,133 @@
+"""What a report shows, as plain values and frames: SI units, radians, no object of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+Floats = np.ndarray[tuple[int, ...], np.dtype[np.floating]]
+PathKey = tuple[str, str, int]
+
+DATA_DRIVEN = "none"  # the family (column `kind`) of the model without physics
+ANCHORS = (
+    "findings",
+    "gain",
+    "horizon",
+    "over-time",
+    "browser",
+    "snapshots",
+    "manoeuvres",
+    "envelope",
+    "repairs",
+    "models",
+    "cells",
+    "provenance",
+)
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One sentence of the answer and the figure or table that carries it.
+
+    Parameters
+    ----------
+    text : plain text.
+    figure : one of `ANCHORS`, or empty for no link; ValueError otherwise.
+    """
+
+    text: str
+    figure: str = ""
+
+    def __post_init__(self) -> None:
+        if self.figure and self.figure not in ANCHORS:
+            raise ValueError(f"no figure is called {self.figure!r}; valid: {', '.join(ANCHORS)}")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim of the paper, what the results say about it, and the numbers they say it with."""
+
+    id: str
+    claim: str
+    verdict: Literal["confirmed", "refuted", "undecided"]
+    evidence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One window of a test run with its predictions, in the frame (11) frozen at the instant of prediction.
+
+    Parameters
+    ----------
+    run, t : test run and instant of prediction [s].
+    outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
+    psi_end : true heading at the end of the horizon, relative to the heading at its start [rad].
+    truth : (T + 1, 2) true x, y from the instant of prediction on [m].
+    paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; physics has N_D = 0.
+    wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
+    """
+
+    run: str
+    t: float
+    outline: Floats
+    psi_end: float
+    truth: Floats
+    paths: Mapping[PathKey, Floats]
+    wind: tuple[float, float] | None = None
+
+
+def _empty(*columns: str) -> pd.DataFrame:
+    return pd.DataFrame(columns=list(columns))
+
+
+@dataclass(frozen=True, eq=False)
+class ReportContent:
+    """Everything one report shows; a frame without rows leaves its figure out.
+
+    `source` is "physics", "cooperative" or "naive". Rows of physics and naive hold whatever the number of
+    manoeuvres and have N_D = 0; the pure data-driven model is the one of kind "none", its source "cooperative".
+
+    Parameters
+    ----------
+    title, name : the study's question in words and its short name.
+    answer : three to five sentences, in order.
+    cells : one row per cell: model, kind, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
+        A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
+    naive : mean, p90, rms [m] of the floor of constant u, v, r.
+    models : model, family, A, A_90, A_rms [m], status, description.
+    horizon : model, N_D, seed, source, ahead [s], mean, p90 [m].
+    over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
+    commands : run, t [s], one column per command in sailors' units, the unit in brackets: "port shaft [rpm]".
+    snapshots : windows of the test runs.
+    tracks : run, set ("train", "validation", "test", ...), north, east [m].
+    envelope : set, quantity, unit, min, mean, max.
+    repairs : kind, column, count, note.
+    provenance : label -> value.
+    study_document, command : the document as TOML text and the command that reproduces the study.
+    """
+
+    title: str
+    name: str
+    answer: list[Sentence]
+    findings: list[Finding]
+    cells: pd.DataFrame
+    naive: Mapping[str, float]
+    models: pd.DataFrame
+    horizon: pd.DataFrame = field(
+        default_factory=lambda: _empty("model", "N_D", "seed", "source", "ahead", "mean", "p90")
+    )
+    over_time: pd.DataFrame = field(
+        default_factory=lambda: _empty("run", "t", "model", "N_D", "seed", "source", "error")
+    )
+    commands: pd.DataFrame = field(default_factory=lambda: _empty("run", "t"))
+    snapshots: list[Snapshot] = field(default_factory=list)
+    tracks: pd.DataFrame = field(default_factory=lambda: _empty("run", "set", "north", "east"))
+    envelope: pd.DataFrame = field(default_factory=lambda: _empty("set", "quantity", "unit", "min", "mean", "max"))
+    repairs: pd.DataFrame = field(default_factory=lambda: _empty("kind", "column", "count", "note"))
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    study_document: str = ""
+    command: str = ""

@@ -1,0 +1,202 @@
+"""Where the error grows: over the horizon, and over the time of a test run with its commands below."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import Floats, ReportContent
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
+from shipid.report.palette import DASHES, INK, NAIVE, styles
+from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
+from shipid.report.wording import counted, listed, metres
+
+BY = ["model", "source", "N_D"]
+COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
+
+
+def horizon(content: ReportContent) -> Figure | None:
+    """Mean and 90th percentile of the error at each second ahead; None without rows."""
+    if content.horizon.empty:
+        return None
+    frame = _settled(content.horizon, content)
+    means = over_seeds(frame, [*BY, "ahead"], ["mean", "p90"])
+    counts, statistics = sizes(means.N_D), (("mean", "mean"), ("90th percentile", "p90"))
+    views = {}
+    for (i, (word, column)), (j, size) in itertools.product(enumerate(statistics), enumerate(counts)):
+        traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
+        y = axis(f"position error, {word} [m]", rangemode="tozero")
+        plot = layout(axis("time ahead [s]", rangemode="tozero"), y, hovermode="x unified")
+        views[f"{i}-{j}"] = [Panel(go.Figure(traces, plot))]
+    return Figure(
+        id="horizon",
+        title="Error over the horizon",
+        takeaway=_takeaway_horizon(content, means, counts[-1]),
+        how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
+        "mean over seeds. " + _drawn(content),
+        alternative="Lines of the position error that grow with the time ahead, one per model with and without "
+        "compensation.",
+        height=420,
+        views=views,
+        controls=[Control("Position error", [word for word, _ in statistics]), _size_control(counts)],
+        chips=model_chips(content, set(means.source)),
+    )
+
+
+def over_time(content: ReportContent) -> Figure | None:
+    """Error per instant of prediction of a test run, the commands below on the same axis; None without rows."""
+    if content.over_time.empty:
+        return None
+    frame = _settled(content.over_time, content)
+    runs = spread(sorted(frame.run.unique()), FEW_RUNS)
+    means = over_seeds(frame[frame.run.isin(runs)], [*BY, "run", "t"], ["error"])
+    counts = sizes(means.N_D)
+    # Controls show run first: it is what a reader looks for.
+    views = {
+        f"{i}-{j}": [Panel(_with_commands(content, means[means.run.eq(run) & means.N_D.isin([0, size])], run))]
+        for (i, run), (j, size) in itertools.product(enumerate(runs), enumerate(counts))
+    }
+    left = content.over_time.run.nunique() - len(runs)
+    return Figure(
+        id="over-time",
+        title="Error over time",
+        takeaway=_takeaway_time(content, means[means.N_D.isin([0, counts[-1]])]),
+        how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
+        "The commands that were given are below. "
+        + _drawn(content)
+        + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
+        alternative="Lines of the position error over the time of one test run, above lines of its commands.",
+        height=300 + 130 * len(_units(content.commands)),
+        views=views,
+        controls=[Control("Test run", runs), _size_control(counts)],
+        chips=[*model_chips(content, set(means.source)), *_command_chips(content.commands)],
+    )
+
+
+def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
+    """Legend of a close-up: models by colour, sources by dash."""
+    looks = styles(content)
+    chips = [Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width) for name in exemplars(content)]
+    words = {"cooperative": "compensated or data-driven", "physics": "physics alone", "naive": "constant velocity"}
+    return chips + [
+        Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, DASHES[source])
+        for source, word in words.items()
+        if source in sources
+    ]
+
+
+def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
+    """Rows of the models in the close-up; physics and naive hold whatever N_D, so theirs is 0."""
+    frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
+    frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
+    kept = frame.model.isin(exemplars(content)) | frame.source.eq("naive")
+    counts = sizes(frame.N_D)
+    return frame[kept & frame.N_D.isin([0, *counts])]
+
+
+def _drawn(content: ReportContent) -> str:
+    """Sentence that says which models are drawn, if not all are."""
+    total, shown = content.models.model.nunique(), exemplars(content)
+    return "" if len(shown) >= total else f"Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
+
+
+def _size_control(counts: Sequence[int]) -> Control:
+    return Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)
+
+
+def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
+    looks, traces = styles(content), []
+    for (model, source), mine in means.groupby(["model", "source"], sort=False):
+        x, y = mine[across].to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
+        ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
+        ink = {"width": looks[model].width if source == "cooperative" else 1.5, **ink} if model else ink
+        pure = model == data_driven(content)
+        name = "constant velocity" if source == "naive" else model if pure else f"{model}, {_word(source)}"
+        keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
+        keep = _visible(x, y)
+        traces.append(line(name, x[keep], y[keep], keys, line={"dash": DASHES[source], **ink}))
+    return traces
+
+
+def _word(source: str) -> str:
+    return "compensated" if source == "cooperative" else "physics alone"
+
+
+def _visible(x: Floats, y: Floats) -> Floats:
+    """Points of a line that a plot of 2,000 pixels can tell apart; a line with gaps is kept whole."""
+    if not np.isfinite(y).all() or len(y) < 3:
+        return np.arange(len(y))
+    span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]
+    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / 2000)
+
+
+def _units(commands: pd.DataFrame) -> dict[str, list[str]]:
+    """Unit -> the command columns in it, in the order of the frame."""
+    units: dict[str, list[str]] = {}
+    for column in commands.columns:
+        if column not in ("run", "t"):
+            units.setdefault(column.partition("[")[2].rstrip("] ") or "1", []).append(column)
+    return units
+
+
+def _command_chips(commands: pd.DataFrame) -> list[Chip]:
+    return [
+        Chip(f"command:{column}", column.partition("[")[0].strip(), INK, COMMAND_DASHES[i % 4], 1.5)
+        for columns in _units(commands).values()
+        for i, column in enumerate(columns)
+    ]
+
+
+def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.Figure:
+    """Error on top; below, one row per unit of the commands, all on one time axis."""
+    units = _units(content.commands)
+    mine = content.commands[content.commands.run == run]
+    traces, gap = _traces(content, means, "t", "error"), 0.06
+    top = 0.0 if not units else 0.22 * len(units) + gap
+    axes = {}
+    for row, (unit, columns) in enumerate(units.items(), start=2):
+        for i, column in enumerate(columns):
+            t, values = mine.t.to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
+            keep = _visible(t, values)
+            ink = {"color": INK, "width": 1.5, "dash": COMMAND_DASHES[i % 4]}
+            name = column.partition("[")[0].strip()
+            traces.append(
+                line(name, t[keep], values[keep], [f"command:{column}"], unit, line=ink, xaxis="x", yaxis=f"y{row}")
+            )
+        low = 0.22 * (len(units) - row + 1)
+        shared = ", ".join(sorted({column.partition("[")[0].split()[-1] for column in columns}))
+        axes[f"yaxis{row}"] = axis(f"{shared} [{unit}]", domain=[low, low + 0.22 - gap], anchor="x", nticks=4)
+    # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
+    lowest = "y" if not units else f"y{len(units) + 1}"
+    x = axis("time of the recording [s]", anchor=lowest)
+    y = axis("position error [m]", rangemode="tozero", domain=[top, 1.0])
+    return go.Figure(traces, layout(x, y, hovermode="x unified", **axes))
+
+
+def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) -> str:
+    end = means[means.ahead.eq(means.ahead.max()) & means.N_D.isin([0, size])]
+    together = end[end.source == "cooperative"].set_index("model")["mean"]
+    alone = end[end.source == "physics"].set_index("model")["mean"]
+    if together.empty:
+        return "No compensated model gave a prediction."
+    best, pure = str(together.idxmin()), data_driven(content)
+    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average"
+    text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
+    return text + (f"; pure data-driven {metres(together[pure])}." if pure in together.index and pure != best else ".")
+
+
+def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
+    together = means[means.source == "cooperative"]
+    if together.empty:
+        return "No compensated model gave a prediction."
+    best = str(together.groupby("model").error.mean().idxmin())
+    worst = together.loc[together[together.model == best].error.idxmax()]
+    text = f"{best}, the best of those drawn, errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    same = means[means.model.eq(best) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)]
+    return f"{text} on average over the horizon" + (
+        f", where its physics alone errs by {metres(float(same.error.iloc[0]))}." if len(same) else "."
+    )

@@ -1,0 +1,244 @@
+"""What physics and data buy: H over N_D, one line per model, or A -> H per model when there is one N_D."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import ReportContent
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.palette import INK, NAIVE, Style, accuracy_range, scale, styles
+from shipid.report.selection import data_driven, families, trained
+from shipid.report.wording import counted, listed, metres
+
+ROW = 46  # height of a model in the dumbbell figure [px]
+
+
+class Statistic(NamedTuple):
+    """One way to sum up the position error: its columns in the cells, the models and the naive floor."""
+
+    name: str
+    cell: str
+    model: str
+    naive: str
+
+
+STATISTICS = (
+    Statistic("mean", "H", "A", "mean"),
+    Statistic("90th percentile", "H_90", "A_90", "p90"),
+    Statistic("root mean square", "rms", "A_rms", "rms"),
+)
+HOW = (
+    "Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of the "
+    "physics alone A (14). Where a cell was trained with several seeds, {seeds}. The dashed line is the naive floor: "
+    "surge, sway and yaw rate held at their values at the instant of prediction."
+)
+
+
+def gain(content: ReportContent) -> Figure:
+    """H over N_D, or the dumbbell A -> H when the study has a single N_D."""
+    means = trained(content)
+    return _over_size(content, means) if content.cells.N_D.nunique() > 1 else _dumbbell(content, means)
+
+
+def unplotted(content: ReportContent) -> str:
+    """Sentence naming the cells that gave no result; empty if all did."""
+    failed = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
+    names = [f"{row.model} at N_D = {row.N_D} ({row.status})" for row in failed.itertuples()]
+    return f" Not plotted: {listed(names, 6)}; reasons in the table of cells." if names else ""
+
+
+def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
+    looks = styles(content)
+    order = [str(name) for name in families(content).model if name in set(content.cells.model)]
+    views = {str(i): [Panel(_lines(content, means, statistic, looks))] for i, statistic in enumerate(STATISTICS)}
+    accuracy = content.cells.groupby("model").A.first()
+    chips = [
+        Chip(
+            f"model:{name}",
+            f"{name}, A {metres(accuracy[name])}" if np.isfinite(accuracy[name]) else name,
+            looks[name].colour,
+            width=looks[name].width,
+            symbol=looks[name].symbol,
+        )
+        for name in order
+    ]
+    return Figure(
+        id="gain",
+        title="What another manoeuvre buys",
+        takeaway=_takeaway_sizes(content, means),
+        how=HOW.format(seeds="the line joins their means and the pale points are the seeds")
+        + " Colour is A; the marker is the family."
+        + unplotted(content),
+        alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
+        "The numbers are in the table of cells.",
+        height=460,
+        views=views,
+        controls=[Control("Position error", [statistic.name for statistic in STATISTICS])],
+        chips=[*chips, Chip("naive", "constant velocity", NAIVE, "dash")],
+    )
+
+
+def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style]) -> go.Figure:
+    sizes = sorted(content.cells.N_D.unique())
+    traces = []
+    for name, style in looks.items():
+        mine = means[means.model == name].set_index("N_D")[statistic.cell]
+        if mine.empty:
+            continue
+        marker = {"symbol": style.symbol, "size": 8, "color": style.colour}
+        keys = [f"model:{name}"]
+        # A size whose cells all failed stays NaN: the line has a gap there.
+        heights = mine.reindex(sizes).to_numpy()
+        ink = {"color": style.colour, "width": style.width}
+        traces.append(line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
+        seeds = content.cells[content.cells.model.eq(name) & content.cells.status.eq("ok")]
+        if seeds.seed.nunique() > 1:
+            faint = {**marker, "size": 5}
+            each = seeds[statistic.cell].to_numpy()
+            traces.append(line(f"{name}, seed", seeds.N_D.to_numpy(), each, keys, "m", "markers", marker=faint))
+            traces[-1].opacity = 0.4
+    traces.append(_floor(content, statistic, [sizes[0], sizes[-1]], across=True))
+    span = accuracy_range(content)
+    if span is not None:
+        traces.append(_colour_bar(span, sizes[0]))
+    x = axis("manoeuvres to train and validate, N_D [1]", tickvals=[int(size) for size in sizes])
+    y = axis(f"position error, {statistic.name} [m]", rangemode="tozero")
+    return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 48, "r": 16, "t": 12, "b": 44}))
+
+
+def _floor(content: ReportContent, statistic: Statistic, ends: list[float], across: bool) -> go.Scatter:
+    level = [content.naive[statistic.naive]] * 2
+    ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
+    trace = line("constant velocity", *((ends, level) if across else (level, ends)), ["naive"], line=ink)
+    trace.hovertemplate = f"constant velocity: {metres(level[0])}<extra></extra>"
+    return trace
+
+
+def _colour_bar(span: tuple[float, float], at: float) -> go.Scatter:
+    """An invisible point that brings the colour bar of A."""
+    bar = {
+        "orientation": "h",
+        "thickness": 10,
+        "len": 0.6,
+        "x": 0,
+        "xanchor": "left",
+        "y": 1.02,
+        "yanchor": "bottom",
+        "outlinewidth": 0,
+        "title": {"text": "error of the physics alone, A [m]", "side": "top"},
+    }
+    marker = {"color": list(span), "colorscale": scale(), "cmin": span[0], "cmax": span[1], "opacity": 0}
+    return go.Scatter(
+        x=[at, at], y=[0, 0], mode="markers", marker={**marker, "showscale": True, "colorbar": bar}, hoverinfo="skip"
+    )
+
+
+def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
+    pure = data_driven(content)
+    if means.empty:
+        return "No cell gave a result."
+    parts = []
+    for size in (means.N_D.min(), means.N_D.max()):
+        here = means[means.N_D == size].set_index("model").H
+        best = str(here.idxmin())
+        text = f"at N_D = {size}, {best} is best with H = {metres(here[best])}"
+        if pure in here.index and len(here) > 1:
+            physics = here.drop(pure)
+            text += f"; {int((physics < here[pure]).sum())} of {len(physics)} physics models beat pure data-driven "
+            text += f"({metres(here[pure])})"
+        parts.append(text)
+    return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}."
+
+
+def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
+    looks, sizes = styles(content), content.cells.N_D.unique()
+    names = [str(name) for name in families(content).model]
+    ranked = means.set_index("model").H.reindex(names).sort_values(na_position="last")
+    views = {
+        str(i): [Panel(_dumbbells(content, means, statistic, looks, list(ranked.index)))]
+        for i, statistic in enumerate(STATISTICS)
+    }
+    return Figure(
+        id="gain",
+        title="What compensation buys",
+        takeaway=_takeaway_dumbbell(content, means),
+        how=f"Open marker: the physics alone; filled: with the compensator trained on N_D = {listed(sizes.astype(str))} "
+        "manoeuvres. "
+        + HOW.format(seeds="the filled marker is their mean and the pale points are the seeds")
+        + unplotted(content),
+        alternative=f"Position error before and after compensation for {counted(len(names), 'model')}. "
+        "The numbers are in the tables of models and cells.",
+        height=ROW * len(names) + 90,
+        views=views,
+        controls=[Control("Position error", [statistic.name for statistic in STATISTICS])],
+        chips=[
+            Chip("before", "physics alone", INK, "none", symbol="circle-open"),
+            Chip("after", "with compensation (or pure data-driven)", INK, "none", symbol="circle"),
+            Chip("naive", "constant velocity", NAIVE, "dash"),
+        ],
+    )
+
+
+def _dumbbells(
+    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style], names: list[str]
+) -> go.Figure:
+    before = content.models.set_index("model")[statistic.model].reindex(names).astype(float)
+    after = means.set_index("model")[statistic.cell].reindex(names)
+    traces, texts = [_floor(content, statistic, [len(names) - 0.4, -0.6], across=False)], []
+    for row, name in enumerate(names):
+        colour, old, new = looks[name].colour, before[name], after[name]
+        good = content.cells[content.cells.model.eq(name) & content.cells.status.eq("ok")][statistic.cell]
+        traces.append(line(name, [old, new], [row, row], ["before", "after"], line={"color": colour, "width": 3}))
+        traces[-1].hoverinfo, traces[-1].hovertemplate = "skip", None
+        traces.append(_dot(name, old, row, "before", "circle-open", colour))
+        if len(good) > 1:
+            traces += [_dot(name, each, row, "after", "circle", colour, small=True) for each in good]
+        traces.append(_dot(name, new, row, "after", "circle", colour))
+        texts.append(_row_text(name, row, old, new))
+    x = axis(f"position error, {statistic.name} [m]", rangemode="tozero")
+    y = axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
+    return go.Figure(
+        traces, layout(x, y, annotations=texts, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44})
+    )
+
+
+def _dot(name: str, value: float, row: int, key: str, symbol: str, colour: str, small: bool = False) -> go.Scatter:
+    marker = {"symbol": symbol, "size": 7 if small else 13, "color": colour, "line": {"width": 2, "color": colour}}
+    what = "physics alone" if key == "before" else "with compensation"
+    trace = line(name, [value], [row], [key], mode="markers", marker=marker, opacity=0.4 if small else 1.0)
+    trace.hovertemplate = f"{label(name)}, {what}: %{{x:.2f}} m<extra></extra>"
+    return trace
+
+
+def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
+    """Name and numbers of a row, written above it: long names need no margin then."""
+    numbers = " → ".join(metres(value) for value in (old, new) if np.isfinite(value))
+    if not np.isfinite(new):
+        numbers += f"{', ' if numbers else ''}compensation failed"
+    return {
+        "x": 0,
+        "xref": "paper",
+        "xanchor": "left",
+        "y": row,
+        "yshift": 17,
+        "showarrow": False,
+        "text": f"<b>{label(name)}</b>  {numbers}",
+    }
+
+
+def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
+    after = means.set_index("model").H
+    if after.empty:
+        return "No cell gave a result."
+    before = content.models.set_index("model").A.reindex(after.index).dropna()
+    better = before.index[after[before.index] < before]
+    best, pure = str(after.idxmin()), data_driven(content)
+    text = f"{best} predicts best, H = {metres(after[best])}; compensation improves {len(better)} of "
+    text += f"{counted(len(before), 'physics model')}"
+    if pure in after.index:
+        text += f"; pure data-driven stands at {metres(after[pure])}"
+    return f"{text}; the naive floor is {metres(content.naive['mean'])}."

@@ -1,0 +1,81 @@
+"""Colours: one per model, the same in every figure, as names of CSS variables that the page resolves.
+
+Figures hold `var(--...)` instead of colours, so that one figure serves a light, a dark and a printed page.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from plotly.colors import sample_colorscale
+
+from shipid.report.content import DATA_DRIVEN, ReportContent
+from shipid.report.selection import FEW_MODELS, families
+
+INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
+LEVELS = 24
+# Okabe and Ito (2008), "Color universal design"; yellow and black are left out: one page is white, one nearly black.
+OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+SYMBOLS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
+DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How one model is drawn: colour (CSS variable), marker of its family, line width [px]."""
+
+    colour: str
+    symbol: str
+    width: float
+
+
+def variables(dark: bool) -> str:
+    """CSS declarations of the model colours: viridis cut to what stands out from the page, and Okabe-Ito."""
+    ends = (0.28, 1.0) if dark else (0.0, 0.72)
+    scale = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
+    lines = [f"--scale-{i}: {colour};" for i, colour in enumerate(scale)]
+    lines += [f"--category-{i}: {colour};" for i, colour in enumerate(OKABE_ITO)]
+    return " ".join(lines)
+
+
+def category(index: int) -> str:
+    """A colour for the index-th of a few named things."""
+    return f"var(--category-{index % len(OKABE_ITO)})"
+
+
+def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
+    """Smallest and largest A [m] if models are coloured by A; None if there are few and each has its own colour."""
+    frame = families(content)
+    physics = frame.A[frame.A.notna() & (frame.family != DATA_DRIVEN)]
+    if len(frame) <= FEW_MODELS or physics.empty:
+        return None
+    return float(physics.min()), float(physics.max())
+
+
+def scale() -> list[list[float | str]]:
+    """The colour scale of A for a colour bar, in Plotly's form."""
+    return [[i / (LEVELS - 1), f"var(--scale-{i})"] for i in range(LEVELS)]
+
+
+def styles(content: ReportContent) -> dict[str, Style]:
+    """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
+    frame, span = families(content), accuracy_range(content)
+    kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
+    result = {}
+    for index, row in enumerate(frame.itertuples()):
+        if row.family == DATA_DRIVEN:
+            result[str(row.model)] = Style(INK, "x", 3.5)
+            continue
+        colour = category(index) if span is None else _by_accuracy(float(str(row.A)), span)
+        result[str(row.model)] = Style(colour, SYMBOLS[kinds.index(row.family) % len(SYMBOLS)], 2.0)
+    return result
+
+
+def _by_accuracy(accuracy: float, span: tuple[float, float]) -> str:
+    low, high = span
+    if not np.isfinite(accuracy):  # A could not be found: its physics diverged
+        return MUTED
+    share = (accuracy - low) / (high - low) if high > low else 0.0
+    return f"var(--scale-{round(share * (LEVELS - 1))})"

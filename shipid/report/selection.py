@@ -1,0 +1,93 @@
+"""Which models, data sets and runs a figure draws, and how seeds become one line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
+
+FEW_MODELS = 6  # up to here every model has a colour of its own and is drawn everywhere
+FEW_RUNS = 12  # test runs in the error-over-time figure and the window browser
+
+
+def spread(items: Sequence[str], count: int) -> list[str]:
+    """At most `count` items at even distances, first and last included."""
+    if len(items) <= count:
+        return list(items)
+    return [items[i] for i in np.linspace(0, len(items) - 1, count).round().astype(int)]
+
+
+def families(content: ReportContent) -> pd.DataFrame:
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last."""
+    known = content.models[["model", "family", "A"]]
+    trained = content.cells[["model", "kind", "A"]].rename(columns={"kind": "family"})
+    joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})
+    frame = joined.groupby("model", sort=False, as_index=False).agg({"family": "first", "A": "first"})
+    frame["last"] = frame.family == DATA_DRIVEN
+    return frame.sort_values(["last", "A"], kind="stable", ignore_index=True).drop(columns="last")
+
+
+def data_driven(content: ReportContent) -> str | None:
+    """Name of the pure data-driven model, if the study has one."""
+    frame = families(content)
+    names = frame.model[frame.family == DATA_DRIVEN]
+    return None if names.empty else str(names.iloc[0])
+
+
+def exemplars(content: ReportContent) -> list[str]:
+    """Models drawn in close-ups: all of a few, else per family the one of middle A."""
+    frame = families(content)
+    if len(frame) <= FEW_MODELS:
+        return [str(name) for name in frame.model]
+    kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
+    middle = {str(group.model.iloc[len(group) // 2]) for _, group in kept.groupby("family")}
+    return [str(name) for name in frame.model if name in middle]
+
+
+def sizes(values: pd.Series[int], count: int = 3) -> list[int]:
+    """Small, middle and large N_D among those present (0, physics alone, is none)."""
+    present = [str(size) for size in sorted({int(value) for value in values if value > 0})]
+    return [int(size) for size in spread(present, count)]
+
+
+def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:
+    """Mean over seeds (and over whatever else `by` does not name), NaN rows left out of the mean."""
+    return frame.groupby(by, sort=True, as_index=False)[values].mean()
+
+
+def trained(content: ReportContent) -> pd.DataFrame:
+    """Cells that gave a result, by model and N_D: mean over seeds of H, H_90, rms [m] and the number of seeds."""
+    good = content.cells[content.cells.status.eq("ok") & content.cells.H.notna()]
+    means = over_seeds(good, ["model", "N_D"], ["H", "H_90", "rms"])
+    return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
+
+
+def thinned(points: Floats, tolerance: float) -> Floats:
+    """Indices of the points of a line that a pixel can tell apart (Ramer 1972; Douglas and Peucker 1973).
+
+    Parameters
+    ----------
+    points : (n, 2), in the same unit as tolerance.
+    tolerance : largest distance of a dropped point from the line that is kept.
+    """
+    keep = np.zeros(len(points), dtype=bool)
+    keep[[0, -1]] = True
+    pieces = [(0, len(points) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        along = points[last] - points[first]
+        inner = points[first + 1 : last] - points[first]
+        # Distance from the segment, not from its line: a track may come back to where it began.
+        share = np.clip(inner @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+        away = np.linalg.norm(inner - share[:, None] * along, axis=1)
+        worst = int(np.argmax(away))
+        if away[worst] > tolerance:
+            middle = first + 1 + worst
+            keep[middle] = True
+            pieces += [(first, middle), (middle, last)]
+    return np.flatnonzero(keep)

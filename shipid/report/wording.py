@@ -1,0 +1,35 @@
+"""Numbers and lists as a reader wants them in a sentence or a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def number(value: float) -> str:
+    """Three digits, two decimals at most: 0.83, 12.4, 131; NaN is a dash."""
+    if not math.isfinite(value):
+        return "–"
+    decimals = 2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def metres(value: float) -> str:
+    """A length with its unit."""
+    return f"{number(value)} m"
+
+
+def distance(value: float) -> str:
+    """A distance between places: metres, or kilometres from 1,000 m on."""
+    return f"{value / 1000:.1f} km" if value >= 1000 else f"{value:.0f} m"
+
+
+def listed(names: Sequence[str], limit: int = 4) -> str:
+    """Join as `a, b and c`; what exceeds the limit is counted."""
+    shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
+    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
+
+
+def counted(count: int, noun: str) -> str:
+    """`1 run`, `3 runs`."""
+    return f"{count:,} {noun}" + ("" if count == 1 else "s")

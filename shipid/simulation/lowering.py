@@ -1,0 +1,284 @@
+"""A CasADi SX function as PyTorch: one tensor operation an instruction, so that whole batches go at once.
+
+The printer walks the instructions of the function. What depends on parameters alone is printed into a prologue that
+runs once a rollout; the rest broadcasts over (variant, sample). Nothing of the physics is written twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import torch
+
+from shipid.simulation.rollout import Batch, Method, integrate
+from shipid.vessel.dynamics import Dynamics
+
+EAGER_BLOCK = 16384  # samples of one block: the intermediate results of a step stay in the cache
+COMPILED_BLOCK = 8192
+
+_UNARY = {
+    ca.OP_NEG: "(-{0})",
+    ca.OP_EXP: "torch.exp({0})",
+    ca.OP_LOG: "torch.log({0})",
+    ca.OP_SQRT: "torch.sqrt({0})",
+    ca.OP_SQ: "({0} * {0})",
+    ca.OP_TWICE: "({0} + {0})",
+    ca.OP_SIN: "torch.sin({0})",
+    ca.OP_COS: "torch.cos({0})",
+    ca.OP_TAN: "torch.tan({0})",
+    ca.OP_ASIN: "torch.asin({0})",
+    ca.OP_ACOS: "torch.acos({0})",
+    ca.OP_ATAN: "torch.atan({0})",
+    ca.OP_SINH: "torch.sinh({0})",
+    ca.OP_COSH: "torch.cosh({0})",
+    ca.OP_TANH: "torch.tanh({0})",
+    ca.OP_FABS: "torch.abs({0})",
+    ca.OP_SIGN: "torch.sign({0})",
+    ca.OP_INV: "torch.reciprocal({0})",
+    ca.OP_NOT: "({0} == 0).to({0}.dtype)",
+    ca.OP_FLOOR: "torch.floor({0})",
+    ca.OP_CEIL: "torch.ceil({0})",
+}
+_BINARY = {
+    ca.OP_ADD: "({0} + {1})",
+    ca.OP_SUB: "({0} - {1})",
+    ca.OP_MUL: "({0} * {1})",
+    ca.OP_DIV: "({0} / {1})",
+    ca.OP_POW: "torch.pow({0}, {1})",
+    ca.OP_CONSTPOW: "torch.pow({0}, {1})",
+    ca.OP_ATAN2: "_atan2({0}, {1})",
+    ca.OP_FMIN: "_minimum({0}, {1})",
+    ca.OP_FMAX: "_maximum({0}, {1})",
+    ca.OP_LT: "({0} < {1})",
+    ca.OP_LE: "({0} <= {1})",
+    ca.OP_EQ: "({0} == {1})",
+    ca.OP_NE: "({0} != {1})",
+    ca.OP_AND: "(({0} != 0) & ({1} != 0))",
+    ca.OP_OR: "(({0} != 0) | ({1} != 0))",
+    ca.OP_IF_ELSE_ZERO: "_where({0}, {1})",
+}
+_TRUTH = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR}
+
+
+def _minimum(a: Any, b: Any) -> torch.Tensor:
+    if isinstance(b, float):
+        return torch.clamp(a, max=b)
+    return torch.clamp(b, max=a) if isinstance(a, float) else torch.minimum(a, b)
+
+
+def _maximum(a: Any, b: Any) -> torch.Tensor:
+    if isinstance(b, float):
+        return torch.clamp(a, min=b)
+    return torch.clamp(b, min=a) if isinstance(a, float) else torch.maximum(a, b)
+
+
+def _atan2(a: Any, b: Any) -> torch.Tensor:
+    like = b if isinstance(a, float) else a
+    return torch.atan2(torch.as_tensor(a, dtype=like.dtype), torch.as_tensor(b, dtype=like.dtype))
+
+
+def _where(condition: Any, value: Any) -> torch.Tensor:
+    return torch.where(condition != 0, value, 0.0)
+
+
+_NAMES = {"torch": torch, "_minimum": _minimum, "_maximum": _maximum, "_atan2": _atan2, "_where": _where}
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """A lowered function.
+
+    prologue : parameters (num_parameters, ...) -> hoisted (num_hoisted, ...), once a rollout.
+    main : the function's inputs in order, parameters replaced by hoisted, channel first -> list of output channels.
+    """
+
+    prologue: Callable[[torch.Tensor], torch.Tensor]
+    main: Callable[..., list[Any]]
+    num_instructions: int
+
+
+def lower(function: ca.Function, parameters: str = "parameters") -> Lowered:
+    """Lower an SX function of dense vectors with one output; `parameters` names the input that the prologue takes.
+
+    An instruction that has no PyTorch counterpart raises ValueError with its number.
+    """
+    names = [function.name_in(i) for i in range(function.n_in())]
+    held = names.index(parameters)
+    lines: dict[bool, list[str]] = {True: [], False: []}  # True: prologue
+    slot: dict[int, tuple[str, bool | None]] = {}  # work slot -> expression, is it parameter-only (None: a number)
+    hoisted: dict[str, int] = {}
+    outputs: dict[int, tuple[str, bool | None]] = {}
+
+    def use(operand: tuple[str, bool | None], in_prologue: bool) -> str:
+        text, parameter_only = operand
+        if in_prologue or not parameter_only:
+            return text
+        return f"h[{hoisted.setdefault(text, len(hoisted))}]"
+
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        source, target = function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            slot[target[0]] = (repr(float(function.instruction_constant(k))), None)
+        elif operation == ca.OP_INPUT:
+            slot[target[0]] = (f"{names[source[0]]}[{source[1]}]", source[0] == held)
+        elif operation == ca.OP_OUTPUT:
+            outputs[target[1]] = slot[source[0]]
+        else:
+            operands = [slot[i] for i in source]
+            template = _UNARY.get(operation) or _BINARY.get(operation)
+            if template is None:
+                raise ValueError(f"CasADi operation {operation} of {function.name()} has no PyTorch counterpart")
+            kinds = {kind for _, kind in operands}
+            if kinds == {None}:
+                value = float(ca.evalf(_on_numbers(operation, [float(text) for text, _ in operands])))
+                slot[target[0]] = (repr(value), None)
+                continue
+            in_prologue = kinds <= {True, None}
+            expression = template.format(*(use(operand, in_prologue) for operand in operands))
+            name = f"{'p' if in_prologue else 'a'}{k}"
+            lines[in_prologue].append(f"    {name} = {expression}")
+            slot[target[0]] = (name, in_prologue)
+
+    arguments = ["h" if name == parameters else name for name in names]
+    result = ", ".join(use(outputs[i], False) for i in sorted(outputs))
+    main = [f"def main({', '.join(arguments)}):", *lines[False], f"    return [{result}]"]
+    saved = ", ".join(hoisted) or f"{parameters}[0]"
+    prologue = [f"def prologue({parameters}):", *lines[True], f"    return _stack({parameters}, [{saved}])"]
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack}
+    exec(compile("\n".join([*prologue, "", *main]), f"<lowered {function.name()}>", "exec"), space)
+    return Lowered(space["prologue"], space["main"], len(lines[False]))
+
+
+def _on_numbers(operation: int, values: Sequence[float]) -> ca.SX:
+    return ca.SX.unary(operation, values[0]) if len(values) == 1 else ca.SX.binary(operation, *values)
+
+
+def _stack(like: torch.Tensor, values: Sequence[Any]) -> torch.Tensor:
+    shape = like.shape[1:]
+    return torch.stack([torch.as_tensor(value, dtype=like.dtype).expand(shape) for value in values])
+
+
+@dataclass(frozen=True)
+class Program:
+    """A lowered step: `prologue(parameters)` once a rollout, then `step(x, m, commands, environment, tau, *hoisted)`."""
+
+    prologue: Callable[[torch.Tensor], list[torch.Tensor]]
+    step: Callable[..., tuple[torch.Tensor, torch.Tensor]]
+
+
+@lru_cache(maxsize=32)
+def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Program:
+    """Lower the functions of a vessel's structure and put the integrator around them; one compilation each."""
+    lowered_rates, lowered_advance = lower(model.rates), lower(model.advance)
+    lowered_sums = [(lower(term.function), torch.tensor(term.arrays.T)) for term in model.sums]
+
+    def prologue(parameters: torch.Tensor) -> list[torch.Tensor]:
+        hoisted = [lowered_rates.prologue(parameters), lowered_advance.prologue(parameters)]
+        return hoisted + [function.prologue(parameters).unsqueeze(-1) for function, _ in lowered_sums]
+
+    def one_step(
+        x: torch.Tensor,
+        m: torch.Tensor,
+        commands: torch.Tensor,
+        environment: torch.Tensor,
+        tau: torch.Tensor,
+        *hoisted: torch.Tensor,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        h_rates, h_advance, *h_sums = hoisted
+
+        def rates(state: Any, memory: Any) -> Any:
+            total = tau
+            for (function, arrays), h in zip(lowered_sums, h_sums, strict=True):
+                wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory, commands, environment)]
+                wrench = function.main(*wide, h, arrays.to(tau))
+                total = [a + b.sum(-1) if isinstance(b, torch.Tensor) else a + b for a, b in zip(total, wrench, strict=True)]
+            return lowered_rates.main(state, memory, commands, environment, h_rates, total)
+
+        def advance(memory: Any, dt: float) -> Any:
+            return lowered_advance.main(x, memory, commands, environment, h_advance, [dt])
+
+        after, memory_after = integrate(rates, advance, _add, list(x), list(m), step, method)
+        return torch.stack(after), torch.stack(memory_after) if memory_after else m
+
+    return Program(prologue, torch.compile(one_step, dynamic=False, fullgraph=True) if compiled else one_step)
+
+
+def _add(x: Sequence[Any], a: float, k: Sequence[Any]) -> list[Any]:
+    return [xi + a * ki for xi, ki in zip(x, k, strict=True)]
+
+
+def run_torch(
+    model: Dynamics,
+    batch: Batch,
+    step: float,
+    num_steps: int,
+    method: Method,
+    every: int,
+    rows: list[int],
+    compiled: bool,
+    device: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
+
+    Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
+    a family of any size needs one compilation and a block stays in the cache.
+    """
+    program = _program(model, method, step, compiled)
+    num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
+    width = min(COMPILED_BLOCK if compiled else EAGER_BLOCK, 1 << max(0, num_samples - 1).bit_length())
+    padded = -(-num_samples // width) * width
+    place = torch.device(device)
+
+    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, padded S)
+        filled = np.concatenate([array, np.repeat(array[..., -1:], padded - num_samples, axis=-1)], axis=-1)
+        return torch.tensor(filled, dtype=torch.float64, device=place).unsqueeze(-2)
+
+    start, memory = tensor(batch.state), tensor(batch.memory)
+    held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
+    values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
+    groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
+    records = torch.empty(
+        (num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place
+    )
+    worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
+    with torch.no_grad():
+        for group in groups:
+            hoisted = program.prologue(values[:, group])
+            for left in range(0, padded, width):
+                block = slice(left, left + width)
+                inputs = [channel[..., block] for channel in held]
+                shape = (-1, hoisted[0].shape[1], width)
+                state = [start[..., block].expand(shape).contiguous(), memory[..., block].expand(shape).contiguous()]
+                worst[group, block] = _run_block(program, state, inputs, hoisted, records[..., group, block], rows, every)
+    result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
+    return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
+
+
+def _run_block(
+    program: Program,
+    state: list[torch.Tensor],
+    inputs: list[torch.Tensor],
+    hoisted: list[torch.Tensor],
+    records: torch.Tensor,
+    rows: list[int],
+    every: int,
+) -> torch.Tensor:
+    """All steps of one block; fills `records` (R, C, V, S) and returns the greatest speed (V, S)."""
+    x, m = state
+    num_dof = x.shape[0] // 2
+    greatest = torch.zeros_like(x[0])
+    for record in range(len(records)):
+        if record:
+            for k in range((record - 1) * every, record * every):
+                now = [series[min(k, len(series) - 1)] for series in inputs]
+                x, m = program.step(x, m, *now, *hoisted)
+        both = torch.cat([x, m]) if len(m) else x
+        records[record] = both[rows]
+        greatest = torch.maximum(greatest, both[num_dof : 2 * num_dof].abs().amax(0) + 0 * both.sum(0))
+    return greatest

@@ -1,0 +1,1 @@
+"""From a document to equations: read a vessel, perturb it, assemble its dynamics."""

@@ -1,0 +1,224 @@
+"""What a vessel document may say, read off the signatures of the physics: no second list to keep in step."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
+
+from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
+from shipid.physics.grammar import POSITIVE, Grammar
+from shipid.physics.inertia import added_mass, rigid_body
+
+DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
+
+PARTICULARS = {
+    "L_pp": "m",
+    "L_oa": "m",
+    "B": "m",
+    "T": "m",
+    "C_b": "-",
+}
+CONSTANTS = {"rho": "kg m^-3", "rho_a": "kg m^-3", "g": "m s^-2"}
+SHARED = {**{name: "particulars" for name in PARTICULARS}, **{name: "constants" for name in CONSTANTS}}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One keyword argument of a physics function: its unit (or grammar), shape and default."""
+
+    name: str
+    unit: str | Grammar
+    kind: Literal["number", "list", "table", "open"]
+    positive: bool
+    default: float | None
+
+
+@cache
+def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
+    """Parameters of a physics function, in order, from its keyword-only arguments and `**` table."""
+    hints = get_type_hints(function, include_extras=True)
+    found = []
+    for name, argument in inspect.signature(function).parameters.items():
+        if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
+            continue
+        if get_origin(hints[name]) is not Annotated:
+            continue
+        base, unit, *marks = get_args(hints[name])
+        kind: Literal["number", "list", "table", "open"] = "number"
+        if argument.kind is argument.VAR_KEYWORD:
+            kind = "open"
+        elif get_origin(base) is list:
+            kind = "list"
+        elif isinstance(unit, Grammar):
+            kind = "table"
+        default = None if argument.default is argument.empty else float(argument.default)
+        found.append(Parameter(name, unit, kind, POSITIVE in marks, default))
+    return tuple(found)
+
+
+@cache
+def signals(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Positional arguments of a physics function."""
+    return tuple(
+        name
+        for name, argument in inspect.signature(function).parameters.items()
+        if argument.kind is argument.POSITIONAL_OR_KEYWORD
+    )
+
+
+@cache
+def counts(term: Term) -> tuple[str, ...]:
+    """Structural whole numbers of a term that sums over components, such as `strips`."""
+    return tuple(inspect.signature(term.components).parameters) if term.components else ()
+
+
+class Block(BaseModel):
+    """Part of a vessel document: nothing but what is declared, and a word on where the numbers come from."""
+
+    model_config = ConfigDict(extra="forbid", strict=False, populate_by_name=True)
+    source: str | None = Field(default=None, description="where the numbers come from")
+
+
+def _number(parameter: Parameter) -> Any:
+    return Annotated[FiniteFloat, Field(gt=0)] if parameter.positive else FiniteFloat
+
+
+def _unit_note(parameter: Parameter) -> str:
+    return parameter.unit if isinstance(parameter.unit, str) else "by name"
+
+
+def _checked_table(grammar: Grammar) -> Any:
+    def check(table: dict[str, float]) -> dict[str, float]:
+        grammar.check(table)
+        return table
+
+    from pydantic import AfterValidator
+
+    return Annotated[dict[str, FiniteFloat], AfterValidator(check)]
+
+
+def block_model(name: str, function: Callable[..., Any], **extra: Any) -> type[Block]:
+    """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
+    fields: dict[str, Any] = dict(extra)
+    validators: dict[str, Any] = {}
+    config = ConfigDict(extra="forbid", populate_by_name=True)
+    for parameter in parameters(function):
+        if parameter.kind == "open":
+            grammar = parameter.unit
+            assert isinstance(grammar, Grammar)
+            config = ConfigDict(extra="allow", populate_by_name=True)
+            fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
+            validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
+            continue
+        note = Field(description=_unit_note(parameter))
+        if parameter.kind == "list":
+            fields[parameter.name] = (Annotated[list[FiniteFloat], Field(min_length=2), note], ...)
+        elif parameter.kind == "table":
+            assert isinstance(parameter.unit, Grammar)
+            fields[parameter.name] = (Annotated[_checked_table(parameter.unit), note], ...)
+        elif parameter.name in SHARED:
+            fields[parameter.name] = (Annotated[_number(parameter) | None, note], None)
+        elif parameter.default is not None:
+            fields[parameter.name] = (Annotated[_number(parameter), note], parameter.default)
+        else:
+            fields[parameter.name] = (Annotated[_number(parameter), note], ...)
+    base = type("Base", (Block,), {"model_config": config, "__module__": __name__})
+    return create_model(name, __base__=base, __validators__=validators, **fields)
+
+
+def _name_check(grammar: Grammar) -> Callable[[Any], Any]:
+    def check(block: Any) -> Any:
+        grammar.check(block.model_extra or {})
+        return block
+
+    return check
+
+
+def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
+    fields: dict[str, Any] = {
+        key: (Annotated[FiniteFloat, Field(gt=0, description=unit)] | None, None) for key, unit in units.items()
+    }
+    return create_model(name, __base__=Block, **fields)
+
+
+def _term_model(key: str) -> type[Block]:
+    """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
+    term = TERMS[key]
+    group, kind = key.split(".")
+    extra: dict[str, Any] = {"off": (bool, False)}
+    if group != "hull":
+        extra["kind"] = (Literal[kind], ...)
+    for count in counts(term):
+        extra[count] = (Annotated[int, Field(ge=1, le=1000)], ...)
+    commands = [signal for signal in signals(term.function) if signal in SIGNALS.commands]
+    if commands:
+        fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
+        extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
+    return block_model(f"{group}_{kind}", term.function, **extra)
+
+
+def _actuator_union() -> Any:
+    models = [
+        block_model(f"actuator_{kind}", memory.advance, kind=(Literal[kind], ...)) for kind, memory in ACTUATORS.items()
+    ]
+    return _union(models)
+
+
+def _union(models: list[type[Block]]) -> Any:
+    if len(models) == 1:
+        return models[0]
+    union: Any = models[0]
+    for model in models[1:]:
+        union = union | model
+    return Annotated[union, Field(discriminator="kind")]
+
+
+def kinds(group: str) -> list[str]:
+    """Kinds of term in a group."""
+    return [key.split(".")[1] for key in TERMS if key.split(".")[0] == group]
+
+
+def _named(group: str) -> Any:
+    return _union([_term_model(f"{group}.{kind}") for kind in kinds(group)])
+
+
+@cache
+def vessel_model() -> type[BaseModel]:
+    """Pydantic model of a whole vessel document; its JSON schema serves editors."""
+    hull_fields: dict[str, Any] = {kind: (_term_model(f"hull.{kind}") | None, None) for kind in kinds("hull")}
+    hull = create_model("hull", __base__=Block, **hull_fields)
+    component = Annotated[dict[str, _named("thruster")], Field(default_factory=dict)]
+    current = create_model("current", __base__=Block, kind=(Literal["uniform"], ...))
+    return create_model(
+        "vessel",
+        __base__=Block,
+        name=(str, ...),
+        description=(str | None, None),
+        dof=(Literal[3, 4, 6], ...),
+        particulars=(_dimension_model("particulars", PARTICULARS) | None, None),
+        constants=(_dimension_model("constants", CONSTANTS) | None, None),
+        inertia=(block_model("inertia", rigid_body), ...),
+        added_mass=(block_model("added_mass", added_mass) | None, None),
+        hull=(hull | None, None),
+        wind=(_named("wind") | None, None),
+        thruster=(component, ...),
+        current=(current | None, None),
+    )
+
+
+def term_blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Dotted path, TERMS key and block of every term of a vessel document that is not off."""
+    groups = dict.fromkeys(key.split(".")[0] for key in TERMS)
+    for group in groups:
+        block = document.get(group)
+        if not isinstance(block, Mapping):
+            continue
+        named = {"": block} if "kind" in block else {k: v for k, v in block.items() if isinstance(v, Mapping)}
+        for name, entry in named.items():
+            if not entry.get("off", False):
+                yield (f"{group}.{name}" if name else group), f"{group}.{entry.get('kind', name)}", entry
