@@ -180,9 +180,7 @@ def _turn(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
     return rows.assign(**turned)
 
 
-def _close_gaps(
-    rows: pd.DataFrame, max_gap: float | None, file: Path
-) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
     """Fill gaps of at most `max_gap` [s] between known values, remove the other rows, and break the run there."""
     t, flags = rows["t"].to_numpy(), rows["flags"].to_numpy().copy()
     removed, records, filled = np.zeros(len(t), dtype=bool), [], {}

@@ -147,7 +147,9 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
     _factor(mapping.clock.unit, "s", file, "clock.unit")
     columns, mapped = mapping.columns, (*REQUIRED.keys() - {"t"}, *OPTIONAL)
     for name in REQUIRED.keys() - {"t"} - columns.keys():
-        raise DocumentError(f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}", file=file, path=f"columns.{name}")
+        raise DocumentError(
+            f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}", file=file, path=f"columns.{name}"
+        )
     for name, column in columns.items():
         unit, path = unit_of(name), f"columns.{name}"
         if unit is None or name == "t":
@@ -160,7 +162,9 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
         if column.wrap and unit != "rad":
             raise DocumentError("only an angle wraps", file=file, path=f"{path}.wrap")
     if columns["u"].frame != columns["v"].frame:
-        raise DocumentError("u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame")
+        raise DocumentError(
+            "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
+        )
     for name in columns.keys() - {"u", "v"}:
         if columns[name].frame == "earth":
             raise DocumentError("only u and v can be earth-fixed", file=file, path=f"columns.{name}.frame")

@@ -121,7 +121,7 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
 def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
 
-    Windows do not reach over a break, where a jump is no spike.
+    Windows are whole and do not reach over a break: half a window of a moving ship has its median elsewhere.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     width = 2 * int(round(repair.window / 2 / float(np.median(np.diff(t))))) + 1
@@ -129,7 +129,7 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     healed = {}
     for name in repair.columns:
         pieces = rows[name].groupby(stretch)
-        median = pieces.transform(lambda piece: piece.rolling(width, center=True, min_periods=1).median())
+        median = pieces.transform(lambda piece: piece.rolling(width, center=True, min_periods=width).median())
         spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
         healed[name] = interpolate_at(t, rows[name].to_numpy(), spikes)
         touched |= spikes

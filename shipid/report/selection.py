@@ -48,9 +48,9 @@ def exemplars(content: ReportContent) -> list[str]:
 
 
 def sizes(values: pd.Series[int], count: int = 3) -> list[int]:
-    """Small, middle and large N_D among those present (0, physics alone, is none)."""
-    present = [str(size) for size in sorted({int(value) for value in values if value > 0})]
-    return [int(size) for size in spread(present, count)]
+    """Small, middle and large N_D among those present; physics alone (N_D = 0) counts only if there is nothing else."""
+    present = sorted({int(value) for value in values if value > 0}) or [0]
+    return [int(size) for size in spread([str(size) for size in present], count)]
 
 
 def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:

@@ -1,0 +1,61 @@
+"""Public sets: the log behind a bundled mapping, from the data folder or from where it is published."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pooch
+
+from shipid import document
+from shipid.data.importing import sha256_of
+from shipid.data.mapping import read_mapping
+from shipid.errors import DataError
+
+FOLDER_VARIABLE = "SHIPID_DATA"
+
+
+def available() -> list[str]:
+    """Names of the bundled mappings, each one that `fetch` understands."""
+    return list(document.bundled("studies/mappings"))
+
+
+def fetch(name: str) -> Path:
+    """File of the log behind a mapping, its checksum verified.
+
+    With the environment variable SHIPID_DATA set, the log is looked for in that folder and nothing is downloaded;
+    else it comes from the mapping's url, once, into the cache folder of the user.
+
+    Raises
+    ------
+    DataError : if the log is not there, cannot be downloaded, or is another file than the mapping was written for.
+    """
+    source = read_mapping(name).source
+    folder = os.environ.get(FOLDER_VARIABLE)
+    if folder:
+        if source.file is None:
+            raise DataError("the mapping names no file in a data folder", file=name, path="source.file")
+        file = Path(folder) / source.file
+        if not file.is_file():
+            message = f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})"
+            raise DataError(message, file=file)
+        if source.sha256 not in (None, sha256_of(file)):
+            message = f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}"
+            raise DataError(message, file=file, path="source.sha256")
+        return file
+    if source.url is None or source.sha256 is None:
+        raise DataError(f"nothing to download: set {FOLDER_VARIABLE}", file=name, path="source.url")
+    return _download(name, source.url, source.sha256)
+
+
+def _download(name: str, url: str, sha256: str) -> Path:
+    cache = Path(pooch.os_cache("shipid"))
+    pooch.get_logger().setLevel("WARNING")
+    try:
+        return Path(pooch.retrieve(url, f"sha256:{sha256}", fname=f"{name}-{url.rpartition('/')[2]}", path=cache))
+    except ValueError:  # pooch's word for a wrong checksum; it has already removed the download
+        message = f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}"
+        raise DataError(message, file=url, path="source.sha256") from None
+    except OSError as error:  # requests' errors are OSErrors too
+        message = f"cannot be downloaded ({type(error).__name__}): go online, or put the log into a folder "
+        raise DataError(f"{message}and set {FOLDER_VARIABLE} to it", file=url) from None

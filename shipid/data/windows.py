@@ -1,0 +1,228 @@
+"""Windows: every instant of prediction with its future; and splits by run that share no moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array, Dataset, pieces, sample
+from shipid.errors import DataError
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """S windows with a horizon of T steps; every array is in SI units, time first.
+
+    Parameters
+    ----------
+    run : name of the run, (S,).
+    t : instant of prediction on the clock of the recording [s], (S,).
+    columns : every dataset column at that instant, name -> (S,); angles unwrapped within the run.
+    future : x, y [m] of eq. (11) after 1..T steps, (T, S, 2).
+    planned : command in force from step i-1 to i, i = 1..T, name -> (T, S).
+    horizon, step : T, and its step [s].
+    shared_clock : whether all runs lie on one clock; if not, equal times of two runs are different moments.
+    """
+
+    run: NDArray[np.str_]
+    t: Array
+    columns: dict[str, NDArray[Any]]
+    future: Array
+    planned: dict[str, Array]
+    horizon: int
+    step: float
+    shared_clock: bool = True
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def end(self) -> Array:
+        """Last instant of every future [s], (S,)."""
+        return self.t + self.horizon * self.step
+
+    @property
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant [s] that the windows of every run see, futures included."""
+        names, index = np.unique(self.run, return_inverse=True)
+        first, last = np.full(len(names), np.inf), np.full(len(names), -np.inf)
+        np.minimum.at(first, index, self.t)
+        np.maximum.at(last, index, self.end)
+        return {str(name): (float(a), float(b)) for name, a, b in zip(names, first, last, strict=True)}
+
+    def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Windows:
+        """The windows of a mask, of indices or of a slice."""
+        return Windows(
+            run=self.run[chosen],
+            t=self.t[chosen],
+            columns={name: values[chosen] for name, values in self.columns.items()},
+            future=self.future[:, chosen],
+            planned={name: values[:, chosen] for name, values in self.planned.items()},
+            horizon=self.horizon,
+            step=self.step,
+            shared_clock=self.shared_clock,
+        )
+
+    def touching(self, intervals: Iterable[tuple[float, float]]) -> Mask:
+        """Windows whose [t, t + T step] shares a moment with any closed interval of the recording clock, (S,)."""
+        touched = np.zeros(len(self), dtype=bool)
+        for start, end in intervals:
+            touched |= (self.t <= end) & (self.end >= start)
+        return touched
+
+
+def to_frame(north: Any, east: Any, north0: Any, east0: Any, psi0: Any) -> tuple[Any, Any]:
+    """Position [m] in the body axes frozen at the moment of prediction (method, eq. 11); arguments broadcast.
+
+    x = cos psi0 (N - N0) + sin psi0 (E - E0); y = -sin psi0 (N - N0) + cos psi0 (E - E0).
+    """
+    c, s = np.cos(psi0), np.sin(psi0)
+    return c * (north - north0) + s * (east - east0), c * (east - east0) - s * (north - north0)
+
+
+def from_frame(x: Any, y: Any, north0: Any, east0: Any, psi0: Any) -> tuple[Any, Any]:
+    """North, east [m] of a position in frozen body axes: the inverse of `to_frame`."""
+    c, s = np.cos(psi0), np.sin(psi0)
+    return north0 + c * x - s * y, east0 + s * x + c * y
+
+
+def cut_windows(
+    dataset: Dataset,
+    *,
+    horizon: int,
+    step: float = 1.0,
+    interval: float = 1.0,
+    path: Literal["position", "velocity"] = "position",
+) -> Windows:
+    """Cut a window every `interval` [s], its whole future inside one unbroken stretch of one run.
+
+    Parameters
+    ----------
+    dataset : the recorded or simulated runs.
+    horizon, step : T, and its step [s].
+    interval : time between instants of prediction [s].
+    path : the true path: recorded north, east; or the integral (trapezoid on the clock of the dataset) of u, v, psi
+        from the start of the window, where positions are coarser than velocities.
+
+    Raises
+    ------
+    DataError : if no run is as long as the horizon.
+    """
+    if horizon < 1 or step <= 0 or interval <= 0:
+        raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must all be positive")
+    shared = dataset.metadata.get("clock", "shared") != "run"
+    parts = []
+    for run, rows in pieces(dataset):
+        t = rows["t"].to_numpy()
+        last = np.floor((t[-1] - t[0] - horizon * step) / interval + 1e-9)
+        if last >= 0:
+            instants = t[0] + interval * np.arange(int(last) + 1)
+            grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
+            values = sample(rows, grid)
+            north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
+            x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
+            parts.append(
+                Windows(
+                    run=np.full(len(instants), run),
+                    t=instants,
+                    columns={name: column[0] for name, column in values.items()},
+                    future=np.stack([x, y], axis=-1)[1:],
+                    planned={name: values[name][:-1] for name in dataset.commands},
+                    horizon=horizon,
+                    step=step,
+                    shared_clock=shared,
+                )
+            )
+    if not parts:
+        raise DataError(f"no run is as long as the horizon of {horizon * step:g} s")
+    return concatenate(parts)
+
+
+def _integral(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
+    """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
+    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
+    row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
+
+    def travelled(rate: Array) -> Array:
+        whole = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
+        return np.asarray(whole[row] + (instants - t[row]) * (rate[row] + np.interp(instants, t, rate)) / 2)
+
+    return travelled(u * np.cos(psi) - v * np.sin(psi)), travelled(u * np.sin(psi) + v * np.cos(psi))
+
+
+def concatenate(parts: Sequence[Windows]) -> Windows:
+    """All windows of several sets with the same horizon, step, clock and columns, in order."""
+    first = parts[0]
+    for part in parts[1:]:
+        if (part.horizon, part.step, part.shared_clock) != (first.horizon, first.step, first.shared_clock):
+            raise DataError("windows with different horizons, steps or clocks cannot be joined")
+        if part.columns.keys() != first.columns.keys():
+            raise DataError(f"windows differ in columns: {', '.join(part.columns.keys() ^ first.columns.keys())}")
+    return Windows(
+        run=np.concatenate([part.run for part in parts]),
+        t=np.concatenate([part.t for part in parts]),
+        columns={name: np.concatenate([part.columns[name] for part in parts]) for name in first.columns},
+        future=np.concatenate([part.future for part in parts], axis=1),
+        planned={name: np.concatenate([part.planned[name] for part in parts], axis=1) for name in first.planned},
+        horizon=first.horizon,
+        step=first.step,
+        shared_clock=first.shared_clock,
+    )
+
+
+def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, Mask]:
+    """Split windows into (training, validation), (S,) each, so that no moment is seen by both, futures included.
+
+    Validation windows are those of the validation runs. A training window is one of another run that touches none
+    of the validation runs' spans; so none of the validation windows touches a training window either.
+    """
+    names = set(validation_runs)
+    unknown = names - set(windows.spans)
+    if unknown:
+        raise DataError(f"no windows of the runs {', '.join(sorted(unknown))}")
+    validation = np.isin(windows.run, sorted(names))
+    training = ~validation
+    if windows.shared_clock:
+        training &= ~windows.touching(windows.spans[name] for name in names)
+    for part, mask in (("training", training), ("validation", validation)):
+        if not mask.any():
+            raise DataError(f"no {part} window is left when {', '.join(sorted(names))} validate")
+    return training, validation
+
+
+def _drawn(runs: Iterable[str], seed: int) -> list[str]:
+    """The runs in random order, the same for any order in which they are given."""
+    names = sorted(set(runs))
+    return [names[index] for index in np.random.default_rng(seed).permutation(len(names))]
+
+
+def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[str, ...]]:
+    """Deal the runs into folds of (nearly) equal number: the validation runs of every fold."""
+    drawn = _drawn(runs, seed)
+    if not 2 <= num_folds <= len(drawn):
+        raise DataError(f"{len(drawn)} runs cannot be dealt into {num_folds} folds: choose 2 to {len(drawn)}")
+    return [tuple(drawn[fold::num_folds]) for fold in range(num_folds)]
+
+
+def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Split the runs into (rest, held out), `share` of them held out, at least one on each side."""
+    drawn = _drawn(runs, seed)
+    if len(drawn) < 2 or not 0 < share < 1:
+        raise DataError(f"a share of {share:g} of {len(drawn)} runs cannot be held out: two runs, 0 < share < 1")
+    count = min(max(round(share * len(drawn)), 1), len(drawn) - 1)
+    return tuple(drawn[count:]), tuple(drawn[:count])
+
+
+def nested_runs(runs: Iterable[str], amounts: Iterable[int], seed: int) -> dict[int, tuple[str, ...]]:
+    """Nested draws D_a c D_b c ... for amounts a < b < ...: the first ones of one random order."""
+    drawn, wanted = _drawn(runs, seed), sorted(set(amounts))
+    if wanted and not 1 <= wanted[0] <= wanted[-1] <= len(drawn):
+        raise DataError(f"amounts {wanted} cannot be drawn from {len(drawn)} runs: choose 1 to {len(drawn)}")
+    return {amount: tuple(drawn[:amount]) for amount in wanted}

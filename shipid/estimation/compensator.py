@@ -1,0 +1,209 @@
+"""The compensator: small networks that predict what the physics misses, eq. (12) and (13).
+
+Everything here is arrays and formulas, so that a trained compensator predicts, is saved and is exported without the
+library that trained it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import DataError, ResultError
+
+Array = NDArray[np.float64]
+Layers = tuple[tuple[Array, Array], ...]
+MOTIONS = ("u", "v", "r")
+TOLERANCE = 1e-9  # two columns that differ by less, relative to their size, are one column written twice
+
+
+def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict[str, Array]:
+    """Name every candidate input: u, v, r, the commands and, where wind was measured, the relative wind.
+
+    u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7). What is not measured is no input.
+
+    Parameters
+    ----------
+    columns : quantities (S,) at the instants of prediction, SI and radians.
+    commands : names of the command columns, `<component>.<signal>`.
+
+    Raises
+    ------
+    DataError : a motion or a command is missing.
+    """
+    for name in (*MOTIONS, *commands):
+        if name not in columns:
+            raise DataError(f"the compensator needs this column; there are {', '.join(sorted(columns))}", path=name)
+    table = {name: np.asarray(columns[name], dtype=float) for name in (*MOTIONS, *commands)}
+    if "V_w" in columns and "beta_w" in columns:
+        angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
+        table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
+        table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
+    return table
+
+
+def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Merge columns that are equal and drop those that are constant: (12) becomes (13) where both azimuths act as one.
+
+    Parameters
+    ----------
+    table : features (S,), training samples only.
+
+    Returns
+    -------
+    dict : name of each feature that stays -> all the columns it stands for, itself first.
+    """
+    chosen: dict[str, tuple[str, ...]] = {}
+    for name, values in table.items():
+        tolerance = TOLERANCE * max(1e-300, float(np.abs(values).max(initial=0.0)))
+        if np.ptp(values) <= tolerance:
+            continue
+        twin = next((kept for kept in chosen if "." in name and np.allclose(table[kept], values, 0.0, tolerance)), None)
+        if twin is None:
+            chosen[name] = (name,)
+        else:
+            chosen[twin] += (name,)
+    return chosen
+
+
+@dataclass(frozen=True)
+class Normaliser:
+    """The z-score of the training samples: (value - mean) / std of each named feature.
+
+    Parameters
+    ----------
+    names : features in the order of the network's inputs.
+    mean, std : (d,) statistics in the units of the features.
+    """
+
+    names: tuple[str, ...]
+    mean: Array
+    std: Array
+
+    @classmethod
+    def fit(cls, table: Mapping[str, Array], names: Sequence[str]) -> Self:
+        """Take the statistics of features (S,), which must be training samples only."""
+        values = [table[name] for name in names]
+        return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
+
+    def apply(self, table: Mapping[str, Array]) -> Array:
+        """Normalised inputs (S, d) of features (S,), found by name."""
+        return (np.stack([table[name] for name in self.names], axis=1) - self.mean) / self.std
+
+
+@dataclass(frozen=True)
+class Network:
+    """One trained network with what belongs to its data: inputs, statistics, scale of its targets.
+
+    Parameters
+    ----------
+    features : name of each input -> the columns that were equal to it in training.
+    normaliser : z-score of those inputs.
+    scale : (T, 2) [m] that one unit of each output stands for.
+    layers : (weight (i, o), bias (o,)) of each layer; outputs are x_1 ... x_T, y_1 ... y_T.
+    """
+
+    features: Mapping[str, tuple[str, ...]]
+    normaliser: Normaliser
+    scale: Array
+    layers: Layers
+
+    def predict(self, table: Mapping[str, Array]) -> Array:
+        """Compensation (T, S, 2) [m] for features (S,)."""
+        h = self.normaliser.apply(table)
+        *hidden, (weight, bias) = self.layers
+        for w, b in hidden:
+            h = np.tanh(h @ w + b)
+        return unflatten(h @ weight + bias) * self.scale[:, None, :]
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """The mean of the networks of all folds: measured quantities at an instant -> compensation of the path after it.
+
+    Parameters
+    ----------
+    commands : names of the command columns.
+    networks : one per fold.
+    hyperparameters : what tuning chose, for the record.
+    """
+
+    commands: tuple[str, ...]
+    networks: tuple[Network, ...]
+    hyperparameters: Mapping[str, float]
+
+    def predict(self, columns: Mapping[str, Array]) -> Array:
+        """Compensation (T, S, 2) [m] in the frame (11) of the instant of prediction, from columns (S,)."""
+        table = feature_table(columns, self.commands)
+        for network in self.networks:
+            for name in network.normaliser.names:
+                if name not in table:
+                    raise DataError(
+                        "the compensator was trained with this input; measure wind (V_w, beta_w)", path=name
+                    )
+        return np.mean([network.predict(table) for network in self.networks], axis=0)
+
+    def header(self) -> dict[str, Any]:
+        """Return all that is not an array, as plain JSON."""
+        return {
+            "commands": list(self.commands),
+            "hyperparameters": dict(self.hyperparameters),
+            "networks": [
+                {"features": {k: list(v) for k, v in n.features.items()}, "layers": len(n.layers)}
+                for n in self.networks
+            ],
+        }
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by flat names: `0.mean`, `0.std`, `0.scale`, `0.weight.0`, `0.bias.0`, ..."""
+        flat: dict[str, Array] = {}
+        for i, network in enumerate(self.networks):
+            flat |= {
+                f"{i}.mean": network.normaliser.mean,
+                f"{i}.std": network.normaliser.std,
+                f"{i}.scale": network.scale,
+            }
+            for j, (weight, bias) in enumerate(network.layers):
+                flat |= {f"{i}.weight.{j}": weight, f"{i}.bias.{j}": bias}
+        return flat
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header()` and `arrays()`; raises ResultError where a part is missing or shapes do not fit."""
+        try:
+            networks = []
+            for i, entry in enumerate(header["networks"]):
+                features = {k: tuple(v) for k, v in entry["features"].items()}
+                layers = tuple((arrays[f"{i}.weight.{j}"], arrays[f"{i}.bias.{j}"]) for j in range(entry["layers"]))
+                normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])
+                networks.append(Network(features, normaliser, arrays[f"{i}.scale"], layers))
+                _check(networks[-1], i)
+            return cls(tuple(header["commands"]), tuple(networks), dict(header["hyperparameters"]))
+        except KeyError as error:
+            raise ResultError("missing in the saved compensator", path=str(error.args[0])) from None
+
+
+def _check(network: Network, index: int) -> None:
+    """Refuse a network whose arrays do not fit together."""
+    widths = [len(network.features), *(weight.shape[1] for weight, _ in network.layers)]
+    expected = [
+        *(((i, o), (o,)) for i, o in zip(widths[:-1], widths[1:], strict=True)),
+    ]
+    shapes = [(weight.shape, bias.shape) for weight, bias in network.layers]
+    statistics = {network.normaliser.mean.shape, network.normaliser.std.shape}
+    if shapes != expected or statistics != {(widths[0],)} or network.scale.shape != (widths[-1] // 2, 2):
+        raise ResultError("the arrays of the saved compensator do not fit together", path=f"networks.{index}")
+
+
+def flatten(paths: Array) -> Array:
+    """Outputs (S, 2 T) of a network, x_1 ... x_T, y_1 ... y_T as in (12), for paths (T, S, 2)."""
+    return np.concatenate([paths[..., 0], paths[..., 1]]).T
+
+
+def unflatten(outputs: Array) -> Array:
+    """Paths (T, S, 2) of outputs (S, 2 T): the inverse of `flatten`."""
+    return np.stack(np.split(outputs.T, 2), axis=-1)

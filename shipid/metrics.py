@@ -1,0 +1,74 @@
+"""Arrays in, named numbers out: how far a predicted path is from the true one.
+
+Errors have the shape (T, S): horizon step first, window last. A member that diverged is said so, never averaged away.
+"""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Summary(TypedDict):
+    """Position error over all predicted points: A or H (mean), H_90 (p90) and the root mean square, all in metres.
+
+    `status` is `ok`, or `diverged` with NaN for the numbers if any point is not finite; `failed_share` is the share of
+    windows with such a point.
+    """
+
+    mean: float
+    p90: float
+    rms: float
+    status: str
+    failed_share: float
+
+
+def position_error(predicted: Array, true: Array) -> Array:
+    """Return the distance (T, S) [m] between paths (T, S, 2) [m], the e_k of (14) and (15); frame and order of x, y are free."""
+    if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
+        raise ValueError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
+    return np.hypot(predicted[..., 0] - true[..., 0], predicted[..., 1] - true[..., 1])
+
+
+def summary(error: Array) -> Summary:
+    """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
+    failed = ~np.isfinite(error).all(axis=0)
+    if error.size == 0 or failed.any():
+        share = float(failed.mean()) if failed.size else 1.0
+        return Summary(
+            mean=np.nan, p90=np.nan, rms=np.nan, status="diverged" if error.size else "empty", failed_share=share
+        )
+    return Summary(
+        mean=float(error.mean()),
+        p90=float(np.quantile(error, 0.9)),
+        rms=float(np.sqrt(np.square(error).mean())),
+        status="ok",
+        failed_share=0.0,
+    )
+
+
+def over_horizon(error: Array) -> dict[str, Array]:
+    """Mean and 90th percentile (T,) [m] of errors (T, S) at each step of the horizon (Fig. 14)."""
+    return {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1)}
+
+
+def over_time(error: Array) -> Array:
+    """Mean error (S,) [m] over the horizon of each window, hence over the instants of prediction (Fig. 13)."""
+    return error.mean(axis=0)
+
+
+def roughness(path: Array) -> float:
+    """Mean length [m] of the second difference over the horizon, |p_i+1 - 2 p_i + p_i-1|, of paths (T, S, 2) [m], T >= 3."""
+    if len(path) < 3:
+        raise ValueError(f"a second difference needs 3 steps, got {len(path)}")
+    second = np.diff(path, n=2, axis=0)
+    return float(np.hypot(second[..., 0], second[..., 1]).mean())
+
+
+def skill(error: Array, reference: Array) -> float:
+    """Share of a reference's mean error that is gone, 1 - mean(error) / mean(reference); negative where it is worse."""
+    return float(1.0 - error.mean() / reference.mean())

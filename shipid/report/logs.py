@@ -1,0 +1,110 @@
+"""The data behind a study: where the ship went, and how far each set of manoeuvres reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import ReportContent
+from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line
+from shipid.report.palette import category
+from shipid.report.selection import thinned
+from shipid.report.wording import counted, distance, listed, number
+
+TRAIN, TEST, VALIDATION = 0, 1, 2  # indices of the category colours
+PIXELS = 2000  # a track needs no more detail than extent / PIXELS
+
+
+def set_colour(name: str) -> str:
+    """Blue for what trains, green for what validates, vermillion for the test, whatever the sets are called."""
+    word = name.lower()
+    return category(TEST if word.startswith("test") else VALIDATION if word.startswith("valid") else TRAIN)
+
+
+def manoeuvres(content: ReportContent) -> Figure | None:
+    """Tracks of all manoeuvres by set, north up, equal axes; None without rows."""
+    tracks = content.tracks
+    if tracks.empty:
+        return None
+    extent = max(float(np.ptp(tracks[column])) for column in ("north", "east"))
+    traces, names = [], _sets(tracks["set"])
+    # Test last, so that it lies on top.
+    for name in sorted(names, key=lambda name: (set_colour(name) == category(TEST), names.index(name))):
+        for run, mine in tracks[tracks["set"] == name].groupby("run", sort=False):
+            points = mine[["east", "north"]].to_numpy(dtype=float)
+            points = points[thinned(points, extent / PIXELS)]
+            ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == category(TEST) else 1.2}
+            traces.append(line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink))
+            traces[-1].hovertemplate = f"{label(str(run))} ({label(name)})<extra></extra>"
+    x = axis("east [m]", scaleanchor="y", scaleratio=1, nticks=6)
+    counts = tracks.groupby("set").run.nunique()
+    spans = [distance(float(np.ptp(tracks[column]))) for column in ("north", "east")]
+    runs = listed([f"{counted(int(counts[name]), 'run')} ({name})" for name in names], 6)
+    return Figure(
+        id="manoeuvres",
+        title="The manoeuvres",
+        takeaway=f"{runs} cover {spans[0]} from south to north and {spans[1]} from west to east.",
+        how="Logged positions, north up, equal axes; points closer to the line than a pixel are left out.",
+        alternative="Map of the tracks of all manoeuvres, coloured by set.",
+        height=520,
+        views={"": [Panel(go.Figure(traces, layout(x, axis("north [m]"), hovermode="closest")))]},
+        chips=[Chip(f"set:{name}", name, set_colour(name)) for name in names],
+    )
+
+
+def envelope(content: ReportContent) -> Figure | None:
+    """Range and mean of every input per set, one panel per quantity; None without rows."""
+    frame = content.envelope
+    if frame.empty:
+        return None
+    panels = [Panel(_ranges(mine)) for _, mine in frame.groupby("quantity", sort=False)]
+    return Figure(
+        id="envelope",
+        title="What the inputs cover",
+        takeaway=_takeaway(frame),
+        how="Bar: smallest to largest value at the instants of prediction; dot: mean. The numbers are in the table below.",
+        alternative="Ranges of the inputs per set; the table below holds the same numbers.",
+        height=24 * frame["set"].nunique() + 74,
+        views={"": panels},
+    )
+
+
+def _ranges(mine: pd.DataFrame) -> go.Figure:
+    """One quantity: a bar from smallest to largest and a dot at the mean, one row per set."""
+    traces, names = [], [str(name) for name in mine["set"]]
+    quantity, unit = str(mine.quantity.iloc[0]), str(mine.unit.iloc[0])
+    for row, values in enumerate(mine.itertuples()):
+        ink = set_colour(names[row])
+        numbers = [float(str(value)) for value in (values.min, values.mean, values.max)]
+        bar = line(names[row], [numbers[0], numbers[2]], [row, row], [], line={"color": ink, "width": 5})
+        dot = line(names[row], numbers[1:2], [row], [], mode="markers", marker={"color": ink, "size": 11})
+        text = " / ".join(number(value) for value in numbers)
+        for trace in (bar, dot):
+            trace.hovertemplate = f"{label(names[row])}: {text} {label(unit)}<extra></extra>"
+        bar.opacity = 0.55
+        traces += [bar, dot]
+    y = axis("", tickvals=list(range(len(names))), ticktext=[label(name) for name in names], showgrid=False)
+    y["range"] = [len(names) - 0.4, -0.6]
+    x = axis(f"{label(quantity)} [{label(unit)}]", nticks=6)
+    return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
+
+
+def _takeaway(frame: pd.DataFrame) -> str:
+    """Whether the test asks for anything outside what was trained on."""
+    is_test = frame["set"].map(lambda name: set_colour(name) == category(TEST))
+    tested = frame[is_test].groupby("quantity", sort=False).agg(low=("min", "min"), high=("max", "max"))
+    seen = frame[~is_test].groupby("quantity").agg(low=("min", "min"), high=("max", "max")).reindex(tested.index)
+    if tested.empty or seen.low.isna().all():
+        return f"{counted(frame.quantity.nunique(), 'input')} in {counted(frame['set'].nunique(), 'set')}."
+    outside = tested.index[(tested.low < seen.low) | (tested.high > seen.high)]
+    if len(outside) == 0:
+        return f"The test stays inside what the other sets cover in all {counted(len(tested), 'input')}."
+    reach = f"{len(outside)} of {counted(len(tested), 'input')}"
+    return f"The test reaches outside what the other sets cover in {reach}: {listed([str(name) for name in outside])}."
+
+
+def _sets(column: pd.Series[str]) -> Sequence[str]:
+    return [str(name) for name in pd.unique(column)]

@@ -1,0 +1,102 @@
+"""Put the figures and tables into one file that needs nothing else."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from shipid.errors import ResultError
+from shipid.report import errors_over, gain, logs, palette, paths, tables
+from shipid.report.content import ReportContent
+from shipid.report.figure import Figure
+from shipid.report.tables import Table
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading of the page with its figures and tables; one without any is left out."""
+
+    id: str
+    title: str
+    items: tuple[Figure | Table | None, ...]
+
+
+def sections(content: ReportContent) -> list[Section]:
+    """The storyboard: a new figure is one more entry here."""
+    listing = [
+        Section("results", "What physics and data buy", (gain.gain(content),)),
+        Section("errors", "Where the error grows", (errors_over.horizon(content), errors_over.over_time(content))),
+        Section("predictions", "The predictions", (paths.browser(content), paths.snapshots(content))),
+        Section("the-models", "The models", (tables.models(content),)),
+        Section(
+            "data",
+            "The data",
+            (logs.manoeuvres(content), logs.envelope(content), tables.envelope(content), tables.repairs(content)),
+        ),
+        Section("all-cells", "The cells", (tables.cells(content),)),
+    ]
+    return [section for section in listing if any(section.items)]
+
+
+def render(content: ReportContent) -> str:
+    """The page as text."""
+    parts = sections(content)
+    anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
+    windows = paths.window_data(content) if content.snapshots else None
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(_resource("template.html.j2"))
+    return template.render(
+        content=content,
+        sections=parts,
+        anchors=anchors,
+        numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
+        views={item.id: _embedded(_views(item)) for item in _figures(parts)},
+        windows=_embedded(windows) if windows else "",
+        palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
+        style=Markup(_resource("style.css")),
+        script=Markup(_resource("page.js")),
+        plotly=Markup(get_plotlyjs()),
+    )
+
+
+def write_report(content: ReportContent, file: Path) -> Path:
+    """Write the report as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
+    return write(render(content), file)
+
+
+def write(text: str, file: Path) -> Path:
+    """Write text, making the folder if need be; ResultError if the place cannot be written."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise ResultError(f"cannot be written ({error.strerror})", file=file) from None
+    return file
+
+
+def _figures(parts: list[Section]) -> list[Figure]:
+    return [item for section in parts for item in section.items if isinstance(item, Figure)]
+
+
+def _views(figure: Figure) -> dict[str, Any]:
+    return {
+        key: [{"data": spec["data"], "layout": spec["layout"]} for spec in (json.loads(p.figure.to_json()) for p in panels)]
+        for key, panels in figure.views.items()
+    }
+
+
+def _embedded(data: Any) -> Markup:
+    """JSON inside a script element: no character in it can end the element or start a tag."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def _resource(name: str) -> str:
+    return files("shipid.report").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,196 @@
+"""Look at predictions: a window browser, and three windows side by side.
+
+The page holds every window once, as numbers in centimetres' precision, and draws it itself (page.js).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.report.content import Floats, PathKey, ReportContent, Snapshot
+from shipid.report.errors_over import model_chips
+from shipid.report.figure import Chip, Control, Figure, FixedWindow, axis, label, layout
+from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
+from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread
+from shipid.report.wording import counted, metres, number
+
+MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
+HOW = (
+    "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
+    "where the ship truly was at the end. The pale band is the true path. "
+)
+
+
+def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
+    """Test run -> its windows by rising time, at most `FEW_RUNS` runs of `MOST_INSTANTS` windows."""
+    by_run: dict[str, list[Snapshot]] = {}
+    for snapshot in content.snapshots:
+        by_run.setdefault(snapshot.run, []).append(snapshot)
+    result = {}
+    for run in spread(sorted(by_run), FEW_RUNS):
+        ordered = sorted(by_run[run], key=lambda window: window.t)
+        chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), MOST_INSTANTS)).round().astype(int)
+        result[run] = [ordered[i] for i in chosen]
+    return result
+
+
+def window_sizes(content: ReportContent) -> list[int]:
+    """The numbers of manoeuvres a reader can choose from."""
+    return sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
+
+
+def browser(content: ReportContent) -> Figure | None:
+    """Pick a test run and an instant; None without windows."""
+    runs, counts = windows_of(content), window_sizes(content)
+    if not runs:
+        return None
+    return Figure(
+        id="browser",
+        title="Look at predictions",
+        takeaway=_takeaway(content, counts[-1]),
+        how=HOW + f"{counted(sum(map(len, runs.values())), 'window')} of {counted(len(runs), 'test run')}; "
+        "arrow keys move the slider.",
+        alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
+        "The line of text beside it gives the end errors.",
+        height=520,
+        views={},
+        controls=[Control("Test run", list(runs)), Control("Manoeuvres, N_D", [str(c) for c in counts], len(counts) - 1)],
+        chips=_chips(content),
+        browser=True,
+    )
+
+
+def snapshots(content: ReportContent) -> Figure | None:
+    """One window at small, middle and large N_D; at a single N_D, three instants of one run. None without windows."""
+    runs, counts = windows_of(content), window_sizes(content)
+    if not runs:
+        return None
+    names = list(runs)
+    if len(counts) > 1:
+        run, instant = _middle(runs)
+        caption = f"{names[run]}, t = {runs[names[run]][instant].t:g} s"
+        windows = [FixedWindow(f"{caption}, N_D = {c}", run, instant, i) for i, c in enumerate(counts)]
+        title, chosen = "One window, more and more data", "The window is the one of middle physics error."
+    else:
+        run = max(range(len(names)), key=lambda i: len(runs[names[i]]))
+        mine = runs[names[run]]
+        instants = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
+        windows = [FixedWindow(f"{names[run]}, t = {mine[i].t:g} s", run, i, 0) for i in instants]
+        title, chosen = "Three instants of a test run", "Instants at one, three and five sixths of the run."
+    return Figure(
+        id="snapshots",
+        title=title,
+        takeaway=_takeaway_windows(content, [runs[names[w.run]][w.instant] for w in windows], counts),
+        how=HOW + chosen,
+        alternative=f"{len(windows)} small plots of true and predicted paths; captions name run and instant.",
+        height=380,
+        views={},
+        chips=_chips(content),
+        windows=windows,
+    )
+
+
+def window_data(content: ReportContent) -> dict[str, Any]:
+    """What page.js draws: layout, line styles, ship outline and the windows by run.
+
+    A path is `[line, size, x, y, end error]`; `line` is an index into `lines`, `size` into the N_D offered or -1
+    for what holds at every N_D. Lengths are metres to the centimetre, angles radians.
+    """
+    runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
+    lines: dict[tuple[str, str], int] = {}
+    packed = {}
+    for run, windows in runs.items():
+        packed[run] = []
+        for window in windows:
+            paths = []
+            for (model, source, size), points in window.paths.items():
+                if source == "cooperative" and size not in counts or source != "naive" and model not in drawn:
+                    continue
+                which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
+                at = counts.index(size) if source == "cooperative" else -1
+                paths.append([which, at, *_rounded(points), round(_end_error(window, points), 2)])
+            wind = None if window.wind is None else [round(value, 3) for value in window.wind]
+            packed[run].append(
+                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _rounded(window.truth)}
+                | {"paths": paths}
+            )
+    first = next(iter(runs.values()))[0] if runs else None
+    return {
+        "runs": list(packed.values()),
+        "outline": _rounded(first.outline) if first else [[], []],
+        "lines": [_line(content, model, source) for model, source in lines],
+        "truth": {"color": TRUTH, "width": 9},
+        "layout": layout(
+            axis("y, to starboard [m]", scaleanchor="y", scaleratio=1, nticks=6), axis("x, ahead [m]", nticks=8)
+        ),
+    }
+
+
+def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
+    style = styles(content).get(model)
+    pure = model == data_driven(content)
+    words = {"cooperative": model if pure else f"{model}, compensated", "physics": f"{model}, physics alone"}
+    width = style.width if style and source == "cooperative" else 1.5
+    return {
+        "name": label(words.get(source, "constant velocity")),
+        "keys": [f"source:{source}"] + ([f"model:{model}"] if model else []),
+        "line": {"color": style.colour if style else NAIVE, "dash": DASHES[source], "width": width},
+    }
+
+
+def _chips(content: ReportContent) -> list[Chip]:
+    sources = {source for window in content.snapshots for _, source, _ in window.paths}
+    return [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
+
+
+def _rounded(points: Floats) -> list[list[float]]:
+    """(n, 2) -> [x, y], each a list rounded to the centimetre."""
+    return [[round(float(value), 2) for value in column] for column in np.asarray(points).T]
+
+
+def _end_error(window: Snapshot, points: Floats) -> float:
+    return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
+
+
+def _middle(runs: dict[str, list[Snapshot]]) -> tuple[int, int]:
+    """Run and instant of the window whose mean physics error at the end is the middle one."""
+    errors = [
+        (np.mean([_end_error(w, p) for (_, source, _), p in w.paths.items() if source != "cooperative"] or [0]), i, j)
+        for i, windows in enumerate(runs.values())
+        for j, w in enumerate(windows)
+    ]
+    _, run, instant = sorted(errors)[len(errors) // 2]
+    return run, instant
+
+
+def _mean_end_error(windows: list[Snapshot], keys: set[PathKey]) -> float:
+    errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
+    return float(np.mean(errors)) if errors else float("nan")
+
+
+def _takeaway(content: ReportContent, size: int) -> str:
+    """Mean end errors over all windows, per source."""
+    pure, windows = data_driven(content), content.snapshots
+    keys = {key for window in windows for key in window.paths if key[0] in exemplars(content)}
+    together = _mean_end_error(windows, {k for k in keys if k[1] == "cooperative" and k[2] == size and k[0] != pure})
+    alone = _mean_end_error(windows, {k for k in keys if k[1] == "physics"})
+    learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
+    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
+    said = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
+    return f"At the end of the horizon, N_D = {size}, the models drawn miss the true place on average: {'; '.join(said)}."
+
+
+def _takeaway_windows(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
+    """How far the compensated paths end from the truth in each panel."""
+    pure, drawn = data_driven(content), exemplars(content)
+    chosen = counts if len(counts) > 1 else counts * len(windows)
+    means = []
+    for window, size in zip(windows, chosen, strict=True):
+        keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in drawn and k[0] != pure}
+        means.append(_mean_end_error([window], keys))
+    if not np.isfinite(means).any():
+        return "No compensated path was recorded for these windows."
+    return f"From left to right, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."

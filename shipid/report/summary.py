@@ -1,0 +1,48 @@
+"""The same results as Markdown, so that nobody has to scrape the page."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from pathlib import Path
+
+from shipid.report import tables
+from shipid.report.content import ReportContent
+from shipid.report.page import write
+from shipid.report.wording import metres
+
+
+def summary(content: ReportContent) -> str:
+    """Answer, findings, naive floor, models, cells and provenance as Markdown."""
+    naive = content.naive
+    parts = [
+        f"# {_plain(content.title)}",
+        "\n".join(f"- {_plain(sentence.text)}" for sentence in content.answer),
+        "## Findings",
+        _grid(["", "claim", "verdict", "evidence"], [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]),
+        "## Naive floor",
+        f"Constant surge, sway and yaw rate: mean {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
+        f"root mean square {metres(naive['rms'])}.",
+    ]
+    for table in (tables.models(content), tables.cells(content)):
+        rows = [[cell.text for cell in row] for row in table.rows]
+        parts += [f"## {table.title}", table.takeaway, _grid(table.columns, rows)]
+    parts += ["## Provenance", _grid(["", ""], [[key, value] for key, value in content.provenance.items()])]
+    if content.command:
+        parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def write_summary(content: ReportContent, file: Path) -> Path:
+    """Write the summary as Markdown; returns the file. Raises ResultError if it cannot."""
+    return write(summary(content), file)
+
+
+def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [[_plain(name) for name in columns], ["---"] * len(columns), *([_plain(cell) for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) if rows else ""
+
+
+def _plain(text: str) -> str:
+    """One line of text that Markdown reads as text: no tag, no column."""
+    return html.escape(" ".join(text.split()), quote=False).replace("|", "\\|")

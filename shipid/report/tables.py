@@ -1,0 +1,147 @@
+"""Frames as tables of text: every number of the report can be read, searched and sorted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from shipid.report.content import ReportContent
+from shipid.report.wording import counted, listed, number
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a table cell says and what it is sorted by; `state` marks a cell that gave no result."""
+
+    text: str
+    key: float | str
+    state: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the page; numeric columns are set flush right."""
+
+    id: str
+    title: str
+    takeaway: str
+    columns: Sequence[str]
+    numeric: Sequence[bool]
+    rows: Sequence[Sequence[Cell]]
+
+
+def text(value: object) -> Cell:
+    """A cell of words; a missing value is a dash."""
+    missing = value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
+    return Cell("–" if missing else str(value), "" if missing else str(value).lower())
+
+
+def figure(value: object) -> Cell:
+    """A cell with a number; NaN is a dash and sorts last."""
+    amount = float(str(value)) if value is not None and value is not pd.NA else math.nan
+    whole = math.isfinite(amount) and amount == int(amount) and not isinstance(value, float)
+    return Cell(f"{int(amount)}" if whole else number(amount), amount if math.isfinite(amount) else 1e300)
+
+
+# Column of the frame -> heading and whether it holds numbers.
+CELLS = {
+    "model": ("model", False),
+    "kind": ("family", False),
+    "A": ("A [m]", True),
+    "N_D": ("N_D [1]", True),
+    "minutes": ("data [min]", True),
+    "seed": ("seed", True),
+    "H": ("H [m]", True),
+    "H_90": ("H_90 [m]", True),
+    "rms": ("rms [m]", True),
+    "status": ("status", False),
+    "seconds": ("time [s]", True),
+    "hyperparameters": ("hyperparameters", False),
+}
+MODELS = {
+    "model": ("model", False),
+    "family": ("family", False),
+    "A": ("A [m]", True),
+    "A_90": ("A_90 [m]", True),
+    "A_rms": ("rms [m]", True),
+    "status": ("status", False),
+    "description": ("what it is", False),
+}
+REPAIRS = {
+    "kind": ("repair", False),
+    "column": ("column", False),
+    "count": ("samples [1]", True),
+    "note": ("note", False),
+}
+
+
+def cells(content: ReportContent) -> Table:
+    """Every cell of the study; a failed one says so where its numbers would stand."""
+    frame = content.cells
+    bad = int((frame.status.ne("ok") | frame.H.isna()).sum())
+    takeaway = f"{counted(len(frame), 'cell')} in {_duration(float(frame.seconds.sum()))} of computing; "
+    takeaway += f"{counted(bad, 'cell')} gave no result." if bad else "all gave a result."
+    return _table("cells", "Every cell", takeaway, frame, CELLS)
+
+
+def models(content: ReportContent) -> Table:
+    """The physics models, by rising A."""
+    frame = content.models.sort_values("A", kind="stable", na_position="last")
+    valid = frame.A.dropna()
+    names = frame.model[frame.A.notna()]
+    takeaway = "No physics model could be judged."
+    if len(valid):
+        takeaway = f"A runs from {number(valid.iloc[0])} m ({names.iloc[0]}) to {number(valid.iloc[-1])} m "
+        takeaway += f"({names.iloc[-1]})." if len(valid) > 1 else "."
+    return _table("models", "The models", takeaway, frame, MODELS)
+
+
+def repairs(content: ReportContent) -> Table | None:
+    """What the importer mended; None if nothing is recorded."""
+    frame = content.repairs
+    if frame.empty:
+        return None
+    kinds = [str(kind) for kind in pd.unique(frame.kind)]
+    takeaway = f"{counted(int(frame['count'].sum()), 'sample')} repaired or flagged: {listed(kinds)}."
+    return _table("repairs", "What the importer repaired", takeaway, frame, REPAIRS)
+
+
+def envelope(content: ReportContent) -> Table | None:
+    """Smallest, mean and largest value of every input, a column per set; None without rows."""
+    frame = content.envelope
+    if frame.empty:
+        return None
+    sets = [str(name) for name in pd.unique(frame["set"])]
+    rows = []
+    for (quantity, unit), mine in frame.groupby(["quantity", "unit"], sort=False):
+        by_set = mine.set_index("set")
+        row = [text(quantity), text(unit)]
+        for name in sets:
+            if name not in by_set.index:
+                row.append(text(None))
+                continue
+            values = [float(by_set.loc[name, column]) for column in ("min", "mean", "max")]
+            row.append(Cell(" / ".join(number(value) for value in values), values[1]))
+        rows.append(row)
+    numeric = [False, False, *[True] * len(sets)]
+    return Table("envelope-table", "Minimum / mean / maximum", "", ["input", "unit", *sets], numeric, rows)
+
+
+def _table(id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, bool]]) -> Table:
+    present = {name: heading for name, heading in columns.items() if name in frame.columns}
+    rows = []
+    for record in frame.to_dict("records"):
+        row = [figure(record[name]) if numeric else text(record[name]) for name, (_, numeric) in present.items()]
+        if "status" in present and record["status"] != "ok":
+            said = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])
+            row[list(present).index("status")] = Cell(said, said.lower(), "bad")
+        rows.append(row)
+    headings, numeric_columns = zip(*present.values(), strict=True)
+    return Table(id_, title, takeaway, headings, numeric_columns, rows)
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

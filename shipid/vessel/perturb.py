@@ -1,0 +1,209 @@
+"""Families of degraded vessels: a variant is a named patch on a digested base, never a copied file.
+
+Each draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a family never
+changes another draw.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import tomlkit
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from shipid import document as documents
+from shipid.errors import DocumentError, choices
+from shipid.physics.grammar import derivative
+from shipid.vessel.load import Vessel
+
+_CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
+_RELATIONS = {
+    ">=": lambda a, b: a >= b,
+    "<=": lambda a, b: a <= b,
+    "==": lambda a, b: a == b,
+    ">": lambda a, b: a > b,
+    "<": lambda a, b: a < b,
+}
+
+
+class Perturbation(BaseModel):
+    """One `[[family.perturb]]` block: a factor, new values, or removals."""
+
+    model_config = ConfigDict(extra="forbid")
+    parameters: list[str] = Field(default=[], description="dotted paths; * and [order >= 3] select")
+    factor: FiniteFloat | tuple[FiniteFloat, FiniteFloat] | None = Field(
+        default=None, description="a number is fixed, a pair is a range drawn from uniformly"
+    )
+    together: bool = Field(default=False, description="one draw for all parameters of the block")
+    set: dict[str, FiniteFloat] = Field(default={}, description="path -> new value")
+    remove: list[str] = Field(default=[], description="paths whose value becomes 0")
+
+    @model_validator(mode="after")
+    def _one_meaning(self) -> Perturbation:
+        if bool(self.parameters) != (self.factor is not None):
+            raise ValueError("`parameters` and `factor` go together: which ones, and by how much")
+        if not (self.parameters or self.set or self.remove):
+            raise ValueError("says nothing: give `parameters` with `factor`, or `set`, or `remove`")
+        if isinstance(self.factor, tuple) and self.factor[0] > self.factor[1]:
+            raise ValueError(f"the range {list(self.factor)} runs backwards: give [low, high]")
+        return self
+
+
+class Family(BaseModel):
+    """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
+
+    model_config = ConfigDict(extra="forbid")
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]*$")]
+    base: str | None = None
+    extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
+    members: Annotated[int, Field(ge=1, le=100000)] = 1
+    seed: int = 0
+    description: str | None = None
+    perturb: list[Perturbation] = []
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A named patch on a digested base.
+
+    values : dotted path -> new value. factors : path -> new / old, where the old value is not 0.
+    counter : 0, or how often this member was redrawn because it diverged on training windows.
+    """
+
+    name: str
+    family: str
+    member: int
+    base: str
+    base_digest: str
+    values: Mapping[str, float]
+    factors: Mapping[str, float]
+    counter: int = 0
+    seed: int = 0
+    base_parameters: Mapping[str, float] = field(default_factory=dict, repr=False)
+
+    @property
+    def parameters(self) -> list[float]:
+        """Values of all parameters in the order of the base vessel's."""
+        return [self.values.get(path, value) for path, value in self.base_parameters.items()]
+
+    def document(self) -> str:
+        """The patch as TOML: `load_vessel` on it rebuilds the variant exactly."""
+        patch = tomlkit.document()
+        patch["name"] = self.name
+        patch["base"] = self.base
+        patch["base_digest"] = self.base_digest
+        patch["source"] = f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
+        table = tomlkit.table()
+        for path, value in self.values.items():
+            table[path] = value
+        patch["set"] = table
+        return tomlkit.dumps(patch)
+
+
+def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
+    """Families with `extends` written out; unknown or circular ones, and missing bases, raise DocumentError."""
+    by_name: dict[str, Family] = {}
+    for index, family in enumerate(families):
+        if family.name in by_name:
+            raise DocumentError(f"two families are called {family.name!r}", file=file, path=f"family.{index}.name")
+        by_name[family.name] = family
+
+    def written_out(family: Family, above: tuple[str, ...]) -> Family:
+        where = f"family.{list(by_name).index(family.name)}"
+        if family.name in above:
+            raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
+        base, perturb = family.base, family.perturb
+        if family.extends is not None:
+            if family.extends not in by_name:
+                hint = choices(family.extends, by_name)
+                raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
+            parent = written_out(by_name[family.extends], (*above, family.name))
+            base, perturb = base or parent.base, [*parent.perturb, *perturb]
+        if base is None:
+            raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
+        return family.model_copy(update={"base": base, "perturb": perturb, "extends": None})
+
+    return [written_out(family, ()) for family in families]
+
+
+def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str | Path | None = None) -> Variant:
+    """Draw one member of a resolved family; bit for bit the same on every machine.
+
+    Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
+    """
+    original = base.parameters
+    values: dict[str, float] = {}
+    times: dict[str, int] = {}
+    for index, block in enumerate(family.perturb):
+        where = f"family {family.name!r}.perturb.{index}"
+        for path in _select(block.remove, original, file, f"{where}.remove"):
+            values[path] = 0.0
+        for path, value in block.set.items():
+            if path not in original:
+                raise DocumentError(
+                    f"{base.key} has no parameter {path!r}: {choices(path, original)}", file=file, path=f"{where}.set"
+                )
+            values[path] = value
+        paths = _select(block.parameters, original, file, f"{where}.parameters")
+        for path in paths:
+            key = f"together {block.parameters[0]}" if block.together else path
+            times[path] = times.get(path, -1) + 1
+            values[path] = values.get(path, original[path]) * _factor(block, family, member, key, times[path], counter)
+    factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
+    name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
+    return Variant(
+        name, family.name, member, family.base or base.key, base.digest, values, factors, counter, family.seed, original
+    )
+
+
+def members(family: Family, base: Vessel, file: str | Path | None = None) -> list[Variant]:
+    """All members of a resolved family, none redrawn."""
+    return [draw(family, member, base, file=file) for member in range(family.members)]
+
+
+def _factor(block: Perturbation, family: Family, member: int, key: str, times: int, counter: int) -> float:
+    if not isinstance(block.factor, tuple):
+        assert block.factor is not None
+        return block.factor
+    low, high = block.factor
+    return low + (high - low) * uniform(family.seed, family.name, member, key, times, counter)
+
+
+def uniform(*key: Any) -> float:
+    """A number in [0, 1) that depends on the key alone: the first 53 bits of its SHA-256."""
+    digest = hashlib.sha256("\x1f".join(map(str, key)).encode()).digest()
+    return (int.from_bytes(digest[:8], "big") >> 11) / 2.0**53
+
+
+def _select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
+    """Paths that the patterns select, each once, in the vessel's order; a pattern that selects nothing is an error."""
+    chosen: set[str] = set()
+    for pattern in patterns:
+        parsed = _CONDITION.fullmatch(pattern)
+        if parsed is None:
+            raise DocumentError(
+                f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]",
+                file=file,
+                path=where,
+            )
+        found = documents.match(parsed["pattern"], list(paths))
+        if parsed["order"] is not None:
+            relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])
+            found = [path for path in found if _has_order(path) and relation(_order(path), limit)]
+        if not found:
+            raise DocumentError(f"{pattern!r} selects nothing: {choices(pattern, paths)}", file=file, path=where)
+        chosen.update(found)
+    return [path for path in paths if path in chosen]
+
+
+def _has_order(path: str) -> bool:
+    return path.startswith(("hull.derivatives.", "hull.prime_derivatives."))
+
+
+def _order(path: str) -> int:
+    return derivative(path.rsplit(".", 1)[-1]).order
