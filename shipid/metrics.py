@@ -28,7 +28,7 @@ class Summary(TypedDict):
 
 
 def position_error(predicted: Array, true: Array) -> Array:
-    """Return the distance (T, S) [m] between paths (T, S, 2) [m], the e_k of (14) and (15); frame and order of x, y are free."""
+    """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15), in whatever frame both are."""
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
         raise ValueError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
     return np.hypot(predicted[..., 0] - true[..., 0], predicted[..., 1] - true[..., 1])
@@ -36,12 +36,11 @@ def position_error(predicted: Array, true: Array) -> Array:
 
 def summary(error: Array) -> Summary:
     """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
+    if error.size == 0:
+        raise ValueError("no window to summarise")
     failed = ~np.isfinite(error).all(axis=0)
-    if error.size == 0 or failed.any():
-        share = float(failed.mean()) if failed.size else 1.0
-        return Summary(
-            mean=np.nan, p90=np.nan, rms=np.nan, status="diverged" if error.size else "empty", failed_share=share
-        )
+    if failed.any():
+        return Summary(mean=np.nan, p90=np.nan, rms=np.nan, status="diverged", failed_share=float(failed.mean()))
     return Summary(
         mean=float(error.mean()),
         p90=float(np.quantile(error, 0.9)),
@@ -52,17 +51,18 @@ def summary(error: Array) -> Summary:
 
 
 def over_horizon(error: Array) -> dict[str, Array]:
-    """Mean and 90th percentile (T,) [m] of errors (T, S) at each step of the horizon (Fig. 14)."""
+    """Return mean and 90th percentile (T,) [m] of errors (T, S) at each step of the horizon (Fig. 14)."""
     return {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1)}
 
 
 def over_time(error: Array) -> Array:
-    """Mean error (S,) [m] over the horizon of each window, hence over the instants of prediction (Fig. 13)."""
-    return error.mean(axis=0)
+    """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
+    mean: Array = error.mean(axis=0)
+    return mean
 
 
 def roughness(path: Array) -> float:
-    """Mean length [m] of the second difference over the horizon, |p_i+1 - 2 p_i + p_i-1|, of paths (T, S, 2) [m], T >= 3."""
+    """Return the mean |p_i+1 - 2 p_i + p_i-1| [m] over the horizon of paths (T, S, 2) [m], T >= 3."""
     if len(path) < 3:
         raise ValueError(f"a second difference needs 3 steps, got {len(path)}")
     second = np.diff(path, n=2, axis=0)
@@ -70,5 +70,5 @@ def roughness(path: Array) -> float:
 
 
 def skill(error: Array, reference: Array) -> float:
-    """Share of a reference's mean error that is gone, 1 - mean(error) / mean(reference); negative where it is worse."""
+    """Return how much of a reference's error is gone, 1 - mean(error) / mean(reference); negative where worse."""
     return float(1.0 - error.mean() / reference.mean())

@@ -10,8 +10,6 @@ import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, pieces, unit_of
 
-CHECKS = ("gap", "jitter", "range", "heading rate", "heading scale", "heading error", "path", "frozen", "overlap")
-
 RANGES = {"u": 25.0, "v": 10.0, "r": 0.6, "phi": 1.0, "theta": 0.5, "V_w": 60.0, "n": 40.0, "alpha": 12.6, "delta": 1.6}
 """Largest plausible magnitude in SI units, by column or by signal of a command: past it a unit is wrong."""
 GAP, JITTER, FROZEN, OVERLAP = 3.0, 0.05, 0.02, 0.5
@@ -33,8 +31,8 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     found = []
     for run, stretches in by_run.items():
         others = dataset.frame.loc[dataset.frame["run"] != run, "t"] if shared else pd.Series(dtype=float)
-        rows = [*_clock(stretches), *_ranges(stretches), *_heading(stretches), *_path(stretches)]
-        found += [{"run": run, **row} for row in [*rows, *_repetition(stretches, others)]]
+        results = [*_clock(stretches), *_ranges(stretches), *_heading(stretches), *_path(stretches)]
+        found += [{"run": run, **row} for row in [*results, *_repetition(stretches, others)]]
     return pd.DataFrame(found)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -60,7 +58,7 @@ def _ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         if limit is not None:
             largest = max(float(rows[name].abs().max()) for rows in stretches)
             unit = unit_of(name) or ""
-            yield _row("range", largest, unit, limit, f"{name} reaches {largest:.3g} {unit}: right unit?")
+            yield _row(f"range {name}", largest, unit, limit, f"{name} reaches {largest:.3g} {unit}: right unit?")
 
 
 def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:

@@ -143,12 +143,14 @@ def _columns(log: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
 
 
 def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str) -> NDArray[np.float64]:
-    """A column of text as numbers, NaN where it is missing; text that is no number raises with its row."""
+    """Turn a column of text into numbers, NaN where it is missing; text that is no number raises with its row."""
     names = [str(name) for name in log.columns]
-    if names.count(source) != 1:
-        what = "stands twice in" if source in names else "is not in"
-        remedy = f"the header is one column, {names[0]!r}: is the separator right?" if len(names) == 1 else ""
-        raise DataError(f"column {source!r} {what} the log: {remedy or choices(source, names)}", file=file, path=path)
+    if names.count(source) > 1:
+        raise DataError(f"column {source!r} stands twice in the log: rename one of them", file=file, path=path)
+    if source not in names:
+        alone = f"the header is one column, {names[0]!r}: is the separator right?"
+        remedy = alone if len(names) == 1 else choices(source, names)
+        raise DataError(f"column {source!r} is not in the log: {remedy}", file=file, path=path)
     text = log[source].fillna("").str.strip()
     missing = text.isin(form.missing)
     plain = text.str.replace(",", ".", regex=False) if form.decimal == "," else text
@@ -218,7 +220,7 @@ def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
 
 
 def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
-    """The runs one after another; rows that belong to two runs stand twice."""
+    """Put the runs one after another; rows that belong to two runs stand twice."""
     t = rows["t"].to_numpy()
     slack = 1e-9 * max(1.0, float(np.abs(t).max())) + float(np.median(np.diff(t)))
     runs = []

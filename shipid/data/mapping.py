@@ -110,8 +110,12 @@ def read_mapping(name: str | Path) -> Mapping:
     raw = document.read(file)
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
-    repairs = list(_repairs(raw.get("repair", []), file))
-    mapping: Mapping = document.parse(Mapping, {**raw, "repair": repairs, "digest": document.digest(raw)}, file)
+    parts = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}
+    if isinstance(raw.get("columns"), dict):
+        parts["columns"] = {
+            key: document.parse(Column, entry, file, prefix=f"columns.{key}") for key, entry in raw["columns"].items()
+        }
+    mapping: Mapping = document.parse(Mapping, {**raw, **parts}, file)
     _check_columns(mapping, file)
     _check_segments(mapping, file)
     clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
@@ -123,13 +127,16 @@ def read_mapping(name: str | Path) -> Mapping:
                     file=file,
                     path=f"repair.{index}.columns",
                 )
+            if isinstance(repair, WrapInterpolation) and not mapping.columns[column].wrap:
+                message = f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair"
+                raise DocumentError(message, file=file, path=f"repair.{index}.columns")
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]
     return mapping.model_copy(update={"repair": tuple(converted)})
 
 
 def to_si(unit: str, name: str) -> float:
     """Factor from a unit of the log to the SI unit of a column."""
-    return UNITS[unit_of(name) or "s"][unit]
+    return UNITS[str(unit_of(name))][unit]
 
 
 def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
@@ -146,10 +153,6 @@ def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
 def _check_columns(mapping: Mapping, file: Path) -> None:
     _factor(mapping.clock.unit, "s", file, "clock.unit")
     columns, mapped = mapping.columns, (*REQUIRED.keys() - {"t"}, *OPTIONAL)
-    for name in REQUIRED.keys() - {"t"} - columns.keys():
-        raise DocumentError(
-            f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}", file=file, path=f"columns.{name}"
-        )
     for name, column in columns.items():
         unit, path = unit_of(name), f"columns.{name}"
         if unit is None or name == "t":
@@ -161,6 +164,10 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
             raise DocumentError(message, file=file, path=f"{path}.direction")
         if column.wrap and unit != "rad":
             raise DocumentError("only an angle wraps", file=file, path=f"{path}.wrap")
+    for name in sorted(REQUIRED.keys() - {"t"} - columns.keys()):
+        raise DocumentError(
+            f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}", file=file, path=f"columns.{name}"
+        )
     if columns["u"].frame != columns["v"].frame:
         raise DocumentError(
             "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
@@ -184,7 +191,7 @@ def _check_segments(mapping: Mapping, file: Path) -> None:
 
 
 def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
-    """The repair with its parameters in SI units."""
+    """Give the repair with its parameters in SI units."""
     match repair:
         case WrapInterpolation():
             return repair.model_copy(update={"threshold": repair.threshold * _factor(repair.unit, "rad", file, path)})

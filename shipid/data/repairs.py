@@ -124,7 +124,7 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     Windows are whole and do not reach over a break: half a window of a moving ship has its median elsewhere.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
-    width = 2 * int(round(repair.window / 2 / float(np.median(np.diff(t))))) + 1
+    width = 2 * round(repair.window / 2 / float(np.median(np.diff(t)))) + 1
     stretch = np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
     healed = {}
     for name in repair.columns:
@@ -138,13 +138,13 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
 
 
 def scale(rows: pd.DataFrame, repair: Scale) -> Outcome:
-    """x <- factor x, for every column named."""
+    """Multiply: x <- factor x, for every column named."""
     scaled = {name: repair.factor * rows[name] for name in repair.columns}
     return _all_rows(rows.assign(**scaled), f"times {repair.factor:g}")
 
 
 def turn_heading(rows: pd.DataFrame, repair: HeadingOffset) -> Outcome:
-    """psi <- psi + d; (u, v) <- R(-d) (u, v), so that R(psi) (u, v), the velocity over ground, does not change."""
+    """Turn: psi <- psi + d; (u, v) <- R(-d) (u, v); the velocity over ground, R(psi) (u, v), does not change."""
     c, s = np.cos(repair.offset), np.sin(repair.offset)
     u, v = rows["u"], rows["v"]
     turned = rows.assign(psi=rows["psi"] + repair.offset, u=c * u + s * v, v=c * v - s * u)
@@ -152,7 +152,7 @@ def turn_heading(rows: pd.DataFrame, repair: HeadingOffset) -> Outcome:
 
 
 def move_origin(rows: pd.DataFrame, repair: LeverArm) -> Outcome:
-    """v <- v - x r; north <- north - x cos(psi); east <- east - x sin(psi): rigid body, u does not change."""
+    """Move: v <- v - x r; north <- north - x cos(psi); east <- east - x sin(psi); u does not change (rigid body)."""
     moved = rows.assign(
         v=rows["v"] - repair.x * rows["r"],
         north=rows["north"] - repair.x * np.cos(rows["psi"]),

@@ -58,7 +58,7 @@ class Windows:
         return {str(name): (float(a), float(b)) for name, a, b in zip(names, first, last, strict=True)}
 
     def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Windows:
-        """The windows of a mask, of indices or of a slice."""
+        """Choose windows by a mask, by indices or by a slice."""
         return Windows(
             run=self.run[chosen],
             t=self.t[chosen],
@@ -198,7 +198,7 @@ def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, 
 
 
 def _drawn(runs: Iterable[str], seed: int) -> list[str]:
-    """The runs in random order, the same for any order in which they are given."""
+    """Draw the runs in random order, the same for any order in which they are given."""
     names = sorted(set(runs))
     return [names[index] for index in np.random.default_rng(seed).permutation(len(names))]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -91,7 +92,7 @@ class Normaliser:
         return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
 
     def apply(self, table: Mapping[str, Array]) -> Array:
-        """Normalised inputs (S, d) of features (S,), found by name."""
+        """Return normalised inputs (S, d) of features (S,), found by name."""
         return (np.stack([table[name] for name in self.names], axis=1) - self.mean) / self.std
 
 
@@ -113,7 +114,7 @@ class Network:
     layers: Layers
 
     def predict(self, table: Mapping[str, Array]) -> Array:
-        """Compensation (T, S, 2) [m] for features (S,)."""
+        """Return the compensation (T, S, 2) [m] for features (S,)."""
         h = self.normaliser.apply(table)
         *hidden, (weight, bias) = self.layers
         for w, b in hidden:
@@ -137,7 +138,7 @@ class Compensator:
     hyperparameters: Mapping[str, float]
 
     def predict(self, columns: Mapping[str, Array]) -> Array:
-        """Compensation (T, S, 2) [m] in the frame (11) of the instant of prediction, from columns (S,)."""
+        """Return the compensation (T, S, 2) [m] in the frame (11) of the instant of prediction, from columns (S,)."""
         table = feature_table(columns, self.commands)
         for network in self.networks:
             for name in network.normaliser.names:
@@ -145,7 +146,8 @@ class Compensator:
                     raise DataError(
                         "the compensator was trained with this input; measure wind (V_w, beta_w)", path=name
                     )
-        return np.mean([network.predict(table) for network in self.networks], axis=0)
+        total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
+        return total / len(self.networks)
 
     def header(self) -> dict[str, Any]:
         """Return all that is not an array, as plain JSON."""
@@ -190,9 +192,7 @@ class Compensator:
 def _check(network: Network, index: int) -> None:
     """Refuse a network whose arrays do not fit together."""
     widths = [len(network.features), *(weight.shape[1] for weight, _ in network.layers)]
-    expected = [
-        *(((i, o), (o,)) for i, o in zip(widths[:-1], widths[1:], strict=True)),
-    ]
+    expected = [((i, o), (o,)) for i, o in pairwise(widths)]
     shapes = [(weight.shape, bias.shape) for weight, bias in network.layers]
     statistics = {network.normaliser.mean.shape, network.normaliser.std.shape}
     if shapes != expected or statistics != {(widths[0],)} or network.scale.shape != (widths[-1] // 2, 2):
@@ -200,10 +200,10 @@ def _check(network: Network, index: int) -> None:
 
 
 def flatten(paths: Array) -> Array:
-    """Outputs (S, 2 T) of a network, x_1 ... x_T, y_1 ... y_T as in (12), for paths (T, S, 2)."""
+    """Arrange outputs (S, 2 T) of a network, x_1 ... x_T, y_1 ... y_T as in (12), for paths (T, S, 2)."""
     return np.concatenate([paths[..., 0], paths[..., 1]]).T
 
 
 def unflatten(outputs: Array) -> Array:
-    """Paths (T, S, 2) of outputs (S, 2 T): the inverse of `flatten`."""
+    """Arrange paths (T, S, 2) of outputs (S, 2 T): the inverse of `flatten`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)

@@ -19,6 +19,7 @@ from torch import Tensor
 
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
+Stack = Sequence[tuple[Tensor, Tensor]]
 Masks = Sequence[Tensor | None]
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's defaults
@@ -36,8 +37,8 @@ class Settings:
     weight_decay : (K,) decoupled decay (AdamW); 0 is Adam.
     input_dropout, hidden_dropout : (K,) probability in [0, 1] that an input or a hidden unit is dropped.
     epochs : at most so many passes over the training samples.
-    batch : samples per optimiser step; None = all of them.
-    patience : epochs without a better validation loss after which a member stops; None = it never does.
+    batch : samples per optimiser step; 0 = all of them.
+    patience : epochs without a better validation loss after which a member stops; 0 = it never does.
     one_cycle : anneal the rate up and down once over all epochs; False = constant.
     """
 
@@ -48,8 +49,8 @@ class Settings:
     input_dropout: tuple[float, ...]
     hidden_dropout: tuple[float, ...]
     epochs: int
-    batch: int | None = None
-    patience: int | None = None
+    batch: int = 0
+    patience: int = 0
     one_cycle: bool = False
 
 
@@ -100,52 +101,55 @@ def train(
     -------
     Trained : a member whose loss stopped being a number is `diverged`, with its best weights before; others go on.
     """
-    num_members, num_outputs = targets.shape[0], targets.shape[2]
-    widths = [inputs.shape[1], *[settings.units] * settings.layers, num_outputs]
-    metres = np.ones((num_members, num_outputs)) if scale is None else scale
-    unit = _tensor(metres, device)[:, None, :]
-    x_train, x_val = (_tensor(inputs[i], device) for i in (train_idx, [] if val_idx is None else val_idx))
-    y_train = _tensor(targets[:, train_idx], device) / unit
-    y_val = None if val_idx is None else _tensor(targets[:, val_idx], device)
+    num_members, num_samples = len(targets), len(train_idx)
+    widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]
+    unit = _tensor(np.ones(targets[:, 0].shape) if scale is None else scale, device)[:, None]
+    x, y = _tensor(inputs[train_idx], device), _tensor(targets[:, train_idx], device) / unit
+    if val_idx is not None:
+        x_val, y_val = _tensor(inputs[val_idx], device), _tensor(targets[:, val_idx], device)
 
     generators = [torch.Generator().manual_seed(int(seed)) for seed in seeds]
     order = torch.Generator().manual_seed(order_seed)
-    flat = initial_weights(widths, generators).to(device)
-    layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _views(flat, widths)]  # leaves in flat's memory
-    leaves = [leaf for layer in layers for leaf in layer]
-    adam = Adam(flat, settings.weight_decay)
+    weights = initial_weights(widths, generators).to(device)
+    layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _views(weights, widths)]  # leaves, same memory
+    adam = Adam(weights, settings.weight_decay)
     rate = _tensor(settings.learning_rate, device)[:, None]
-    watch = _Watch(flat, settings.patience)
+    watch = _Watch(weights, settings.patience)
 
-    num_samples = len(train_idx)
     batch = min(settings.batch or num_samples, num_samples)
-    steps_per_epoch = -(-num_samples // batch)
-    num_steps = settings.epochs * steps_per_epoch
-    for epoch in range(settings.epochs):
-        shuffled = torch.randperm(num_samples, generator=order).to(device) if batch < num_samples else None
+    num_steps = settings.epochs * -(-num_samples // batch)
+    for _ in range(settings.epochs):
         total = torch.zeros(num_members, device=device)
-        for i in range(steps_per_epoch):
-            rows = slice(None) if shuffled is None else shuffled[i * batch : (i + 1) * batch]
-            x, y = x_train[rows], y_train[:, rows]
-            masks = _masks(x.shape, widths, settings, generators, device)
-            losses = (forward(x, layers, masks) - y).square().mean(dim=(1, 2))
-            gradients = torch.autograd.grad(losses.sum(), leaves)
-            with torch.no_grad():
-                total += losses
-                factor = one_cycle(epoch * steps_per_epoch + i, num_steps) if settings.one_cycle else 1.0
-                adam.step(torch.cat([g.flatten(1) for g in gradients], dim=1), rate * factor)
+        for rows in _batches(num_samples, batch, order):
+            masks = _masks(len(x[rows]), widths, settings, generators, device)
+            factor = one_cycle(adam.count, num_steps) if settings.one_cycle else 1.0
+            total += _step(x[rows], y[:, rows], layers, masks, adam, rate * factor)
         with torch.no_grad():
-            if y_val is None:
+            if val_idx is None:
                 watch.follow(total)
             else:
                 watch.compare(total, (forward(x_val, layers) * unit - y_val).square().mean(dim=(1, 2)))
-            if not watch.running.any():
-                break
+        if not watch.running.any():
+            break
     return watch.result(widths)
 
 
-def forward(x: Tensor, layers: Sequence[tuple[Tensor, Tensor]], masks: Masks = ()) -> Tensor:
-    """Outputs (K, n, m) of K networks for inputs (n, d): tanh layers and a linear one, drop-out by masks (K, n, i)."""
+def _step(x: Tensor, y: Tensor, layers: Stack, masks: Masks, adam: Adam, rate: Tensor) -> Tensor:
+    """Take one optimiser step on a batch; returns the losses (K,) before it."""
+    losses = (forward(x, layers, masks) - y).square().mean(dim=(1, 2))
+    gradients = torch.autograd.grad(losses.sum(), [leaf for layer in layers for leaf in layer])
+    with torch.no_grad():
+        adam.step(torch.cat([gradient.flatten(1) for gradient in gradients], dim=1), rate)
+    return losses.detach()
+
+
+def _batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
+    """Cut one epoch into batches, shuffled; a single batch stays in order."""
+    return [slice(None)] if batch >= num_samples else torch.randperm(num_samples, generator=order).split(batch)
+
+
+def forward(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
+    """Return outputs (K, n, m) of K networks for inputs (n, d): tanh layers, a linear one; masks (K, n, i) drop."""
     h = x.expand(len(layers[0][0]), *x.shape)
     for i, (weight, bias) in enumerate(layers):
         mask = masks[i] if masks else None
@@ -156,7 +160,7 @@ def forward(x: Tensor, layers: Sequence[tuple[Tensor, Tensor]], masks: Masks = (
 
 
 def initial_weights(widths: Sequence[int], generators: Sequence[torch.Generator]) -> Tensor:
-    """PyTorch's default start of `Linear` layers, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator."""
+    """Draw PyTorch's default start of `Linear`, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator."""
     members = []
     for generator in generators:
         parts = []
@@ -187,7 +191,7 @@ class Adam:
 
 
 def one_cycle(step: int, num_steps: int) -> float:
-    """Factor on the peak rate: a cosine from 1/25 up to 1 in the first 30 %, then down to 4e-6 (Smith, 2018)."""
+    """Return the factor on the peak rate: a cosine from 1/25 to 1 in the first 30 %, then to 4e-6 (Smith, 2018)."""
     peak, last = WARM_UP * num_steps - 1, num_steps - 1
     if step <= peak:
         start, end, share = START, 1.0, step / peak
@@ -199,7 +203,7 @@ def one_cycle(step: int, num_steps: int) -> float:
 class _Watch:
     """Keeps the best weights of each member and decides who is still running."""
 
-    def __init__(self, weights: Tensor, patience: int | None) -> None:
+    def __init__(self, weights: Tensor, patience: int) -> None:
         num_members, device = len(weights), weights.device
         self.weights, self.kept, self.patience = weights, weights.clone(), patience
         self.best = torch.full((num_members,), float("inf"), device=device)
@@ -209,18 +213,18 @@ class _Watch:
         self.finite = torch.ones(num_members, dtype=torch.bool, device=device)
 
     def follow(self, training: Tensor) -> None:
-        """An epoch without validation: keep the weights of all whose training loss (K,) is a number."""
+        """Judge an epoch without validation: keep the weights of all whose training loss (K,) is a number."""
         self._judge(training)
         self.kept = torch.where(self.running[:, None], self.weights, self.kept)
 
     def compare(self, training: Tensor, validation: Tensor) -> None:
-        """An epoch with validation loss (K,): keep better weights; those that have waited too long stop for good."""
+        """Judge an epoch by validation loss (K,): keep better weights; who has waited too long stops for good."""
         self._judge(training + validation)
         better = self.running & (validation < self.best)
         self.best = torch.where(better, validation, self.best)
         self.kept = torch.where(better[:, None], self.weights, self.kept)
         self.waited = torch.where(better, 0, self.waited + 1)
-        if self.patience is not None:
+        if self.patience:
             self.running &= self.waited < self.patience
 
     def _judge(self, loss: Tensor) -> None:
@@ -242,28 +246,28 @@ class _Watch:
 
 
 def _views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
-    """Weights (K, i, o) and biases (K, 1, o) of each layer, as views of flat weights (K, P)."""
+    """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
     views, start = [], 0
     for i, o in pairwise(widths):
         middle, end = start + i * o, start + i * o + o
-        views.append((flat[:, start:middle].unflatten(1, (i, o)), flat[:, None, middle:end]))
+        views.append((flat[:, start:middle].view(-1, i, o), flat[:, None, middle:end]))
         start = end
     return views
 
 
 def _masks(
-    shape: Sequence[int], widths: Sequence[int], settings: Settings, generators: Sequence[torch.Generator], device: str
+    num_samples: int, widths: Sequence[int], settings: Settings, generators: Sequence[torch.Generator], device: str
 ) -> Masks:
-    """Inverted drop-out, 0 or 1 / (1 - p), for the input of each layer: (K, n, i), or None where no member drops any."""
+    """Draw a mask (K, n, i) for the input of each layer, or None where no member drops any."""
     rates = [settings.input_dropout] + [settings.hidden_dropout] * settings.layers
     return [
-        dropout(per_member, (shape[0], width), generators).to(device) if any(per_member) else None
+        dropout(per_member, (num_samples, width), generators).to(device) if any(per_member) else None
         for per_member, width in zip(rates, widths[:-1], strict=True)
     ]
 
 
 def dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
-    """Masks (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0."""
+    """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0."""
     return torch.stack(
         [
             # A member without drop-out draws nothing, alone or in company.

@@ -129,5 +129,6 @@ def thrust_monomial(name: str) -> Monomial:
 
 
 DERIVATIVES = Grammar(derivative, derivative_unit)
+PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime")
 ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
-THRUST = Grammar(thrust_monomial, lambda name: "-")
+THRUST = Grammar(thrust_monomial, lambda _: "-")

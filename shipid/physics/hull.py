@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from shipid.physics.frames import vector
-from shipid.physics.grammar import AXES, DERIVATIVES, MOTIONS, POSITIVE, derivative, prime_scale
+from shipid.physics.grammar import AXES, DERIVATIVES, MOTIONS, POSITIVE, PRIME_DERIVATIVES, derivative, prime_scale
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U of higher-order prime derivatives finite at rest
 
@@ -33,7 +33,7 @@ def prime_derivatives(
     *,
     L_pp: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
-    **values: Annotated[SX, DERIVATIVES, "prime"],
+    **values: Annotated[SX, PRIME_DERIVATIVES],
 ) -> SX:
     """Wrench (6) of derivatives in the prime system: value x 1/2 rho L^a U^(2-order) x monomial (SNAME 1950).
 
@@ -72,11 +72,11 @@ def cross_flow(
 def resistance(
     nu_r: SX,
     *,
-    R_0: Annotated[SX, "kg m^-1"] = 0.0,
-    R_1: Annotated[SX, "kg m^-2 s"] = 0.0,
-    R_2: Annotated[SX, "kg m^-3 s^2"] = 0.0,
-    R_3: Annotated[SX, "kg m^-4 s^3"] = 0.0,
-    R_4: Annotated[SX, "kg m^-5 s^4"] = 0.0,
+    R_0: Annotated[SX | float, "kg m^-1"] = 0.0,
+    R_1: Annotated[SX | float, "kg m^-2 s"] = 0.0,
+    R_2: Annotated[SX | float, "kg m^-3 s^2"] = 0.0,
+    R_3: Annotated[SX | float, "kg m^-4 s^3"] = 0.0,
+    R_4: Annotated[SX | float, "kg m^-5 s^4"] = 0.0,
 ) -> SX:
     """Wrench (6) of straight-ahead resistance: X = -(R_0 + R_1|u| + R_2 u^2 + R_3|u|^3 + R_4 u^4) u|u| [N]."""
     u = nu_r[0]

@@ -16,9 +16,9 @@ def rigid_body(
     m: Annotated[SX, "kg", POSITIVE],
     I_z: Annotated[SX, "kg m^2", POSITIVE],
     x_G: Annotated[SX, "m"],
-    z_G: Annotated[SX, "m"] = 0.0,
-    I_x: Annotated[SX, "kg m^2"] = 0.0,
-    I_y: Annotated[SX, "kg m^2"] = 0.0,
+    z_G: Annotated[SX | float, "m"] = 0.0,
+    I_x: Annotated[SX | float, "kg m^2"] = 0.0,
+    I_y: Annotated[SX | float, "kg m^2"] = 0.0,
 ) -> SX:
     """M_RB [6 x 6] about the origin, with the centre of gravity at (x_G, 0, z_G) (Fossen 2021, eq. 3.49).
 

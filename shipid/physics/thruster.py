@@ -27,7 +27,7 @@ def azimuth(
     *,
     x: Annotated[SX, "m"],
     y: Annotated[SX, "m"],
-    z: Annotated[SX, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
     k_T: Annotated[SX, "-"],
     k_astern: Annotated[SX, "-"],
@@ -73,7 +73,7 @@ def tunnel(
     n: SX,
     *,
     x: Annotated[SX, "m"],
-    z: Annotated[SX, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
     F_1: Annotated[SX, "N s"],
     F_2: Annotated[SX, "N s^2"],
     F_3: Annotated[SX, "N s^3"],
@@ -103,5 +103,3 @@ def first_order_advance(
     """
     change = (command - state) * (1 - ca.exp(-dt / T))
     return state + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
-
-

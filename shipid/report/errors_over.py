@@ -109,13 +109,12 @@ def _size_control(counts: Sequence[int]) -> Control:
 
 
 def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
-    looks, traces = styles(content), []
+    looks, pure, traces = styles(content), data_driven(content), []
     for (model, source), mine in means.groupby(["model", "source"], sort=False):
         x, y = mine[across].to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
         ink = {"width": looks[model].width if source == "cooperative" else 1.5, **ink} if model else ink
-        pure = model == data_driven(content)
-        name = "constant velocity" if source == "naive" else model if pure else f"{model}, {_word(source)}"
+        name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         keep = _visible(x, y)
         traces.append(line(name, x[keep], y[keep], keys, line={"dash": DASHES[source], **ink}))

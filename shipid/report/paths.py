@@ -12,7 +12,7 @@ import pandas as pd
 
 from shipid.report.content import Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
-from shipid.report.figure import Chip, Control, Figure, FixedWindow, axis, label, layout
+from shipid.report.figure import Chip, Control, Figure, FixedWindow, axis, layout
 from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread
 from shipid.report.wording import counted, metres, number
@@ -111,7 +111,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                     continue
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
-                paths.append([which, at, *_rounded(points), round(_end_error(window, points), 2)])
+                paths.append([which, at, *_rounded(points), _rounded_value(_end_error(window, points))])
             wind = None if window.wind is None else [round(value, 3) for value in window.wind]
             packed[run].append(
                 {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _rounded(window.truth)}
@@ -135,7 +135,7 @@ def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     words = {"cooperative": model if pure else f"{model}, compensated", "physics": f"{model}, physics alone"}
     width = style.width if style and source == "cooperative" else 1.5
     return {
-        "name": label(words.get(source, "constant velocity")),
+        "name": words.get(source, "constant velocity"),
         "keys": [f"source:{source}"] + ([f"model:{model}"] if model else []),
         "line": {"color": style.colour if style else NAIVE, "dash": DASHES[source], "width": width},
     }
@@ -146,9 +146,13 @@ def _chips(content: ReportContent) -> list[Chip]:
     return [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
 
 
-def _rounded(points: Floats) -> list[list[float]]:
-    """(n, 2) -> [x, y], each a list rounded to the centimetre."""
-    return [[round(float(value), 2) for value in column] for column in np.asarray(points).T]
+def _rounded(points: Floats) -> list[list[float | None]]:
+    """(n, 2) -> [x, y], each a list rounded to the centimetre; a path that diverged has gaps."""
+    return [[_rounded_value(value) for value in column] for column in np.asarray(points).T]
+
+
+def _rounded_value(value: float) -> float | None:
+    return round(float(value), 2) if np.isfinite(value) else None
 
 
 def _end_error(window: Snapshot, points: Floats) -> float:
@@ -173,8 +177,8 @@ def _mean_end_error(windows: list[Snapshot], keys: set[PathKey]) -> float:
 
 def _takeaway(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
-    pure, windows = data_driven(content), content.snapshots
-    keys = {key for window in windows for key in window.paths if key[0] in exemplars(content)}
+    pure, drawn, windows = data_driven(content), exemplars(content), content.snapshots
+    keys = {key for window in windows for key in window.paths if key[0] in drawn}
     together = _mean_end_error(windows, {k for k in keys if k[1] == "cooperative" and k[2] == size and k[0] != pure})
     alone = _mean_end_error(windows, {k for k in keys if k[1] == "physics"})
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})

@@ -260,3 +260,34 @@ def _run_casadi(
         records.append(path[:, :, rows])
         worst.append(np.abs(path[:, :, speed_rows]).max(axis=(0, 2)) + 0 * path.sum(axis=(0, 2)))
     return np.stack(records, axis=1), np.stack(worst)
+
+
+def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
+    """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
+
+    The first order is taken as reached; each order is held until the next row. They are modelled, not measured.
+    """
+    model = dynamics(vessel)
+    if not model.memory:
+        return None
+    orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
+    first = orders[[model.commands.index(name) for name in model.memory], 0]
+    count = len(t) - 1
+    scan = ca.Function(
+        "advance",
+        [
+            memory := ca.MX.sym("memory", len(model.memory)),
+            order := ca.MX.sym("order", len(model.commands)),
+            dt := ca.MX.sym("dt"),
+            parameters := ca.MX.sym("parameters", len(model.parameters)),
+        ],
+        [
+            model.advance(
+                ca.MX.zeros(len(model.state)), memory, order, ca.MX.zeros(len(model.environment)), parameters, dt
+            )
+        ],
+    ).mapaccum(count)
+    values = np.array(list(vessel.parameters.values()))[:, None]
+    after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
+    states = np.concatenate([first[:, None], after], axis=1)
+    return dict(zip(model.memory, states, strict=True))

@@ -1,0 +1,164 @@
+"""Physics and compensator as one deployable thing: save, load and predict, without pickle."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from shipid.data.windows import to_frame
+from shipid.errors import DataError, ResultError
+from shipid.estimation.compensator import Compensator
+from shipid.simulation.rollout import rollout
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, check_vessel
+
+Array = np.ndarray
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """What predicts a trajectory from one instant: a vessel (or none), a compensator (or none), horizon and step.
+
+    vessel : physics with its perturbed numbers; None is pure data-driven.
+    horizon, step, method : number of steps, step [s] and rule of the physics rollout; commands and wind are held.
+    limits : column -> (least, greatest) seen in training: the region where the compensator has evidence.
+    """
+
+    vessel: Vessel | None
+    compensator: Compensator | None
+    horizon: int
+    step: float
+    method: str = "euler"
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def physics(self, columns: Mapping[str, Array], memory: Mapping[str, Array] | None = None) -> Array:
+        """Paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
+        if self.vessel is None:
+            return np.zeros((self.horizon, len(columns["u"]), 2))
+        paths, _ = physics_paths(self.vessel, columns, self.horizon, self.step, self.method, memory=memory)
+        return paths[:, 0]
+
+    def predict(self, columns: Mapping[str, Array], memory: Mapping[str, Array] | None = None) -> Array:
+        """Cooperative paths (T, S, 2) [m] in the frame (11), from columns (S,) at the instants of prediction."""
+        paths = self.physics(columns, memory)
+        return paths if self.compensator is None else paths + self.compensator.predict(columns)
+
+    def outside(self, columns: Mapping[str, Array]) -> Array:
+        """Whether each instant (S,) lies outside what training has seen, in any column."""
+        outside = np.zeros(len(columns["u"]), dtype=bool)
+        for name, (low, high) in self.limits.items():
+            if name in columns:
+                slack = 1e-9 * max(1.0, abs(low), abs(high))
+                outside |= (columns[name] < low - slack) | (columns[name] > high + slack)
+        return outside
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Write one `.npz` of arrays and a JSON header; it appears whole or not at all."""
+        header = {
+            "format": FORMAT,
+            "vessel": None if self.vessel is None else {"document": self.vessel.document, "file": self.vessel.file},
+            "horizon": self.horizon,
+            "step": self.step,
+            "method": self.method,
+            "limits": {name: list(pair) for name, pair in self.limits.items()},
+            "provenance": dict(self.provenance),
+            "compensator": None if self.compensator is None else self.compensator.header(),
+        }
+        arrays = {} if self.compensator is None else self.compensator.arrays()
+        target = Path(file)
+        temporary = target.with_name(f".{target.name}")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as stream:
+            np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)
+        os.replace(temporary, target)
+        return target
+
+    @classmethod
+    def load(cls, file: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote; ResultError for anything else."""
+        try:
+            with np.load(file, allow_pickle=False) as stored:
+                header = json.loads(str(stored["header"]))
+                arrays = {name: stored[name] for name in stored.files if name != "header"}
+        except OSError as error:
+            raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
+        except (ValueError, KeyError, zipfile.BadZipFile, EOFError):
+            raise ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file) from None
+        if header.get("format") != FORMAT:
+            raise ResultError(
+                f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
+            )
+        vessel, compensator = header["vessel"], header["compensator"]
+        return cls(
+            vessel=None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
+            compensator=None if compensator is None else Compensator.from_arrays(compensator, arrays),
+            horizon=header["horizon"],
+            step=header["step"],
+            method=header["method"],
+            limits={name: (low, high) for name, (low, high) in header["limits"].items()},
+            provenance=header["provenance"],
+        )
+
+
+def physics_paths(
+    vessel: Vessel,
+    columns: Mapping[str, Array],
+    horizon: int,
+    step: float,
+    method: str,
+    *,
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    device: str = "cpu",
+) -> tuple[Array, Array]:
+    """Paths (T, V, S, 2) [m] of V variants in the frame (11) of S instants, and which diverged (V, S).
+
+    Commands and wind are held at their value at the instant (method, section 2); what the vessel feels and the columns
+    do not hold, such as wind that was not measured, is zero: see `assumed`.
+    """
+    model = dynamics(vessel)
+    zero = np.zeros(len(columns["u"]))
+    start = {name: columns[name] if name in columns else zero for name in model.state}
+    environment = {name: columns[name] if name in columns else zero for name in model.environment}
+    found = rollout(
+        vessel,
+        start,
+        columns,
+        environment,
+        step=step,
+        num_steps=horizon,
+        method=method,  # type: ignore[arg-type]
+        parameters=parameters,
+        memory=memory,
+        keep=("north", "east"),
+        device=device,
+    )
+    north, east = found["north"], found["east"]
+    x, y = to_frame(north[1:], east[1:], north[0], east[0], columns["psi"])
+    return np.stack([x, y], axis=-1), found.diverged
+
+
+def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
+    """Channels that a vessel feels and the columns do not hold: they are taken as zero and must be said."""
+    return [name for name in dynamics(vessel).environment if name not in columns]
+
+
+def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> None:
+    """Raise DataError if a command of the vessel is not among the columns."""
+    missing = [name for name in dynamics(vessel).commands if name not in columns]
+    if missing:
+        commands = sorted(name for name in columns if "." in name)
+        raise DataError(
+            f"{vessel.name} takes this command; the data have {', '.join(commands) or 'no commands'}",
+            file=file,
+            path=missing[0],
+        )

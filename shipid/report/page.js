@@ -1,0 +1,164 @@
+"use strict";
+(() => {
+  const CONFIG = { responsive: true, displayModeBar: false, showTips: false };
+  const root = document.documentElement;
+  const redraws = [];
+  const json = (element) => JSON.parse(element.textContent || "null");
+
+  // Figures name CSS variables instead of colours: one figure serves the light, the dark and the printed page.
+  function painted(value, style) {
+    if (typeof value === "string") {
+      const name = /^var\((--[\w-]+)\)$/.exec(value);
+      return name ? style.getPropertyValue(name[1]).trim() : value;
+    }
+    if (Array.isArray(value)) return value.map((item) => painted(item, style));
+    if (value && typeof value === "object") {
+      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, painted(item, style)]));
+    }
+    return value;
+  }
+
+  function draw(plot, spec, hidden, view) {
+    const { data, layout } = painted(spec, getComputedStyle(root));
+    for (const trace of data) trace.visible = !(trace.meta || []).some((key) => hidden.has(key));
+    // Dragging would catch a finger that only wants to scroll the page.
+    layout.dragmode = matchMedia("(pointer: coarse)").matches ? false : "zoom";
+    layout.uirevision = view;
+    Plotly.react(plot, data, layout, CONFIG);
+  }
+
+  // Every figure: its hidden lines, its controls, and `redraw` which reads both.
+  function setUp(figure, redraw) {
+    const hidden = new Set();
+    const update = () => redraw(hidden);
+    for (const chip of figure.querySelectorAll(".chips button")) {
+      chip.addEventListener("click", () => {
+        const shown = chip.getAttribute("aria-pressed") === "true";
+        chip.setAttribute("aria-pressed", String(!shown));
+        if (shown) hidden.add(chip.dataset.key);
+        else hidden.delete(chip.dataset.key);
+        update();
+      });
+    }
+    for (const control of figure.querySelectorAll(".control")) control.addEventListener("input", update);
+    redraws.push(update);
+    update();
+  }
+
+  const chosen = (figure) =>
+    [...figure.querySelectorAll("[data-control]")].map((control) =>
+      Number(control.querySelector("input:checked, select").value));
+
+  // --- figures whose views were made beforehand
+  for (const script of document.querySelectorAll("script.views")) {
+    const figure = script.closest("figure");
+    const views = json(script);
+    const plots = figure.querySelectorAll(".plot");
+    setUp(figure, (hidden) => {
+      const key = chosen(figure).join("-");
+      views[key].forEach((spec, i) => draw(plots[i], spec, hidden, key));
+    });
+  }
+
+  // --- windows: true path, ship outline at start and end, predicted paths
+  const windows = json(document.getElementById("windows"));
+
+  function outlineAt(x, y, psi) {
+    const [ahead, aside] = windows.outline;
+    const turned = ahead.map((a, i) => [
+      x + a * Math.cos(psi) - aside[i] * Math.sin(psi), y + a * Math.sin(psi) + aside[i] * Math.cos(psi)]);
+    turned.push(turned[0]);
+    return {
+      x: turned.map((point) => point[1]), y: turned.map((point) => point[0]), mode: "lines", hoverinfo: "skip",
+      line: { color: "var(--muted)", width: 1 }, fill: "toself", fillcolor: "var(--hull)",
+    };
+  }
+
+  // Plotly reads tags in its texts.
+  const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+  const pathsOf = (shot, size) => shot.paths.filter((path) => path[1] === size || path[1] === -1);
+
+  function drawWindow(plot, shot, size, hidden, view) {
+    const [x, y] = shot.truth;
+    const end = x.length - 1;
+    const truth = { x: y, y: x, mode: "lines", name: "true path", meta: ["truth"], line: windows.truth,
+                    hovertemplate: "true path<extra></extra>" };
+    const lines = pathsOf(shot, size).map(([line, , ahead, aside]) => ({
+      x: aside, y: ahead, mode: "lines", meta: windows.lines[line].keys, line: windows.lines[line].line,
+      hovertemplate: `${escaped(windows.lines[line].name)}<extra></extra>`,
+    }));
+    const data = [truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
+    draw(plot, { data, layout: windows.layout }, hidden, view);
+  }
+
+  function showWind(place, wind) {
+    place.hidden = !wind;
+    if (!wind) return;
+    const degrees = Math.round((wind[1] * 180) / Math.PI + 360) % 360;
+    place.innerHTML = `<svg viewBox="0 0 20 20" width="20" height="20" aria-hidden="true">
+      <path transform="rotate(${degrees} 10 10)" d="M10 18V3M5 8l5-5 5 5"/></svg>`;
+    place.append(`wind ${wind[0].toFixed(1)} m/s towards ${degrees}° from ahead`);
+  }
+
+  for (const script of document.querySelectorAll("script.fixed")) {
+    const figure = script.closest("figure");
+    const fixed = json(script);
+    const panels = figure.querySelectorAll(".panel");
+    setUp(figure, (hidden) => fixed.forEach(([run, instant, size], i) => {
+      const shot = windows.runs[run][instant];
+      drawWindow(panels[i].querySelector(".plot"), shot, size, hidden, "fixed");
+      showWind(panels[i].querySelector(".wind"), shot.wind);
+    }));
+  }
+
+  const browser = document.getElementById("browser");
+  if (browser) {
+    const slider = browser.querySelector("input[type=range]");
+    const list = browser.querySelector(".errors");
+    let last = -1;
+    setUp(browser, (hidden) => {
+      const [run, size] = chosen(browser);
+      const shots = windows.runs[run];
+      slider.max = shots.length - 1;
+      if (run !== last) slider.value = Math.floor(shots.length / 2);
+      last = run;
+      const shot = shots[slider.value];
+      slider.setAttribute("aria-valuetext", `t = ${shot.t} s`);
+      browser.querySelector(".where").textContent = `t = ${shot.t} s; instant ${Number(slider.value) + 1} of ${shots.length}`;
+      showWind(browser.querySelector(".wind"), shot.wind);
+      drawWindow(browser.querySelector(".plot"), shot, size, hidden, `${run}-${slider.value}`);
+      list.replaceChildren(...pathsOf(shot, size).map((path) => {
+        const item = document.createElement("li");
+        item.append(windows.lines[path[0]].name);
+        const error = document.createElement("span");
+        error.textContent = path[4] === null ? "diverged" : `${path[4].toFixed(2)} m`;
+        item.append(error);
+        return item;
+      }));
+    });
+  }
+
+  // --- tables sort by a press on a heading; what has no number comes last in either direction
+  for (const table of document.querySelectorAll("table.sortable")) {
+    const headings = [...table.tHead.rows[0].cells];
+    headings.forEach((heading, column) => heading.addEventListener("click", () => {
+      const down = heading.getAttribute("aria-sort") === "ascending";
+      const numeric = heading.classList.contains("numeric");
+      for (const other of headings) other.removeAttribute("aria-sort");
+      heading.setAttribute("aria-sort", down ? "descending" : "ascending");
+      const key = (row) => row.cells[column].dataset.key;
+      const compare = (a, b) => {
+        const [left, right] = [key(a), key(b)];
+        if (!numeric) return (down ? -1 : 1) * left.localeCompare(right);
+        const missing = (Number(left) >= 1e300) - (Number(right) >= 1e300);
+        return missing || (down ? -1 : 1) * (Number(left) - Number(right));
+      };
+      table.tBodies[0].append(...[...table.tBodies[0].rows].sort(compare));
+    }));
+  }
+
+  const repaint = () => redraws.forEach((redraw) => redraw());
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  addEventListener("beforeprint", () => { root.dataset.theme = "light"; repaint(); });
+  addEventListener("afterprint", () => { delete root.dataset.theme; repaint(); });
+})();

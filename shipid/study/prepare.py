@@ -1,0 +1,282 @@
+"""From a plan to arrays: the truth or the log, windows, and what every physics model predicts for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipid.data.catalogue import fetch
+from shipid.data.dataset import Dataset, pieces, read_dataset
+from shipid.data.importing import import_log
+from shipid.data.mapping import read_mapping
+from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, split_folds, split_runs
+from shipid.errors import DataError, DocumentError, choices
+from shipid.metrics import Summary, position_error, summary
+from shipid.predictor import assumed, check_columns, physics_paths
+from shipid.simulation.rollout import memory_along
+from shipid.simulation.truth import simulate
+from shipid.study.plan import Batch, Model, Plan, truth_vessel
+from shipid.vessel.load import Vessel
+from shipid.vessel.perturb import draw, resolve
+
+Array = np.ndarray
+MOST_REDRAWS = 100
+VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """All that cells need, the same for every worker.
+
+    pool, test : windows for training and validation, and windows of the untouched test runs.
+    models : foundations, after redraws.
+    pool_paths, test_paths : model -> (T, S, 2) [m] in the frame (11); zeros for the model without physics.
+    failed : model -> share of test windows on which its physics diverged.
+    notes : what was assumed, redrawn or left out, in sentences.
+    """
+
+    pool: Windows
+    test: Windows
+    models: tuple[Model, ...]
+    commands: tuple[str, ...]
+    pool_paths: Mapping[str, Array]
+    test_paths: Mapping[str, Array]
+    notes: tuple[str, ...]
+
+    def accuracy(self, model: str) -> Summary:
+        """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
+        return summary(position_error(self.test_paths[model], self.test.future))
+
+    @cached_property
+    def naive(self) -> Array:
+        """Error (T, S) [m] of constant u, v, r on the test windows: the floor that any predictor must beat."""
+        return position_error(constant_motion(self.test), self.test.future)
+
+    def runs(self, plan: Plan, batch: Batch) -> tuple[str, ...]:
+        """Training and validation runs of a batch: nested over N_D for one seed."""
+        return nested_runs(self.pool.spans, plan.study.grid.N_D, batch.seed)[batch.N_D]
+
+    def folds(self, plan: Plan, batch: Batch, windows: Windows) -> list[tuple[Array, Array]]:
+        """(Training, validation) indices into the windows of a batch, split by run, sharing no moment."""
+        runs, num_folds = self.runs(plan, batch), plan.study.split.folds
+        if num_folds == 1:
+            held_out = [split_runs(runs, VALIDATION_SHARE, batch.seed)[1]]
+        else:
+            held_out = list(split_folds(runs, min(num_folds, len(runs)), batch.seed))
+        masks = [fold_masks(windows, names) for names in held_out]
+        return [(np.flatnonzero(train), np.flatnonzero(validation)) for train, validation in masks]
+
+
+def obtain(plan: Plan) -> Dataset:
+    """The runs of a study: simulated by its truth, imported from its log, or read."""
+    study, folder = plan.study, Path(plan.file).parent
+    if study.truth is not None:
+        frame = simulate(study.truth, truth_vessel(plan))
+        return Dataset(frame, {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []})
+    assert study.data is not None
+    if study.data.dataset is not None:
+        return read_dataset(_beside(folder, study.data.dataset))
+    assert study.data.mapping is not None
+    mapping = read_mapping(study.data.mapping)
+    log = fetch(study.data.mapping) if study.data.log is None else _beside(folder, study.data.log)
+    return import_log(mapping, log, without=study.data.without)
+
+
+def _beside(folder: Path, name: str) -> Path:
+    return folder / name if (folder / name).exists() else Path(name)
+
+
+def prepare(plan: Plan, dataset: Dataset) -> Prepared:
+    """Cut windows, set the test runs aside, and roll every model out on all of them.
+
+    A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
+    """
+    prediction = plan.study.prediction
+    windows = cut_windows(
+        dataset,
+        horizon=prediction.horizon,
+        step=prediction.step,
+        interval=prediction.interval,
+        path=plan.study.data.path if plan.study.data else "position",
+    )
+    if prediction.samples is not None:
+        windows = windows.select(_place_in_run(windows) < prediction.samples)
+    test_runs = _test_runs(plan, windows)
+    test = windows.select(np.isin(windows.run, test_runs))
+    rest = windows.select(~np.isin(windows.run, test_runs))
+    notes: list[str] = []
+    if windows.shared_clock:
+        touching = rest.touching(test.spans.values())
+        if touching.any():
+            notes.append(f"{int(touching.sum())} windows that touch the test runs in time never train")
+        rest = rest.select(~touching)
+    available = len(rest.spans)
+    if available < max(plan.study.grid.N_D):
+        raise DocumentError(
+            f"{max(plan.study.grid.N_D)}: only {available} runs are left for training", file=plan.file, path="grid.N_D"
+        )
+    both = [rest, test]
+    for model in plan.models:
+        if model.vessel is not None:
+            check_columns(model.vessel, test.columns, plan.file)
+            missing = assumed(model.vessel, test.columns)
+            if missing:
+                notes.append(f"{model.vessel.name}: {', '.join(missing)} not measured, assumed 0")
+    models, paths = _roll_out(plan, dataset, both, notes)
+    return Prepared(
+        pool=rest,
+        test=test,
+        models=models,
+        commands=tuple(dataset.commands),
+        pool_paths={name: pair[0] for name, pair in paths.items()},
+        test_paths={name: pair[1] for name, pair in paths.items()},
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _place_in_run(windows: Windows) -> Array:
+    """How many windows of the same run come before each, (S,)."""
+    place = np.zeros(len(windows), dtype=int)
+    for run in windows.spans:
+        mask = windows.run == run
+        place[mask] = np.arange(mask.sum())
+    return place
+
+
+def _test_runs(plan: Plan, windows: Windows) -> list[str]:
+    wanted, runs = plan.study.split.test, windows.spans
+    if isinstance(wanted, int):
+        if wanted >= len(runs):
+            raise DocumentError(f"{wanted}: there are only {len(runs)} runs", file=plan.file, path="split.test")
+        return list(nested_runs(runs, [wanted], plan.study.split.seed)[wanted])
+    for name in wanted:
+        if name not in runs:
+            raise DocumentError(
+                f"{name!r} is no run with windows: {choices(name, runs)}", file=plan.file, path="split.test"
+            )
+    return wanted
+
+
+def _roll_out(
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str]
+) -> tuple[tuple[Model, ...], dict[str, tuple[Array, Array]]]:
+    """Paths of every model on (pool, test), members that diverge on the pool redrawn."""
+    prediction = plan.study.prediction
+    families = {family.name: family for family in resolve(plan.study.family, plan.file)}
+    finished: dict[str, tuple[Model, tuple[Array, Array]]] = {}
+    waiting = [model for model in plan.models if model.vessel is not None]
+    while waiting:
+        again: list[Model] = []
+        by_structure: dict[str, list[Model]] = {}
+        for model in waiting:
+            assert model.vessel is not None
+            by_structure.setdefault(model.vessel.structure, []).append(model)
+        for group in by_structure.values():
+            vessel = group[0].vessel
+            assert vessel is not None
+            parameters = np.array([model.variant.parameters for model in group if model.variant is not None])
+            results = [
+                physics_paths(
+                    vessel,
+                    windows.columns,
+                    prediction.horizon,
+                    prediction.step,
+                    prediction.method,
+                    parameters=parameters,
+                    memory=window_memory(vessel, dataset, windows),
+                )
+                for windows in parts
+            ]
+            for position, model in enumerate(group):
+                paths = (results[0][0][:, position], results[1][0][:, position])
+                if not results[0][1][position].any():
+                    paths[1][:, results[1][1][position]] = np.nan
+                    finished[model.name] = (model, paths)
+                    continue
+                assert model.variant is not None
+                counter, family = model.variant.counter + 1, families[model.family]
+                share = results[0][1][position].mean()
+                if counter > MOST_REDRAWS or not any(isinstance(b.factor, tuple) for b in family.perturb):
+                    raise DocumentError(
+                        f"{model.name} diverges on {share:.0%} of the training windows"
+                        + (f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else "")
+                        + ": take a smaller [prediction] step, rk4, or narrower factors",
+                        file=plan.file,
+                        path=f"family.{model.family}",
+                    )
+                notes.append(f"{model.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}")
+                assert model.vessel is not None
+                again.append(replace(model, variant=draw(family, model.member, model.vessel, counter, plan.file)))
+        waiting = again
+    zeros = tuple(np.zeros_like(windows.future) for windows in parts)
+    models, paths = [], {}
+    for model in plan.models:
+        drawn, pair = finished.get(model.name, (model, (zeros[0], zeros[1])))
+        models.append(drawn)
+        paths[model.name] = pair
+    return tuple(models), paths
+
+
+def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
+    """Hidden actuator states (S,) at the start of each window, modelled from that run's earlier orders; None if none."""
+    tracks: dict[str, list[tuple[Array, dict[str, Array]]]] = {}
+    for run, rows in pieces(dataset):
+        t = rows["t"].to_numpy()
+        orders = {name: rows[name].to_numpy() for name in dataset.commands}
+        states = memory_along(vessel, orders, t)
+        if states is None:
+            return None
+        tracks.setdefault(run, []).append((t, states))
+    result = {name: np.empty(len(windows)) for name in next(iter(tracks.values()))[0][1]}
+    for run in windows.spans:
+        mask = windows.run == run
+        for t, states in tracks[run]:
+            inside = mask & (windows.t >= t[0] - 1e-9) & (windows.t <= t[-1] + 1e-9)
+            for name, values in states.items():
+                result[name][inside] = np.interp(windows.t[inside], t, values)
+    return result
+
+
+def constant_motion(windows: Windows) -> Array:
+    """Paths (T, S, 2) [m] in the frame (11) if u, v, r stayed as they are: exact arcs, straight as r goes to 0."""
+    u, v, r = (windows.columns[name] for name in ("u", "v", "r"))
+    time = windows.step * np.arange(1, windows.horizon + 1)[:, None]
+    half = r * time / 2
+    chord = time * np.sinc(half / np.pi)  # integral of cos and sin over a turn of 2 half
+    along, across = chord * np.cos(half), chord * np.sin(half)
+    return np.stack([u * along - v * across, u * across + v * along], axis=-1)
+
+
+def minutes(windows: Windows, runs: Sequence[str]) -> float:
+    """Recorded time [min] that the windows of these runs see, futures included."""
+    return sum(windows.spans[run][1] - windows.spans[run][0] for run in runs) / 60
+
+
+def limits(windows: Windows, commands: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of what the compensator takes in, over the windows."""
+    names = ["u", "v", "r", *commands, *(name for name in ("V_w",) if name in windows.columns)]
+    return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
+
+
+def describe(model: Model) -> dict[str, Any]:
+    """A model as plain data: what it is, where it comes from, its factors."""
+    variant = model.variant
+    row: dict[str, Any] = {"model": model.name, "family": model.family, "member": model.member}
+    row["description"] = model.description
+    if variant is not None:
+        row |= {"base": variant.base, "base_digest": variant.base_digest, "counter": variant.counter}
+        row |= {"seed": variant.seed, "factors": dict(variant.factors), "values": dict(variant.values)}
+    return row
+
+
+def with_paths(prepared: Prepared, model: str) -> Array:
+    """What the compensator of a model must learn on the pool: (T, S, 2) [m] = truth - physics."""
+    found = prepared.pool_paths[model]
+    if found.shape != prepared.pool.future.shape:
+        raise DataError(f"{model}: physics paths do not fit the windows")
+    return prepared.pool.future - found

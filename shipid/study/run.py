@@ -1,0 +1,219 @@
+"""Run a plan: batches on Dask, results stored as they come, so that an interrupted run resumes."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipid.data.dataset import read_dataset, write_dataset
+from shipid.errors import ShipidError
+from shipid.estimation.tuning import tune
+from shipid.metrics import position_error, summary
+from shipid.predictor import Predictor
+from shipid.study import store
+from shipid.study.plan import Batch, Model, Plan
+from shipid.study.prepare import Prepared, describe, limits, minutes, obtain, prepare
+
+PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something a user may want to see while a study runs.
+
+    kind : `note` (text), `start` (done and total cells known), `cell` (one finished: row), `end` (text: the folder).
+    """
+
+    kind: str
+    text: str = ""
+    done: int = 0
+    total: int = 0
+    row: dict[str, Any] = field(default_factory=dict)
+
+
+def run_study(
+    plan: Plan,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    device: str = "cpu",
+) -> Iterator[Event]:
+    """Run what is not finished yet of a plan and store it in the folder; yields events.
+
+    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again whole.
+
+    Parameters
+    ----------
+    workers : processes of the local cluster, one thread each; default: one per core, no more than batches.
+    scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
+    device : PyTorch device of rollouts and training.
+    """
+    begun = time.perf_counter()
+    store.open_folder(folder, plan)
+    if not (folder / store.DATASET).exists():
+        yield Event("note", "simulating the truth" if plan.study.truth else "importing the log")
+        write_dataset(obtain(plan), folder / store.DATASET)
+    dataset = read_dataset(folder / store.DATASET)
+    yield Event("note", "rolling out the models")
+    prepared = prepare(plan, dataset)
+    store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
+    store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(prepared, m)} for m in prepared.models])
+    for note in prepared.notes:
+        yield Event("note", note)
+    done = store.finished(folder, plan.batches)
+    left = [batch for batch in plan.batches if batch not in done]
+    cells = len(done) * len(plan.models)
+    yield Event("start", done=cells, total=plan.cells)
+    for batch, results in _compute(plan, prepared, left, workers, scheduler, device):
+        rows = []
+        for row, predictor in results:
+            if predictor is not None:
+                predictor.save(store.cell_file(folder, row["cell"]))
+            rows.append(row)
+        store.write_json(store.batch_file(folder, batch), rows)
+        for row in rows:
+            cells += 1
+            yield Event("cell", done=cells, total=plan.cells, row=row)
+    record = store.read_json(folder / store.PROVENANCE)
+    record["notes"] = list(prepared.notes)
+    record["machine"] = machine()
+    record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
+    store.write_json(folder / store.PROVENANCE, record)
+    store.write_results(folder, store.read_rows(folder))
+    yield Event("end", text=str(folder), done=cells, total=plan.cells)
+
+
+def run_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> list[tuple[dict[str, Any], Predictor | None]]:
+    """All cells of one batch: (row of results, predictor) for every model. Pure: the same on every worker."""
+    import torch
+
+    torch.set_num_threads(1)
+    runs = prepared.runs(plan, batch)
+    mask = np.isin(prepared.pool.run, runs)
+    windows = prepared.pool.select(mask)
+    usable = {m.name: np.isfinite(prepared.test_paths[m.name]).all() for m in prepared.models}
+    targets = {m.name: windows.future - prepared.pool_paths[m.name][:, mask] for m in prepared.models}
+    tuned = tune(
+        windows.columns,
+        prepared.commands,
+        targets,
+        prepared.folds(plan, batch, windows),
+        plan.recipe,
+        batch.seed,
+        device=device,
+    )
+    shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": minutes(prepared.pool, runs)}
+    results: list[tuple[dict[str, Any], Predictor | None]] = []
+    for model in prepared.models:
+        found = tuned[model.name]
+        row = {"cell": batch.cell(model.name), "model": model.name, "kind": model.family, "member": model.member}
+        row |= {**shared, **_accuracy(prepared, model), "H": np.nan, "H_90": np.nan, "rms": np.nan}
+        row |= {"status": "ok", "sentence": "", "seconds": found.seconds, "trials": found.trials, "hyperparameters": ""}
+        predictor = None
+        if found.compensator is None:
+            row |= {"status": "failed", "sentence": "no training converged"}
+        else:
+            chosen = found.compensator.hyperparameters
+            row["hyperparameters"] = ", ".join(f"{name} {value:.4g}" for name, value in chosen.items())
+            predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
+            if usable[model.name]:
+                paths = prepared.test_paths[model.name] + found.compensator.predict(prepared.test.columns)
+                error = summary(position_error(paths, prepared.test.future))
+                row |= {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
+            else:
+                share = (~np.isfinite(prepared.test_paths[model.name]).all(axis=(0, 2))).mean()
+                row |= {"status": "diverged", "sentence": f"physics diverges on {share:.1%} of the test windows"}
+        results.append((row, predictor))
+    return results
+
+
+def machine() -> dict[str, Any]:
+    """What the results were computed with: interpreter, packages, machine."""
+    packages = {name: version(name) for name in PACKAGES}
+    system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
+    return {**system, "cores": os.cpu_count(), "packages": packages}
+
+
+def _accuracy(prepared: Prepared, model: Model) -> dict[str, Any]:
+    if model.vessel is None:
+        return {"A": np.nan, "A_90": np.nan, "A_rms": np.nan}
+    found = prepared.accuracy(model.name)
+    return {"A": found["mean"], "A_90": found["p90"], "A_rms": found["rms"]}
+
+
+def _predictor(plan: Plan, prepared: Prepared, model: Model, batch: Batch, compensator: Any, windows: Any) -> Predictor:
+    vessel = model.vessel
+    if vessel is not None and model.variant is not None:
+        vessel = vessel.with_values(model.variant.values)
+    return Predictor(
+        vessel=vessel,
+        compensator=compensator,
+        horizon=windows.horizon,
+        step=windows.step,
+        method=plan.study.prediction.method,
+        limits=limits(windows, prepared.commands),
+        provenance={
+            "study": plan.name,
+            "digest": plan.digest,
+            "cell": batch.cell(model.name),
+            "runs": list(prepared.runs(plan, batch)),
+            "shipid": version("shipid"),
+        },
+    )
+
+
+def _compute(
+    plan: Plan, prepared: Prepared, batches: list[Batch], workers: int | None, scheduler: str | None, device: str
+) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
+    """Batches and their results in the order in which they finish."""
+    if not batches:
+        return
+    with _client(workers, scheduler, len(batches)) as client:
+        from dask.distributed import as_completed
+
+        shared = client.scatter([plan, prepared], broadcast=True)
+        futures = {
+            client.submit(run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False): batch
+            for batch in batches
+        }
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+@contextmanager
+def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[Any]:
+    """A Dask client: of an existing scheduler, or of a local cluster of single-threaded processes."""
+    import dask
+    from dask.distributed import Client, LocalCluster
+
+    quiet = {"distributed.worker.memory.terminate": False, "distributed.admin.large-graph-warning-threshold": "1GB"}
+    with warnings.catch_warnings(), dask.config.set(quiet):
+        warnings.simplefilter("ignore")
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout="10s")
+            except (OSError, ValueError) as error:
+                raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
+            with client:
+                yield client
+            return
+        count = min(workers or os.cpu_count() or 1, most)
+        with (
+            LocalCluster(
+                n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50, memory_limit=0
+            ) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client

@@ -1,0 +1,162 @@
+"""Results: a folder that can be copied and opened anywhere, written batch by batch."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.windows import Windows
+from shipid.errors import ResultError
+from shipid.study.plan import Batch, Plan, build_plan
+
+STUDY, PROVENANCE, DATASET, TEST, MODELS = "study.toml", "provenance.json", "dataset.parquet", "test.npz", "models.json"
+METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_name(f".{file.name}.{os.getpid()}")
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, file)
+
+
+def write_json(file: Path, content: Any) -> None:
+    """Write plain data as JSON, whole or not at all; NaN becomes null."""
+    write_text(file, json.dumps(_plain(content), indent=1))
+
+
+def read_json(file: Path) -> Any:
+    """Read JSON; ResultError if it is missing or damaged."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
+    except ValueError:
+        raise ResultError("damaged: run the study again into a new folder", file=file) from None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def open_folder(folder: Path, plan: Plan) -> None:
+    """Make the folder of a run, or check that an existing one belongs to the same study."""
+    if (folder / STUDY).exists():
+        if read_json(folder / PROVENANCE).get("digest") != plan.digest:
+            raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+        return
+    if folder.exists() and any(folder.iterdir()):
+        raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
+    write_json(folder / PROVENANCE, {"digest": plan.digest, "name": plan.name, "file": str(Path(plan.file).absolute())})
+    write_text(folder / STUDY, plan.text())
+
+
+def stored_plan(folder: Path) -> Plan:
+    """The plan of a run from its folder; vessel files named by path are looked for beside the original study."""
+    if not (folder / STUDY).is_file():
+        raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
+    provenance = read_json(folder / PROVENANCE)
+    document = tomllib.loads((folder / STUDY).read_text(encoding="utf-8"))
+    plan = build_plan(document, Path(provenance["file"]))
+    if plan.digest != provenance["digest"]:
+        raise ResultError("a vessel of this study has changed since the run: run the study again", file=folder)
+    return plan
+
+
+def batch_file(folder: Path, batch: Batch) -> Path:
+    """Where the rows of a finished batch are; its presence says that the batch is done."""
+    return folder / "batches" / f"{batch.key}.json"
+
+
+def cell_file(folder: Path, cell: str) -> Path:
+    """Where the predictor of a cell is."""
+    return folder / "cells" / f"{cell}.npz"
+
+
+def finished(folder: Path, batches: Iterable[Batch]) -> list[Batch]:
+    """Batches whose results are stored whole."""
+    return [batch for batch in batches if batch_file(folder, batch).is_file()]
+
+
+def read_rows(folder: Path) -> pd.DataFrame:
+    """One row per finished cell, with its trials; ordered by N_D, seed and model."""
+    rows = [row for file in sorted((folder / "batches").glob("*.json")) for row in read_json(file)]
+    if not rows:
+        raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
+    frame = pd.DataFrame(rows)
+    for name in METRICS:
+        frame[name] = frame[name].astype(float)
+    return frame.sort_values(["N_D", "seed"], kind="stable").reset_index(drop=True)
+
+
+def write_results(folder: Path, rows: pd.DataFrame) -> Path:
+    """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial."""
+    keys = ["cell", "model", "kind", "member", "N_D", "runs", "minutes", "seed", "status"]
+    table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
+    table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
+    table.to_parquet(folder / "results.parquet", index=False)
+    trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
+    pd.DataFrame(trials).to_parquet(folder / "trials.parquet", index=False)
+    return folder / "results.parquet"
+
+
+def _flat(trial: Mapping[str, Any]) -> dict[str, Any]:
+    return {**{k: v for k, v in trial.items() if k != "params"}, **trial.get("params", {})}
+
+
+def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:
+    """Store the test windows and every model's physics paths on them, so that a report needs nothing else."""
+    arrays: dict[str, np.ndarray] = {"run": test.run, "t": test.t, "future": test.future, "naive": naive}
+    arrays |= {f"column {name}": values for name, values in test.columns.items()}
+    arrays |= {f"planned {name}": values for name, values in test.planned.items()}
+    arrays |= {f"physics {name}": values for name, values in paths.items()}
+    arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
+    temporary = folder / f".{TEST}"
+    with temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)
+    os.replace(temporary, folder / TEST)
+
+
+def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:
+    """Test windows, physics paths by model, and the naive floor's errors (T, S)."""
+    try:
+        with np.load(folder / TEST, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+    except (OSError, ValueError):
+        raise ResultError("missing or damaged: continue with `shipid study resume`", file=folder / TEST) from None
+    meta = json.loads(str(arrays["meta"]))
+
+    def named(prefix: str) -> dict[str, np.ndarray]:
+        return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
+
+    windows = Windows(
+        run=arrays["run"],
+        t=arrays["t"],
+        columns=named("column "),
+        future=arrays["future"],
+        planned=named("planned "),
+        horizon=meta["horizon"],
+        step=meta["step"],
+        shared_clock=meta["shared"],
+    )
+    return windows, named("physics "), arrays["naive"]

@@ -1,0 +1,82 @@
+"""Logs and datasets whose motion is known exactly."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+
+REPOSITORY = Path(__file__).parents[2]
+PLAIN = REPOSITORY / "tests" / "bad" / "logs" / "plain.toml"
+
+
+@pytest.fixture(scope="session")
+def data_folder() -> Path:
+    folder = Path(os.environ.get("SHIPID_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip("no folder with recorded data: set SHIPID_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def gunnerus_log(data_folder: Path) -> Path:
+    file = data_folder / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
+    if not file.is_file():
+        pytest.skip(f"no {file.name} in the data folder")
+    return file
+
+
+@pytest.fixture
+def plain_mapping(tmp_path: Path) -> Callable[[str], Path]:
+    """Write the plain mapping with more TOML behind it."""
+
+    def write(more: str = "", replace: tuple[str, str] = ("", "")) -> Path:
+        file = tmp_path / "mapping.toml"
+        file.write_text(PLAIN.read_text().replace(*replace) + more)
+        return file
+
+    return write
+
+
+def turning(t: np.ndarray, *, u: float = 4.0, v: float = -0.5, r: float = 0.05, psi0: float = 6.0) -> pd.DataFrame:
+    """Steady turn, analytically: psi = psi0 + r t, and the exact integral of R(psi) (u, v)."""
+    psi = psi0 + r * t
+    north = (u * (np.sin(psi) - np.sin(psi0)) + v * (np.cos(psi) - np.cos(psi0))) / r
+    east = (-u * (np.cos(psi) - np.cos(psi0)) + v * (np.sin(psi) - np.sin(psi0))) / r
+    return pd.DataFrame(
+        {"t": t, "north": north, "east": east, "psi": psi, "u": u, "v": v, "r": r, "port.n": np.floor(t / 7.0)}
+    )
+
+
+def as_dataset(*frames: pd.DataFrame, names: tuple[str, ...] = (), **metadata: object) -> Dataset:
+    """Join frames as runs `a`, `b`, ... without flags set."""
+    runs = []
+    for index, frame in enumerate(frames):
+        name = names[index] if names else "abcdefghijklmnopqrstuvwxyz"[index]
+        flags = frame["flags"] if "flags" in frame else 0
+        runs.append(frame.assign(run=pd.Series([name] * len(frame), dtype="str"), flags=flags))
+    return Dataset(pd.concat(runs, ignore_index=True).astype({"flags": "int64"}), {"flags": ["break"], **metadata})
+
+
+def as_log(frame: pd.DataFrame, file: Path) -> Path:
+    """Write a frame as a log of the plain mapping: degrees 0..360, deg/min, rpm."""
+    log = pd.DataFrame(
+        {
+            "time": frame["t"],
+            "N": frame["north"],
+            "E": frame["east"],
+            "heading": np.degrees(frame["psi"]) % 360.0,
+            "u": frame["u"],
+            "v": frame["v"],
+            "rot": np.degrees(frame["r"]) * 60.0,
+            "rpm": frame["port.n"] * 60.0,
+        }
+    )
+    log.to_csv(file, index=False)
+    return file

@@ -1,0 +1,130 @@
+"""The schema refuses what it should, and Parquet gives back what went in."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet
+import pytest
+
+from shipid.data.dataset import Dataset, pieces, read_dataset, sample, unit_of, write_dataset
+from shipid.errors import DataError
+from tests.data.conftest import as_dataset, turning
+
+T = np.arange(0.0, 20.0, 0.5)
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    dataset = as_dataset(
+        turning(T), turning(T, r=-0.02), vessel="gunnerus-33.9", repairs=[{"kind": "scale", "count": 3}]
+    )
+    file = write_dataset(dataset, tmp_path / "sub" / "trial.parquet")
+    back = read_dataset(file)
+    pd.testing.assert_frame_equal(back.frame, dataset.frame)
+    assert back.metadata == {"units": back.metadata["units"], **dataset.metadata}
+    assert back.metadata["units"]["port.n"] == "rev/s"
+    assert back.runs == ["a", "b"]
+    assert back.commands == ["port.n"]
+    assert [entry.name for entry in file.parent.iterdir()] == ["trial.parquet"]  # nothing temporary stays
+
+
+def test_file_is_compressed_parquet_with_json_metadata(tmp_path: Path) -> None:
+    file = write_dataset(as_dataset(turning(T), vessel="x"), tmp_path / "trial.parquet")
+    stored = pyarrow.parquet.ParquetFile(file)
+    assert stored.metadata.row_group(0).column(0).compression == "ZSTD"
+    assert json.loads(stored.schema_arrow.metadata[b"shipid"])["vessel"] == "x"
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
+    file = write_dataset(as_dataset(turning(T)), tmp_path / "trial.parquet")
+    before = file.read_bytes()
+    with pytest.raises(TypeError):
+        write_dataset(as_dataset(turning(T), bad=object()), file)
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "remedy"),
+    [
+        (lambda f: f.drop(columns="psi"), "psi", "missing column; there are: t, north"),
+        (lambda f: f.assign(Psi=1.0), "Psi", "did you mean 'psi'?"),
+        (lambda f: f.assign(**{"port.rpm": 1.0}), "port.rpm", "<component>.<signal>"),
+        (lambda f: f.assign(u=f["u"].astype("float32")), "u", "must hold float64 in m/s"),
+        (lambda f: f.assign(u="fast"), "u", "must hold float64 in m/s"),
+        (lambda f: f.assign(run=1), "run", "must hold text"),
+        (lambda f: f.assign(flags=0.0), "flags", "must hold integers"),
+        (lambda f: f.assign(flags=2), "flags", "metadata['flags']"),
+        (lambda f: f.assign(v=f["v"].where(f["t"] != 3.0)), "v", "1 values are not finite, the first in row 6"),
+        (lambda f: f.assign(t=f["t"].where(f["t"] != 3.0, 2.5)), "t", "does not increase at t = 2.5 s"),
+        (lambda f: f.assign(V_w=1.0), "V_w", "beta_w is missing"),
+        (lambda f: f.iloc[:0], None, "no rows"),
+    ],
+)
+def test_schema_names_what_is_wrong(change: object, place: str | None, remedy: str) -> None:
+    dataset = as_dataset(turning(T))
+    with pytest.raises(DataError) as caught:
+        Dataset(change(dataset.frame), dataset.metadata)  # type: ignore[operator]
+    assert caught.value.path == place
+    assert remedy in caught.value.message
+
+
+def test_units_that_contradict_the_schema_are_refused() -> None:
+    with pytest.raises(DataError, match="must be 'rad'"):
+        as_dataset(turning(T), units={"psi": "deg"})
+
+
+def test_two_runs_may_share_a_clock_and_rows() -> None:
+    assert as_dataset(turning(T), turning(T)).runs == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [(b"time,N,E\n", "not a Parquet file"), (None, "cannot be read"), ("foreign", "not a dataset of")],
+)
+def test_foreign_files_are_refused(tmp_path: Path, content: bytes | str | None, remedy: str) -> None:
+    file = tmp_path / "x.parquet"
+    if content == "foreign":
+        pd.DataFrame({"t": [1.0]}).to_parquet(file)
+    elif isinstance(content, bytes):
+        file.write_bytes(content)
+    with pytest.raises(DataError, match=remedy) as caught:
+        read_dataset(file)
+    assert caught.value.file == str(file)
+
+
+def test_read_names_file_and_column(tmp_path: Path) -> None:
+    file = write_dataset(as_dataset(turning(T)), tmp_path / "x.parquet")
+    table = pyarrow.parquet.read_table(file)
+    pyarrow.parquet.write_table(table.drop_columns(["u"]), file)
+    with pytest.raises(DataError) as caught:
+        read_dataset(file)
+    assert (caught.value.file, caught.value.path) == (str(file), "u")
+
+
+def test_pieces_start_at_breaks() -> None:
+    frame = turning(T).assign(flags=np.where(np.isin(T, [0.0, 5.0, 12.0]), 1, 0))
+    found = [(run, rows["t"].iloc[0], len(rows)) for run, rows in pieces(as_dataset(frame, turning(T)))]
+    assert found == [("a", 0.0, 10), ("a", 5.0, 14), ("a", 12.0, 16), ("b", 0.0, 40)]
+
+
+def test_sample_holds_commands_and_interpolates_states() -> None:
+    rows = turning(np.array([0.0, 0.1, 0.1 + 0.2, 0.6])).assign(
+        u=[0.0, 1.0, 2.0, 3.0], **{"port.n": [1.0, 2.0, 3.0, 4.0]}
+    )
+    values = sample(rows, np.array([[0.0, 0.3], [0.29, 0.45]]))  # 0.3 < 0.1 + 0.2 by one bit
+    np.testing.assert_allclose(values["u"], [[0.0, 2.0], [1.95, 2.5]])
+    np.testing.assert_array_equal(values["port.n"], [[1.0, 3.0], [2.0, 3.0]])
+
+
+def test_sample_unwraps_angles() -> None:
+    rows = turning(np.array([0.0, 1.0])).assign(psi=np.radians([359.0, 1.0]))
+    assert np.degrees(sample(rows, np.array([0.5]))["psi"]) == pytest.approx(360.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("port.n", "rev/s"), ("rudder_1.delta", "rad"), ("r", "rad/s"), ("port.thrust", None), ("n", None)],
+)
+def test_unit_of(name: str, unit: str | None) -> None:
+    assert unit_of(name) == unit
