@@ -62,7 +62,7 @@ def _ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
 
 
 def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
-    """d(psi)/dt (central differences) against r: correlation; k of d(psi)/dt = k r by least squares; relative RMS."""
+    """d(psi)/dt (central differences) against r: correlation, k of d(psi)/dt = k r by least squares, RMS difference."""
     long = [rows for rows in stretches if len(rows) > 2]
     if not long:
         return
@@ -72,9 +72,9 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     if max(size, _rms(rate)) < TURNING:
         yield _row("heading rate", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
-    power, moves = float(r @ r), float(r.std() * rate.std()) > 0
-    correlation = float(np.corrcoef(r, rate)[0, 1]) if moves else 1.0
-    scale = float(rate @ r) / power if power > 0 else 0.0
+    product = float(np.mean(r * rate))
+    correlation = product / (size * _rms(rate) or 1.0)  # not centred: a steady turn counts
+    scale = product / (size**2 or 1.0)
     words = "; wrong sign of r or psi?" if correlation < 0 else ""
     sentence = f"d(psi)/dt and r correlate by {correlation:.3f}{words}"
     yield _row("heading rate", correlation, "1", CORRELATION, sentence, ok=correlation >= CORRELATION)

@@ -110,7 +110,7 @@ def read_mapping(name: str | Path) -> Mapping:
     raw = document.read(file)
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
-    parts = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}
+    parts: dict[str, Any] = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}
     if isinstance(raw.get("columns"), dict):
         parts["columns"] = {
             key: document.parse(Column, entry, file, prefix=f"columns.{key}") for key, entry in raw["columns"].items()

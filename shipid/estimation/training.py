@@ -121,9 +121,10 @@ def train(
     for _ in range(settings.epochs):
         total = torch.zeros(num_members, device=device)
         for rows in _batches(num_samples, batch, order):
-            masks = _masks(len(x[rows]), widths, settings, generators, device)
+            x_batch, y_batch = x[rows], y[:, rows]
+            masks = _masks(len(x_batch), widths, settings, generators, device)
             factor = one_cycle(adam.count, num_steps) if settings.one_cycle else 1.0
-            total += _step(x[rows], y[:, rows], layers, masks, adam, rate * factor)
+            total += _step(x_batch, y_batch, layers, masks, adam, rate * factor)
         with torch.no_grad():
             if val_idx is None:
                 watch.follow(total)
@@ -145,7 +146,7 @@ def _step(x: Tensor, y: Tensor, layers: Stack, masks: Masks, adam: Adam, rate: T
 
 def _batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
     """Cut one epoch into batches, shuffled; a single batch stays in order."""
-    return [slice(None)] if batch >= num_samples else torch.randperm(num_samples, generator=order).split(batch)
+    return [slice(None)] if batch >= num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
 
 
 def forward(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
@@ -185,9 +186,9 @@ class Adam:
         self.count += 1
         self.first.lerp_(gradient, 1 - BETA_1)
         self.second.mul_(BETA_2).addcmul_(gradient, gradient, value=1 - BETA_2)
-        spread = (self.second / (1 - BETA_2**self.count)).sqrt_().add_(EPSILON)
+        spread = self.second.sqrt().mul_((1 - BETA_2**self.count) ** -0.5).add_(EPSILON)
         self.weights.mul_(1 - rate * self.decay)
-        self.weights.sub_((rate / (1 - BETA_1**self.count)) * self.first / spread)
+        self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
 
 
 def one_cycle(step: int, num_steps: int) -> float:

@@ -89,15 +89,16 @@ def tune(
     runs = {key: _Run(_study(recipe, _seed(seed, key))) for key in targets}
 
     for number in range(recipe.trials):
-        asked = {key: _suggest(run.ask(), recipe) for key, run in runs.items()}
+        trials = {key: run.study.ask() for key, run in runs.items()}
+        asked = {key: _suggest(trial, recipe) for key, trial in trials.items()}
         for stack in _stacks(asked):
             start = time.perf_counter()
             results = [_fit(fold, stack, recipe, (seed, number, i), device) for i, fold in enumerate(data)]
             seconds = (time.perf_counter() - start) / len(stack)
             for key, parameters in stack.items():
                 runs[key].record(parameters, [result[key] for result in results], seconds)
-        for run in runs.values():
-            run.tell()
+        for key, run in runs.items():
+            run.tell(trials[key])
         if on_trial is not None:
             on_trial(number + 1, recipe.trials)
 
@@ -136,20 +137,15 @@ class _Result:
 
 
 class _Run:
-    """The study of one model: its open trial, its rows and its best networks so far."""
+    """The study of one model: its rows and its best networks so far."""
 
     def __init__(self, study: optuna.Study) -> None:
         self.study = study
-        self.open: Trial | None = None
         self.rows: list[dict[str, Any]] = []
         self.seconds = 0.0
         self.best_value = inf
         self.best_parameters: Parameters = {}
         self.best_networks: tuple[Network, ...] = ()
-
-    def ask(self) -> Trial:
-        self.open = self.study.ask()
-        return self.open
 
     def record(self, parameters: Parameters, results: Sequence[_Result], seconds: float) -> None:
         value = float(np.mean([result.loss for result in results]))
@@ -162,12 +158,11 @@ class _Run:
             self.best_value, self.best_parameters = value, parameters
             self.best_networks = tuple(result.network for result in results)
 
-    def tell(self) -> None:
-        assert self.open is not None
+    def tell(self, trial: Trial) -> None:
         if self.rows[-1]["state"] == "complete":
-            self.study.tell(self.open, self.rows[-1]["value"])
+            self.study.tell(trial, self.rows[-1]["value"])
         else:
-            self.study.tell(self.open, state=TrialState.FAIL)
+            self.study.tell(trial, state=TrialState.FAIL)
 
     def replace(self, results: Sequence[_Result], seconds: float) -> None:
         self.seconds += seconds

@@ -25,12 +25,8 @@ def rotation(phi: SX, theta: SX, psi: SX) -> SX:
     c_phi, s_phi, c_theta, s_theta = ca.cos(phi), ca.sin(phi), ca.cos(theta), ca.sin(theta)
     c_psi, s_psi = ca.cos(psi), ca.sin(psi)
     return ca.vertcat(
-        ca.horzcat(
-            c_psi * c_theta, -s_psi * c_phi + c_psi * s_theta * s_phi, s_psi * s_phi + c_psi * c_phi * s_theta
-        ),
-        ca.horzcat(
-            s_psi * c_theta, c_psi * c_phi + s_phi * s_theta * s_psi, -c_psi * s_phi + s_theta * s_psi * c_phi
-        ),
+        ca.horzcat(c_psi * c_theta, -s_psi * c_phi + c_psi * s_theta * s_phi, s_psi * s_phi + c_psi * c_phi * s_theta),
+        ca.horzcat(s_psi * c_theta, c_psi * c_phi + s_phi * s_theta * s_psi, -c_psi * s_phi + s_theta * s_psi * c_phi),
         ca.horzcat(-s_theta, c_theta * s_phi, c_theta * c_phi),
     )
 
@@ -64,6 +60,6 @@ def current(eta: SX, nu: SX, V_c: SX, beta_c: SX) -> tuple[SX, SX]:
     return ca.vertcat(linear, SX(3, 1)), ca.vertcat(rate, SX(3, 1))
 
 
-def force_at(x: SX, y: SX, z: SX, F_x: SX, F_y: SX) -> SX:
+def force_at(x: SX, y: SX, z: SX | float, F_x: SX, F_y: SX) -> SX:
     """Wrench (6) about the origin of a horizontal force (F_x, F_y) [N] at the point (x, y, z) [m]."""
     return vector(F_x, F_y, 0, -z * F_y, z * F_x, x * F_y - y * F_x)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 Floats = np.ndarray[tuple[int, ...], np.dtype[np.floating]]
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.signedinteger]]
 PathKey = tuple[str, str, int]
 
 DATA_DRIVEN = "none"  # the family (column `kind`) of the model without physics

@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, ReportContent
+from shipid.report.content import Floats, Indices, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
 from shipid.report.palette import DASHES, INK, NAIVE, styles
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres
 
 BY = ["model", "source", "N_D"]
+ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
 
@@ -64,13 +65,13 @@ def over_time(content: ReportContent) -> Figure | None:
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(content, means[means.N_D.isin([0, counts[-1]])]),
+        takeaway=_takeaway_time(means[means.N_D.isin([0, counts[-1]])]),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below. "
         + _drawn(content)
         + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
-        height=300 + 130 * len(_units(content.commands)),
+        height=_height(content.commands),
         views=views,
         controls=[Control("Test run", runs), _size_control(counts)],
         chips=[*model_chips(content, set(means.source)), *_command_chips(content.commands)],
@@ -110,7 +111,8 @@ def _size_control(counts: Sequence[int]) -> Control:
 
 def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
     looks, pure, traces = styles(content), data_driven(content), []
-    for (model, source), mine in means.groupby(["model", "source"], sort=False):
+    for key, mine in means.groupby(["model", "source"], sort=False):
+        model, source = (str(part) for part in key)
         x, y = mine[across].to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
         ink = {"width": looks[model].width if source == "cooperative" else 1.5, **ink} if model else ink
@@ -125,7 +127,7 @@ def _word(source: str) -> str:
     return "compensated" if source == "cooperative" else "physics alone"
 
 
-def _visible(x: Floats, y: Floats) -> Floats:
+def _visible(x: Floats, y: Floats) -> Indices:
     """Points of a line that a plot of 2,000 pixels can tell apart; a line with gaps is kept whole."""
     if not np.isfinite(y).all() or len(y) < 3:
         return np.arange(len(y))
@@ -133,8 +135,18 @@ def _visible(x: Floats, y: Floats) -> Floats:
     return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / 2000)
 
 
+def _changes(values: Floats) -> Indices:
+    """Find the samples of a held command that a step line needs: where it changes, and both ends."""
+    changed = np.flatnonzero(np.diff(values) != 0)
+    return np.unique(np.concatenate([[0], changed, changed + 1, [len(values) - 1]]))
+
+
+def _height(commands: pd.DataFrame) -> int:
+    return MARGIN + ERROR + (COMMAND + GAP) * len(_units(commands))
+
+
 def _units(commands: pd.DataFrame) -> dict[str, list[str]]:
-    """Unit -> the command columns in it, in the order of the frame."""
+    """Map each unit to the command columns in it, in the order of the frame."""
     units: dict[str, list[str]] = {}
     for column in commands.columns:
         if column not in ("run", "t"):
@@ -154,25 +166,24 @@ def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _units(content.commands)
     mine = content.commands[content.commands.run == run]
-    traces, gap = _traces(content, means, "t", "error"), 0.06
-    top = 0.0 if not units else 0.22 * len(units) + gap
+    traces, total = _traces(content, means, "t", "error"), _height(content.commands) - MARGIN
     axes = {}
     for row, (unit, columns) in enumerate(units.items(), start=2):
         for i, column in enumerate(columns):
             t, values = mine.t.to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
-            keep = _visible(t, values)
-            ink = {"color": INK, "width": 1.5, "dash": COMMAND_DASHES[i % 4]}
+            keep = _changes(values)
+            ink = {"color": INK, "width": 1.5, "dash": COMMAND_DASHES[i % 4], "shape": "hv"}
             name = column.partition("[")[0].strip()
             traces.append(
                 line(name, t[keep], values[keep], [f"command:{column}"], unit, line=ink, xaxis="x", yaxis=f"y{row}")
             )
-        low = 0.22 * (len(units) - row + 1)
+        low = (len(units) - row + 1) * (COMMAND + GAP) / total
         shared = ", ".join(sorted({column.partition("[")[0].split()[-1] for column in columns}))
-        axes[f"yaxis{row}"] = axis(f"{shared} [{unit}]", domain=[low, low + 0.22 - gap], anchor="x", nticks=4)
+        axes[f"yaxis{row}"] = axis(f"{shared} [{unit}]", domain=[low, low + COMMAND / total], anchor="x", nticks=4)
     # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
     lowest = "y" if not units else f"y{len(units) + 1}"
     x = axis("time of the recording [s]", anchor=lowest)
-    y = axis("position error [m]", rangemode="tozero", domain=[top, 1.0])
+    y = axis("position error [m]", rangemode="tozero", domain=[1 - ERROR / total, 1.0])
     return go.Figure(traces, layout(x, y, hovermode="x unified", **axes))
 
 
@@ -185,15 +196,17 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     best, pure = str(together.idxmin()), data_driven(content)
     text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
-    return text + (f"; pure data-driven {metres(together[pure])}." if pure in together.index and pure != best else ".")
+    return text + (
+        f"; pure data-driven {metres(together[pure])}." if pure and pure != best and pure in together.index else "."
+    )
 
 
-def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
+def _takeaway_time(means: pd.DataFrame) -> str:
     together = means[means.source == "cooperative"]
     if together.empty:
         return "No compensated model gave a prediction."
     best = str(together.groupby("model").error.mean().idxmin())
-    worst = together.loc[together[together.model == best].error.idxmax()]
+    worst = together[together.model == best].nlargest(1, "error").iloc[0]
     text = f"{best}, the best of those drawn, errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
     same = means[means.model.eq(best) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)]
     return f"{text} on average over the horizon" + (

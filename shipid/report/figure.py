@@ -63,7 +63,8 @@ class Figure:
     views : option indices of the controls, joined by "-" ("" without controls) -> panels.
     height : of one panel [px].
     windows : panels drawn from the windows of the page instead of views.
-    browser : test run -> its instants [s]; a window browser instead of views.
+    browser : whether it is the window browser, instead of views.
+    scale : smallest and largest A [m] of the colour scale, if lines are coloured by it.
     """
 
     id: str
@@ -77,17 +78,28 @@ class Figure:
     chips: Sequence[Chip] = ()
     windows: Sequence[FixedWindow] = ()
     browser: bool = False
+    scale: tuple[float, float] | None = None
 
 
 def label(text: str) -> str:
-    """A name as Plotly text, which would otherwise read tags and links in it."""
+    """Escape a name for Plotly, which reads tags and links in its texts."""
     return html.escape(text, quote=False)
 
 
 def axis(title: str, **options: Any) -> dict[str, Any]:
-    """An axis with its title; the title carries the unit."""
+    """Make an axis; its title carries the unit."""
     base = {"gridcolor": GRID, "linecolor": GRID, "zeroline": False, "automargin": True}
-    return {**base, "title": {"text": title, "standoff": 8}, **options}
+    return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
+
+
+def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str, Any]:
+    """Lay out two lengths on equal axes, over given spans of x and y [m] or over what is drawn."""
+    room = 0.04 * max((high - low for low, high in spans), default=0.0)
+    ranges = [{"range": [low - room, high + room]} for low, high in spans] or [{}, {}]
+    # Margins are fixed: automatic ones and equal axes chase each other.
+    right = axis(x, scaleanchor="y", scaleratio=1, nticks=6, automargin=False, **ranges[0])
+    up = axis(y, nticks=8, automargin=False, **ranges[1])
+    return layout(right, up, hovermode="closest", margin={"l": 60, "r": 12, "t": 12, "b": 44})
 
 
 def layout(x: dict[str, Any], y: dict[str, Any], **options: Any) -> dict[str, Any]:

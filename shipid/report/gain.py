@@ -10,11 +10,12 @@ import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
-from shipid.report.palette import INK, NAIVE, Style, accuracy_range, scale, styles
+from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
 from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, listed, metres
 
 ROW = 46  # height of a model in the dumbbell figure [px]
+LONGEST = 24  # characters of a name that fit beside its numbers on a phone
 
 
 class Statistic(NamedTuple):
@@ -71,7 +72,7 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         title="What another manoeuvre buys",
         takeaway=_takeaway_sizes(content, means),
         how=HOW.format(seeds="the line joins their means and the pale points are the seeds")
-        + " Colour is A; the marker is the family."
+        + " Colour is A; the marker is the family; N_D counts manoeuvres to train and to validate."
         + unplotted(content),
         alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
         "The numbers are in the table of cells.",
@@ -79,6 +80,7 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         views=views,
         controls=[Control("Position error", [statistic.name for statistic in STATISTICS])],
         chips=[*chips, Chip("naive", "constant velocity", NAIVE, "dash")],
+        scale=accuracy_range(content),
     )
 
 
@@ -102,12 +104,9 @@ def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, lo
             traces.append(line(f"{name}, seed", seeds.N_D.to_numpy(), each, keys, "m", "markers", marker=faint))
             traces[-1].opacity = 0.4
     traces.append(_floor(content, statistic, [sizes[0], sizes[-1]], across=True))
-    span = accuracy_range(content)
-    if span is not None:
-        traces.append(_colour_bar(span, sizes[0]))
-    x = axis("manoeuvres to train and validate, N_D [1]", tickvals=[int(size) for size in sizes])
+    x = axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     y = axis(f"position error, {statistic.name} [m]", rangemode="tozero")
-    return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 48, "r": 16, "t": 12, "b": 44}))
+    return go.Figure(traces, layout(x, y, hovermode="closest"))
 
 
 def _floor(content: ReportContent, statistic: Statistic, ends: list[float], across: bool) -> go.Scatter:
@@ -118,35 +117,16 @@ def _floor(content: ReportContent, statistic: Statistic, ends: list[float], acro
     return trace
 
 
-def _colour_bar(span: tuple[float, float], at: float) -> go.Scatter:
-    """An invisible point that brings the colour bar of A."""
-    bar = {
-        "orientation": "h",
-        "thickness": 10,
-        "len": 0.6,
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "outlinewidth": 0,
-        "title": {"text": "error of the physics alone, A [m]", "side": "top"},
-    }
-    marker = {"color": list(span), "colorscale": scale(), "cmin": span[0], "cmax": span[1], "opacity": 0}
-    return go.Scatter(
-        x=[at, at], y=[0, 0], mode="markers", marker={**marker, "showscale": True, "colorbar": bar}, hoverinfo="skip"
-    )
-
-
 def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     pure = data_driven(content)
     if means.empty:
         return "No cell gave a result."
     parts = []
     for size in (means.N_D.min(), means.N_D.max()):
-        here = means[means.N_D == size].set_index("model").H
+        here = means[means.N_D.eq(size)].set_index("model").H
         best = str(here.idxmin())
         text = f"at N_D = {size}, {best} is best with H = {metres(here[best])}"
-        if pure in here.index and len(here) > 1:
+        if pure and pure in here.index and len(here) > 1:
             physics = here.drop(pure)
             text += f"; {int((physics < here[pure]).sum())} of {len(physics)} physics models beat pure data-driven "
             text += f"({metres(here[pure])})"
@@ -166,8 +146,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
         id="gain",
         title="What compensation buys",
         takeaway=_takeaway_dumbbell(content, means),
-        how=f"Open marker: the physics alone; filled: with the compensator trained on N_D = {listed(sizes.astype(str))} "
-        "manoeuvres. "
+        how=f"Open marker: the physics alone; filled: with the compensator trained on N_D = {sizes[0]} manoeuvres. "
         + HOW.format(seeds="the filled marker is their mean and the pale points are the seeds")
         + unplotted(content),
         alternative=f"Position error before and after compensation for {counted(len(names), 'model')}. "
@@ -218,15 +197,17 @@ def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
     """Name and numbers of a row, written above it: long names need no margin then."""
     numbers = " → ".join(metres(value) for value in (old, new) if np.isfinite(value))
     if not np.isfinite(new):
-        numbers += f"{', ' if numbers else ''}compensation failed"
+        numbers += " → no result"
+    short = name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"
     return {
+        "bgcolor": "var(--page)",
         "x": 0,
         "xref": "paper",
         "xanchor": "left",
         "y": row,
         "yshift": 17,
         "showarrow": False,
-        "text": f"<b>{label(name)}</b>  {numbers}",
+        "text": f"<b>{label(short)}</b>  {numbers}",
     }
 
 
@@ -239,6 +220,6 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
     best, pure = str(after.idxmin()), data_driven(content)
     text = f"{best} predicts best, H = {metres(after[best])}; compensation improves {len(better)} of "
     text += f"{counted(len(before), 'physics model')}"
-    if pure in after.index:
+    if pure and pure in after.index:
         text += f"; pure data-driven stands at {metres(after[pure])}"
     return f"{text}; the naive floor is {metres(content.naive['mean'])}."

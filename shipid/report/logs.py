@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
-from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line, plane
 from shipid.report.palette import category
 from shipid.report.selection import thinned
 from shipid.report.wording import counted, distance, listed, number
@@ -29,7 +28,8 @@ def manoeuvres(content: ReportContent) -> Figure | None:
     tracks = content.tracks
     if tracks.empty:
         return None
-    extent = max(float(np.ptp(tracks[column])) for column in ("north", "east"))
+    bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
+    extent = max(high - low for low, high in bounds)
     traces, names = [], _sets(tracks["set"])
     # Test last, so that it lies on top.
     for name in sorted(names, key=lambda name: (set_colour(name) == category(TEST), names.index(name))):
@@ -39,18 +39,17 @@ def manoeuvres(content: ReportContent) -> Figure | None:
             ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == category(TEST) else 1.2}
             traces.append(line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink))
             traces[-1].hovertemplate = f"{label(str(run))} ({label(name)})<extra></extra>"
-    x = axis("east [m]", scaleanchor="y", scaleratio=1, nticks=6)
     counts = tracks.groupby("set").run.nunique()
-    spans = [distance(float(np.ptp(tracks[column]))) for column in ("north", "east")]
+    east, north = (distance(high - low) for low, high in bounds)
     runs = listed([f"{counted(int(counts[name]), 'run')} ({name})" for name in names], 6)
     return Figure(
         id="manoeuvres",
         title="The manoeuvres",
-        takeaway=f"{runs} cover {spans[0]} from south to north and {spans[1]} from west to east.",
+        takeaway=f"{runs} cover {north} from south to north and {east} from west to east.",
         how="Logged positions, north up, equal axes; points closer to the line than a pixel are left out.",
         alternative="Map of the tracks of all manoeuvres, coloured by set.",
         height=520,
-        views={"": [Panel(go.Figure(traces, layout(x, axis("north [m]"), hovermode="closest")))]},
+        views={"": [Panel(go.Figure(traces, plane("east [m]", "north [m]", bounds)))]},
         chips=[Chip(f"set:{name}", name, set_colour(name)) for name in names],
     )
 
@@ -65,7 +64,7 @@ def envelope(content: ReportContent) -> Figure | None:
         id="envelope",
         title="What the inputs cover",
         takeaway=_takeaway(frame),
-        how="Bar: smallest to largest value at the instants of prediction; dot: mean. The numbers are in the table below.",
+        how="Bar: smallest to largest value at the instants of prediction; dot: mean. The table below has the numbers.",
         alternative="Ranges of the inputs per set; the table below holds the same numbers.",
         height=24 * frame["set"].nunique() + 74,
         views={"": panels},
@@ -88,7 +87,9 @@ def _ranges(mine: pd.DataFrame) -> go.Figure:
         traces += [bar, dot]
     y = axis("", tickvals=list(range(len(names))), ticktext=[label(name) for name in names], showgrid=False)
     y["range"] = [len(names) - 0.4, -0.6]
-    x = axis(f"{label(quantity)} [{label(unit)}]", nticks=6)
+    low, high = float(mine["min"].min()), float(mine["max"].max())
+    room = 0.06 * (high - low) or 1.0
+    x = axis(f"{label(quantity)} [{label(unit)}]", nticks=6, range=[low - room, high + room])
     return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
 
 

@@ -47,7 +47,7 @@
 
   const chosen = (figure) =>
     [...figure.querySelectorAll("[data-control]")].map((control) =>
-      Number(control.querySelector("input:checked, select").value));
+      Number(control.querySelector("input:checked, select")?.value ?? 0));
 
   // --- figures whose views were made beforehand
   for (const script of document.querySelectorAll("script.views")) {
@@ -128,11 +128,15 @@
       showWind(browser.querySelector(".wind"), shot.wind);
       drawWindow(browser.querySelector(".plot"), shot, size, hidden, `${run}-${slider.value}`);
       list.replaceChildren(...pathsOf(shot, size).map((path) => {
+        const { name, line } = windows.lines[path[0]];
         const item = document.createElement("li");
-        item.append(windows.lines[path[0]].name);
+        item.innerHTML = `<svg class="swatch" viewBox="0 0 26 14" width="26" height="14" aria-hidden="true">
+          <line x1="1" y1="7" x2="25" y2="7" class="${line.dash}" stroke-width="${line.width}"/></svg>`;
+        item.firstChild.style.setProperty("--line", line.color);
         const error = document.createElement("span");
+        error.className = "value";
         error.textContent = path[4] === null ? "diverged" : `${path[4].toFixed(2)} m`;
-        item.append(error);
+        item.append(name, error);
         return item;
       }));
     });

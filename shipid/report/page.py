@@ -17,6 +17,7 @@ from shipid.report import errors_over, gain, logs, palette, paths, tables
 from shipid.report.content import ReportContent
 from shipid.report.figure import Figure
 from shipid.report.tables import Table
+from shipid.report.wording import bound, number
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Section:
 
 
 def sections(content: ReportContent) -> list[Section]:
-    """The storyboard: a new figure is one more entry here."""
+    """Follow the storyboard; a new figure is one more entry here."""
     listing = [
         Section("results", "What physics and data buy", (gain.gain(content),)),
         Section("errors", "Where the error grows", (errors_over.horizon(content), errors_over.over_time(content))),
@@ -46,11 +47,12 @@ def sections(content: ReportContent) -> list[Section]:
 
 
 def render(content: ReportContent) -> str:
-    """The page as text."""
+    """Write the page as text."""
     parts = sections(content)
     anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
     windows = paths.window_data(content) if content.snapshots else None
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "bound": bound}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
@@ -87,7 +89,10 @@ def _figures(parts: list[Section]) -> list[Figure]:
 
 def _views(figure: Figure) -> dict[str, Any]:
     return {
-        key: [{"data": spec["data"], "layout": spec["layout"]} for spec in (json.loads(p.figure.to_json()) for p in panels)]
+        key: [
+            {"data": spec["data"], "layout": spec["layout"]}
+            for spec in (json.loads(p.figure.to_json()) for p in panels)
+        ]
         for key, panels in figure.views.items()
     }
 

@@ -36,12 +36,15 @@ def variables(dark: bool) -> str:
     ends = (0.28, 1.0) if dark else (0.0, 0.72)
     scale = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
     lines = [f"--scale-{i}: {colour};" for i, colour in enumerate(scale)]
-    lines += [f"--category-{i}: {colour};" for i, colour in enumerate(OKABE_ITO)]
+    # The blue that stands out from white sinks into black; its place goes to the sky blue, and back.
+    named = (OKABE_ITO[-1], *OKABE_ITO[1:-1], OKABE_ITO[0]) if dark else OKABE_ITO
+    lines += [f"--category-{i}: {colour};" for i, colour in enumerate(named)]
+    lines.append(f"--scale: linear-gradient(90deg, {', '.join(scale)});")
     return " ".join(lines)
 
 
 def category(index: int) -> str:
-    """A colour for the index-th of a few named things."""
+    """Give the index-th of a few named things its colour."""
     return f"var(--category-{index % len(OKABE_ITO)})"
 
 
@@ -52,11 +55,6 @@ def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
     if len(frame) <= FEW_MODELS or physics.empty:
         return None
     return float(physics.min()), float(physics.max())
-
-
-def scale() -> list[list[float | str]]:
-    """The colour scale of A for a colour bar, in Plotly's form."""
-    return [[i / (LEVELS - 1), f"var(--scale-{i})"] for i in range(LEVELS)]
 
 
 def styles(content: ReportContent) -> dict[str, Style]:
@@ -74,8 +72,9 @@ def styles(content: ReportContent) -> dict[str, Style]:
 
 
 def _by_accuracy(accuracy: float, span: tuple[float, float]) -> str:
-    low, high = span
+    """Colour on a logarithmic scale: degraded models are factors apart, and a few of them far off."""
+    low, high, value = np.log(np.maximum([*span, accuracy], 1e-3))
     if not np.isfinite(accuracy):  # A could not be found: its physics diverged
         return MUTED
-    share = (accuracy - low) / (high - low) if high > low else 0.0
+    share = (value - low) / (high - low) if high > low else 0.0
     return f"var(--scale-{round(share * (LEVELS - 1))})"

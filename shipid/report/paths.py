@@ -12,7 +12,7 @@ import pandas as pd
 
 from shipid.report.content import Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
-from shipid.report.figure import Chip, Control, Figure, FixedWindow, axis, layout
+from shipid.report.figure import Chip, Control, Figure, FixedWindow, plane
 from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread
 from shipid.report.wording import counted, metres, number
@@ -38,7 +38,7 @@ def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
 
 
 def window_sizes(content: ReportContent) -> list[int]:
-    """The numbers of manoeuvres a reader can choose from."""
+    """List the N_D a reader can choose from."""
     return sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
 
 
@@ -57,7 +57,10 @@ def browser(content: ReportContent) -> Figure | None:
         "The line of text beside it gives the end errors.",
         height=520,
         views={},
-        controls=[Control("Test run", list(runs)), Control("Manoeuvres, N_D", [str(c) for c in counts], len(counts) - 1)],
+        controls=[
+            Control("Test run", list(runs)),
+            Control("Manoeuvres, N_D", [str(c) for c in counts], len(counts) - 1),
+        ],
         chips=_chips(content),
         browser=True,
     )
@@ -94,20 +97,20 @@ def snapshots(content: ReportContent) -> Figure | None:
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:
-    """What page.js draws: layout, line styles, ship outline and the windows by run.
+    """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`; `line` is an index into `lines`, `size` into the N_D offered or -1
     for what holds at every N_D. Lengths are metres to the centimetre, angles radians.
     """
     runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
     lines: dict[tuple[str, str], int] = {}
-    packed = {}
+    packed: dict[str, list[dict[str, Any]]] = {}
     for run, windows in runs.items():
         packed[run] = []
         for window in windows:
             paths = []
             for (model, source, size), points in window.paths.items():
-                if source == "cooperative" and size not in counts or source != "naive" and model not in drawn:
+                if (source == "cooperative" and size not in counts) or (source != "naive" and model not in drawn):
                     continue
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
@@ -123,9 +126,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
         "outline": _rounded(first.outline) if first else [[], []],
         "lines": [_line(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
-        "layout": layout(
-            axis("y, to starboard [m]", scaleanchor="y", scaleratio=1, nticks=6), axis("x, ahead [m]", nticks=8)
-        ),
+        "layout": plane("y, to starboard [m]", "x, ahead [m]"),
     }
 
 
@@ -184,7 +185,9 @@ def _takeaway(content: ReportContent, size: int) -> str:
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
     parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
     said = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
-    return f"At the end of the horizon, N_D = {size}, the models drawn miss the true place on average: {'; '.join(said)}."
+    return (
+        f"At the end of the horizon, N_D = {size}, the models drawn miss the true place on average: {'; '.join(said)}."
+    )
 
 
 def _takeaway_windows(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
@@ -197,4 +200,4 @@ def _takeaway_windows(content: ReportContent, windows: list[Snapshot], counts: l
         means.append(_mean_end_error([window], keys))
     if not np.isfinite(means).any():
         return "No compensated path was recorded for these windows."
-    return f"From left to right, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."
+    return f"In this order, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
+from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to here every model has a colour of its own and is drawn everywhere
 FEW_RUNS = 12  # test runs in the error-over-time figure and the window browser
@@ -65,8 +65,8 @@ def trained(content: ReportContent) -> pd.DataFrame:
     return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
 
 
-def thinned(points: Floats, tolerance: float) -> Floats:
-    """Indices of the points of a line that a pixel can tell apart (Ramer 1972; Douglas and Peucker 1973).
+def thinned(points: Floats, tolerance: float) -> Indices:
+    """Find the points of a line, by index, that a pixel can tell apart (Ramer 1972; Douglas and Peucker 1973).
 
     Parameters
     ----------

@@ -39,7 +39,11 @@ def write_summary(content: ReportContent, file: Path) -> Path:
 
 
 def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [[_plain(name) for name in columns], ["---"] * len(columns), *([_plain(cell) for cell in row] for row in rows)]
+    lines = [
+        [_plain(name) for name in columns],
+        ["---"] * len(columns),
+        *([_plain(cell) for cell in row] for row in rows),
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) if rows else ""
 
 

@@ -14,11 +14,11 @@ from shipid.report.wording import counted, listed, number
 
 @dataclass(frozen=True)
 class Cell:
-    """What a table cell says and what it is sorted by; `state` marks a cell that gave no result."""
+    """What a table cell says and what it is sorted by; `bad` marks what gave no result."""
 
     text: str
     key: float | str
-    state: str = ""
+    bad: bool = False
 
 
 @dataclass(frozen=True)
@@ -34,47 +34,49 @@ class Table:
 
 
 def text(value: object) -> Cell:
-    """A cell of words; a missing value is a dash."""
+    """Make a cell of words; a missing value is a dash."""
     missing = value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
     return Cell("–" if missing else str(value), "" if missing else str(value).lower())
 
 
-def figure(value: object) -> Cell:
-    """A cell with a number; NaN is a dash and sorts last."""
-    amount = float(str(value)) if value is not None and value is not pd.NA else math.nan
-    whole = math.isfinite(amount) and amount == int(amount) and not isinstance(value, float)
-    return Cell(f"{int(amount)}" if whole else number(amount), amount if math.isfinite(amount) else 1e300)
+def figure(value: object, decimals: int) -> Cell:
+    """Make a cell with a number of fixed decimals, so that points align; NaN is a dash and sorts last."""
+    amount = math.nan if value is None or value is pd.NA else float(str(value))
+    if not math.isfinite(amount):
+        return Cell("–", MISSING)
+    return Cell(f"{amount:.{decimals}f}".replace("-", "−"), amount)
 
 
-# Column of the frame -> heading and whether it holds numbers.
+MISSING = 1e300  # sorts after every number (page.js knows it)
+# Column of the frame -> heading and, of numbers, the decimals.
 CELLS = {
-    "model": ("model", False),
-    "kind": ("family", False),
-    "A": ("A [m]", True),
-    "N_D": ("N_D [1]", True),
-    "minutes": ("data [min]", True),
-    "seed": ("seed", True),
-    "H": ("H [m]", True),
-    "H_90": ("H_90 [m]", True),
-    "rms": ("rms [m]", True),
-    "status": ("status", False),
-    "seconds": ("time [s]", True),
-    "hyperparameters": ("hyperparameters", False),
+    "model": ("model", None),
+    "kind": ("family", None),
+    "A": ("A [m]", 2),
+    "N_D": ("N_D [1]", 0),
+    "minutes": ("data [min]", 1),
+    "seed": ("seed", 0),
+    "H": ("H [m]", 2),
+    "H_90": ("H_90 [m]", 2),
+    "rms": ("rms [m]", 2),
+    "status": ("status", None),
+    "seconds": ("time [s]", 0),
+    "hyperparameters": ("hyperparameters", None),
 }
 MODELS = {
-    "model": ("model", False),
-    "family": ("family", False),
-    "A": ("A [m]", True),
-    "A_90": ("A_90 [m]", True),
-    "A_rms": ("rms [m]", True),
-    "status": ("status", False),
-    "description": ("what it is", False),
+    "model": ("model", None),
+    "family": ("family", None),
+    "A": ("A [m]", 2),
+    "A_90": ("A_90 [m]", 2),
+    "A_rms": ("rms [m]", 2),
+    "status": ("status", None),
+    "description": ("what it is", None),
 }
 REPAIRS = {
-    "kind": ("repair", False),
-    "column": ("column", False),
-    "count": ("samples [1]", True),
-    "note": ("note", False),
+    "kind": ("repair", None),
+    "column": ("column", None),
+    "count": ("samples [1]", 0),
+    "note": ("note", None),
 }
 
 
@@ -88,7 +90,7 @@ def cells(content: ReportContent) -> Table:
 
 
 def models(content: ReportContent) -> Table:
-    """The physics models, by rising A."""
+    """List the models, by rising A."""
     frame = content.models.sort_values("A", kind="stable", na_position="last")
     valid = frame.A.dropna()
     names = frame.model[frame.A.notna()]
@@ -96,11 +98,11 @@ def models(content: ReportContent) -> Table:
     if len(valid):
         takeaway = f"A runs from {number(valid.iloc[0])} m ({names.iloc[0]}) to {number(valid.iloc[-1])} m "
         takeaway += f"({names.iloc[-1]})." if len(valid) > 1 else "."
-    return _table("models", "The models", takeaway, frame, MODELS)
+    return _table("models", "Every model", takeaway, frame, MODELS)
 
 
 def repairs(content: ReportContent) -> Table | None:
-    """What the importer mended; None if nothing is recorded."""
+    """List what the importer mended; None if nothing is recorded."""
     frame = content.repairs
     if frame.empty:
         return None
@@ -123,25 +125,36 @@ def envelope(content: ReportContent) -> Table | None:
             if name not in by_set.index:
                 row.append(text(None))
                 continue
-            values = [float(by_set.loc[name, column]) for column in ("min", "mean", "max")]
+            values = [float(str(by_set.loc[name, column])) for column in ("min", "mean", "max")]
             row.append(Cell(" / ".join(number(value) for value in values), values[1]))
         rows.append(row)
     numeric = [False, False, *[True] * len(sets)]
     return Table("envelope-table", "Minimum / mean / maximum", "", ["input", "unit", *sets], numeric, rows)
 
 
-def _table(id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, bool]]) -> Table:
+def _table(
+    id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, int | None]]
+) -> Table:
     present = {name: heading for name, heading in columns.items() if name in frame.columns}
     rows = []
     for record in frame.to_dict("records"):
-        row = [figure(record[name]) if numeric else text(record[name]) for name, (_, numeric) in present.items()]
+        row = [
+            text(record[name]) if decimals is None else figure(record[name], decimals)
+            for name, (_, decimals) in present.items()
+        ]
         if "status" in present and record["status"] != "ok":
             said = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])
-            row[list(present).index("status")] = Cell(said, said.lower(), "bad")
+            row[list(present).index("status")] = Cell(said, said.lower(), bad=True)
         rows.append(row)
-    headings, numeric_columns = zip(*present.values(), strict=True)
-    return Table(id_, title, takeaway, headings, numeric_columns, rows)
+    headings = [heading for heading, _ in present.values()]
+    return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+    return (
+        f"{seconds:.0f} s"
+        if seconds < 120
+        else f"{seconds / 60:.0f} min"
+        if seconds < 7200
+        else f"{seconds / 3600:.1f} h"
+    )

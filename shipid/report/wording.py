@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 
@@ -15,12 +16,12 @@ def number(value: float) -> str:
 
 
 def metres(value: float) -> str:
-    """A length with its unit."""
+    """Write a length with its unit."""
     return f"{number(value)} m"
 
 
 def distance(value: float) -> str:
-    """A distance between places: metres, or kilometres from 1,000 m on."""
+    """Write a distance between places: metres, or kilometres from 1,000 m on."""
     return f"{value / 1000:.1f} km" if value >= 1000 else f"{value:.0f} m"
 
 
@@ -28,6 +29,11 @@ def listed(names: Sequence[str], limit: int = 4) -> str:
     """Join as `a, b and c`; what exceeds the limit is counted."""
     shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
     return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
+
+
+def bound(text: str) -> str:
+    """Keep a number and its unit, or a symbol and its number, on one line: their spaces do not break."""
+    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm|%)\b)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 
 
 def counted(count: int, noun: str) -> str:

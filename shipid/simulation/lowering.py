@@ -6,6 +6,7 @@ runs once a rollout; the rest broadcasts over (variant, sample). Nothing of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -40,7 +41,7 @@ _UNARY = {
     ca.OP_FABS: "torch.abs({0})",
     ca.OP_SIGN: "torch.sign({0})",
     ca.OP_INV: "torch.reciprocal({0})",
-    ca.OP_NOT: "({0} == 0).to({0}.dtype)",
+    ca.OP_NOT: "({0} == 0)",
     ca.OP_FLOOR: "torch.floor({0})",
     ca.OP_CEIL: "torch.ceil({0})",
 }
@@ -62,7 +63,8 @@ _BINARY = {
     ca.OP_OR: "(({0} != 0) | ({1} != 0))",
     ca.OP_IF_ELSE_ZERO: "_where({0}, {1})",
 }
-_TRUTH = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR}
+_TRUTH = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT}  # give booleans
+_TAKES_TRUTH = {ca.OP_NOT: 1, ca.OP_AND: 2, ca.OP_OR: 2, ca.OP_IF_ELSE_ZERO: 1}  # so many operands, from the first
 
 
 def _minimum(a: Any, b: Any) -> torch.Tensor:
@@ -83,10 +85,25 @@ def _atan2(a: Any, b: Any) -> torch.Tensor:
 
 
 def _where(condition: Any, value: Any) -> torch.Tensor:
+    if isinstance(value, float):  # two bare numbers would give single precision
+        value = torch.full((), value, dtype=torch.float64, device=condition.device)
     return torch.where(condition != 0, value, 0.0)
 
 
-_NAMES = {"torch": torch, "_minimum": _minimum, "_maximum": _maximum, "_atan2": _atan2, "_where": _where}
+def _number(truth: torch.Tensor) -> torch.Tensor:
+    return truth.to(torch.float64)  # arithmetic on booleans is logic in PyTorch, counting in CasADi
+
+
+_NAMES = {
+    "torch": torch,
+    "_minimum": _minimum,
+    "_maximum": _maximum,
+    "_atan2": _atan2,
+    "_where": _where,
+    "_number": _number,
+    "inf": math.inf,
+    "nan": math.nan,
+}
 
 
 @dataclass(frozen=True)
@@ -112,6 +129,7 @@ def lower(function: ca.Function, parameters: str = "parameters") -> Lowered:
     lines: dict[bool, list[str]] = {True: [], False: []}  # True: prologue
     slot: dict[int, tuple[str, bool | None]] = {}  # work slot -> expression, is it parameter-only (None: a number)
     hoisted: dict[str, int] = {}
+    truths: set[str] = set()  # names of booleans
     outputs: dict[int, tuple[str, bool | None]] = {}
 
     def use(operand: tuple[str, bool | None], in_prologue: bool) -> str:
@@ -140,8 +158,12 @@ def lower(function: ca.Function, parameters: str = "parameters") -> Lowered:
                 slot[target[0]] = (repr(value), None)
                 continue
             in_prologue = kinds <= {True, None}
-            expression = template.format(*(use(operand, in_prologue) for operand in operands))
+            texts = [use(operand, in_prologue) for operand in operands]
+            bare = _TAKES_TRUTH.get(operation, 0)
+            texts[bare:] = [f"_number({text})" if text in truths else text for text in texts[bare:]]
+            expression = template.format(*texts)
             name = f"{'p' if in_prologue else 'a'}{k}"
+            truths |= {name} if operation in _TRUTH else set()
             lines[in_prologue].append(f"    {name} = {expression}")
             slot[target[0]] = (name, in_prologue)
 
@@ -166,7 +188,7 @@ def _stack(like: torch.Tensor, values: Sequence[Any]) -> torch.Tensor:
 
 @dataclass(frozen=True)
 class Program:
-    """A lowered step: `prologue(parameters)` once a rollout, then `step(x, m, commands, environment, tau, *hoisted)`."""
+    """A lowered step: `prologue(parameters)` once, then `step(x, m, commands, environment, tau, *hoisted)`."""
 
     prologue: Callable[[torch.Tensor], list[torch.Tensor]]
     step: Callable[..., tuple[torch.Tensor, torch.Tensor]]
@@ -193,11 +215,12 @@ def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Pr
         h_rates, h_advance, *h_sums = hoisted
 
         def rates(state: Any, memory: Any) -> Any:
-            total = tau
+            total = list(tau)
             for (function, arrays), h in zip(lowered_sums, h_sums, strict=True):
-                wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory, commands, environment)]
+                groups = (state, memory, commands, environment)
+                wide = [[channel.unsqueeze(-1) for channel in group] for group in groups]
                 wrench = function.main(*wide, h, arrays.to(tau))
-                total = [a + b.sum(-1) if isinstance(b, torch.Tensor) else a + b for a, b in zip(total, wrench, strict=True)]
+                total = [a + _sum(b, arrays.shape[1]) for a, b in zip(total, wrench, strict=True)]
             return lowered_rates.main(state, memory, commands, environment, h_rates, total)
 
         def advance(memory: Any, dt: float) -> Any:
@@ -207,6 +230,13 @@ def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Pr
         return torch.stack(after), torch.stack(memory_after) if memory_after else m
 
     return Program(prologue, torch.compile(one_step, dynamic=False, fullgraph=True) if compiled else one_step)
+
+
+def _sum(value: Any, count: int) -> Any:
+    """Sum over components (last axis); what is the same for all of them counts as often as there are components."""
+    if not isinstance(value, torch.Tensor):
+        return count * value
+    return value.expand(*value.shape[:-1], count).sum(-1)
 
 
 def _add(x: Sequence[Any], a: float, k: Sequence[Any]) -> list[Any]:
@@ -243,9 +273,7 @@ def run_torch(
     held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
     values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
     groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
-    records = torch.empty(
-        (num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place
-    )
+    records = torch.empty((num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place)
     worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
     with torch.no_grad():
         for group in groups:
@@ -255,7 +283,9 @@ def run_torch(
                 inputs = [channel[..., block] for channel in held]
                 shape = (-1, hoisted[0].shape[1], width)
                 state = [start[..., block].expand(shape).contiguous(), memory[..., block].expand(shape).contiguous()]
-                worst[group, block] = _run_block(program, state, inputs, hoisted, records[..., group, block], rows, every)
+                worst[group, block] = _run_block(
+                    program, state, inputs, hoisted, records[..., group, block], rows, every
+                )
     result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
     return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
 

@@ -32,7 +32,8 @@ class Trajectories:
     """What a rollout returns.
 
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
-    diverged : (num_variants, num_samples): not finite or faster than 100 m/s at some step. Others are unharmed.
+    diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
+        unharmed.
     interval : time between records [s].
     """
 
@@ -109,6 +110,8 @@ def rollout(
     names = (*model.state, *(f"actual.{name}" for name in model.memory))
     kept = tuple(names if keep is None else keep)
     rows = [names.index(name) for name in kept]
+    if num_steps % every:
+        raise ShipidError(f"num_steps must be a multiple of every, found {num_steps} and {every}")
     work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1)
     chosen = _by_size(work, num_samples * len(values)) if engine == "auto" else engine
     with np.errstate(all="ignore"):
@@ -118,7 +121,7 @@ def rollout(
             from shipid.simulation.lowering import run_torch
 
             records, worst = run_torch(model, batch, step, num_steps, method, every, rows, chosen == "compiled", device)
-    diverged = ~(worst <= SPEED_LIMIT)
+    diverged = ~(worst <= SPEED_LIMIT) | ~_finite(batch)
     return Trajectories(records, kept, diverged, step * every)
 
 
@@ -147,6 +150,13 @@ def integrate(
     return state, full
 
 
+def _finite(batch: Batch) -> Array:
+    """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
+    inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra)
+    samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
+    return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
+
+
 def _by_size(work: float, width: int) -> Engine:
     if width < BATCH_FROM:
         return "casadi"
@@ -172,7 +182,9 @@ def _channels(
             )
         column = np.asarray(given[name], dtype=float)
         if column.shape not in ((num_samples,), (num_steps, num_samples)):
-            raise ShipidError(f"{what} {name!r} must be ({num_samples},) or ({num_steps}, {num_samples}): {column.shape}")
+            raise ShipidError(
+                f"{what} {name!r} must be ({num_samples},) or ({num_steps}, {num_samples}): {column.shape}"
+            )
         columns.append(np.atleast_2d(column))
     length = max((len(column) for column in columns), default=1)
     stacked = [np.broadcast_to(column, (length, num_samples)) for column in columns]
@@ -188,7 +200,8 @@ def _memory(
     vessel: Vessel,
 ) -> Array:
     if memory is None:
-        return commands[0, [model.commands.index(name) for name in model.memory]]
+        reached: Array = commands[0, [model.commands.index(name) for name in model.memory]]
+        return reached
     return _channels(tuple(model.memory), memory, num_samples, num_steps, "memory", vessel)[0]
 
 

@@ -180,7 +180,7 @@ def build_plan(document: Document, file: Path) -> Plan:
     study: Study = documents.parse(Study, document, file)
     models = _models(study, file)
     _check_claims(study, models, file)
-    recipe = Recipe.from_block(study.recipe, file=file)
+    recipe = _recipe(study, file)
     batches = tuple(
         Batch(amount, seed) for amount in sorted(set(study.grid.N_D), reverse=True) for seed in sorted(set(study.grid.seeds))
     )
@@ -226,6 +226,15 @@ def _models(study: Study, file: Path) -> tuple[Model, ...]:
     if twice is not None:
         raise DocumentError(f"two models would be called {twice!r}: rename a family", file=file, path="family")
     return (*found, Model(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+
+
+def _recipe(study: Study, file: Path) -> Recipe:
+    """The named recipe with the changes of its block."""
+    block = dict(study.recipe)
+    try:
+        return Recipe.preset(str(block.pop("kind", "fast")), **block)
+    except DocumentError as error:
+        raise DocumentError(error.message, file=file, path=error.path) from None
 
 
 def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from shipid.data.catalogue import fetch
 from shipid.data.dataset import Dataset, pieces, read_dataset
@@ -226,12 +227,10 @@ def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[st
     """Hidden actuator states (S,) at the start of each window, modelled from that run's earlier orders; None if none."""
     tracks: dict[str, list[tuple[Array, dict[str, Array]]]] = {}
     for run, rows in pieces(dataset):
-        t = rows["t"].to_numpy()
-        orders = {name: rows[name].to_numpy() for name in dataset.commands}
-        states = memory_along(vessel, orders, t)
+        states = states_along(vessel, dataset.commands, rows)
         if states is None:
             return None
-        tracks.setdefault(run, []).append((t, states))
+        tracks.setdefault(run, []).append((rows["t"].to_numpy(), states))
     result = {name: np.empty(len(windows)) for name in next(iter(tracks.values()))[0][1]}
     for run in windows.spans:
         mask = windows.run == run
@@ -240,6 +239,11 @@ def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[st
             for name, values in states.items():
                 result[name][inside] = np.interp(windows.t[inside], t, values)
     return result
+
+
+def states_along(vessel: Vessel, commands: Sequence[str], rows: pd.DataFrame) -> dict[str, Array] | None:
+    """Hidden actuator states (n,) along one unbroken stretch of a run, modelled from its orders; None if none."""
+    return memory_along(vessel, {name: rows[name].to_numpy() for name in commands}, rows["t"].to_numpy())
 
 
 def constant_motion(windows: Windows) -> Array:

@@ -13,7 +13,8 @@ from casadi import SX
 from shipid.physics import ACTUATORS, SIGNALS, TERMS
 from shipid.physics.frames import current, kinematics
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
-from shipid.vessel.load import Binding, Vessel, bindings
+from shipid.vessel.bindings import Binding, bindings
+from shipid.vessel.load import Vessel
 from shipid.vessel.schema import counts, signals, term_blocks
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
@@ -85,7 +86,7 @@ def _assemble(vessel: Vessel) -> Dynamics:
     parameters = SX.sym("parameters", len(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     value_of = dict(zip(vessel.parameters, ca.vertsplit(parameters) if len(vessel.parameters) else [], strict=True))
-    bound = bindings(vessel)
+    bound = bindings(vessel.document)
 
     eta, nu = SX(6, 1), SX(6, 1)
     for position, axis in enumerate(axes):
@@ -105,7 +106,8 @@ def _assemble(vessel: Vessel) -> Dynamics:
     M_A = added_mass(**_values(bound["added_mass"], value_of))
     force = M_A @ nu_c_dot - coriolis(M_RB, nu) - coriolis(M_A, nu_r)
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
-    rows, options, sums = list(axes), {"cse": True}, []
+    rows, options = list(axes), {"cse": True}
+    sums: list[SumOverComponents] = []
     for path, key, block in terms:
         component = path.rsplit(".", 1)[-1]
         own = {name.rpartition(".")[2]: value for name, value in actual.items() if name.startswith(f"{component}.")}

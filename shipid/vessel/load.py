@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
-from shipid.physics import ACTUATORS, TERMS
-from shipid.physics.grammar import Grammar
 from shipid.physics.inertia import added_mass, rigid_body
-from shipid.vessel.schema import (
-    DOFS,
-    SHARED,
-    Parameter,
-    parameters,
-    term_blocks,
-    vessel_model,
-)
-
-Binding = dict[str, str | list[str] | dict[str, str] | float]
+from shipid.vessel.bindings import bindings, units
+from shipid.vessel.schema import DOFS, components, kinds, term_blocks, term_model, vessel_model
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,7 @@ class Vessel:
     @cached_property
     def units(self) -> dict[str, str]:
         """Dotted path -> unit of every parameter, in document order of use."""
-        return dict(_all_units(self))
+        return units(self.document)
 
     @cached_property
     def parameters(self) -> dict[str, float]:
@@ -69,7 +62,8 @@ class Vessel:
     @cached_property
     def structure(self) -> str:
         """Digest of the document without its parameters' values: vessels of one structure compile once."""
-        return documents.digest(documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0)))
+        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0))
+        return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """The same vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
@@ -81,10 +75,13 @@ def load_vessel(name: str, relative_to: Path | None = None) -> Vessel:
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.
     """
-    file = documents.find(name, "models", relative_to)
+    return _load(documents.find(name, "models", relative_to), ())
+
+
+def _load(file: Path, above: tuple[Path, ...]) -> Vessel:
     document = documents.read(file)
     if "base" in document:
-        return _patched(document, file)
+        return _patched(document, file, above)
     return check_vessel(document, str(file))
 
 
@@ -100,15 +97,19 @@ class Patch(BaseModel):
     provenance: dict[str, Any] = {}
 
 
-def _patched(document: Document, file: Path) -> Vessel:
+def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
     patch: Patch = documents.parse(Patch, document, file)
-    base = load_vessel(patch.base, relative_to=file.parent)
+    try:
+        base_file = documents.find(patch.base, "models", file.parent)
+    except DocumentError as error:
+        raise DocumentError(f"{patch.base!r}: {error.message}", file=file, path="base") from None
+    chain = (*above, file.resolve())
+    if base_file.resolve() in chain:
+        raise DocumentError(f"{patch.base!r} is a patch of this patch: name a vessel", file=file, path="base")
+    base = _load(base_file, chain)
     if patch.base_digest not in (None, base.digest):
-        raise DocumentError(
-            f"{patch.base_digest!r}: the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew",
-            file=file,
-            path="base_digest",
-        )
+        changed = f"the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew"
+        raise DocumentError(f"{patch.base_digest!r}: {changed}", file=file, path="base_digest")
     for path in patch.set:
         if path not in base.parameters:
             raise DocumentError(
@@ -120,16 +121,35 @@ def _patched(document: Document, file: Path) -> Vessel:
 
 def check_vessel(document: Document, file: str) -> Vessel:
     """Check a whole document; the first fault raises DocumentError with file, dotted path and remedy."""
+    for path, group, block in components(document):
+        _check_component(path, group, block, file)
     documents.parse(vessel_model(), document, file)
     vessel = Vessel(document, file, documents.digest(document))
-    names = [path.rsplit(".", 1)[-1] for path, _, _ in term_blocks(document)]
-    for name in names:
-        if names.count(name) > 1:
-            raise DocumentError(f"two components are called {name!r}: commands go by this name", file=file, path=name)
+    paths: dict[str, str] = {}
     for path, _, block in term_blocks(document):
+        name = path.rsplit(".", 1)[-1]
+        if name in paths:
+            message = f"{paths[name]} has the same last name, by which commands go: choose another"
+            raise DocumentError(message, file=file, path=path)
+        paths[name] = path
         _check_lists(path, block, file)
     _check_units(vessel)
+    _check_inertia(vessel)
     return vessel
+
+
+def _check_component(path: str, group: str, block: Any, file: str) -> None:
+    """Check a block against its own kind, so that complaints carry the path and the names that it has in the file."""
+    name = path.partition(".")[2]
+    if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+        raise DocumentError(f"{name!r} is no name for a {group}: use letters, digits, _ and -", file=file, path=group)
+    if not isinstance(block, Mapping):
+        raise DocumentError(f"{block!r}: must be a table with a `kind`", file=file, path=path)
+    kind, valid = block.get("kind"), kinds(group)
+    if kind not in valid:
+        message = "missing" if kind is None else f"{kind!r} is no kind of {group}"
+        raise DocumentError(f"{message}: {choices(str(kind), valid)}", file=file, path=f"{path}.kind")
+    documents.parse(term_model(f"{group}.{kind}"), block, file, path)
 
 
 def _check_lists(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -139,7 +159,7 @@ def _check_lists(path: str, block: Mapping[str, Any], file: str) -> None:
         found = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
         raise DocumentError(f"the columns of a table must be equally long, found {found}", file=file, path=path)
     for key, value in lists.items():
-        if key.endswith("_deg") and any(b <= a for a, b in zip(value, value[1:], strict=False)):
+        if key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
             raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
 
 
@@ -149,68 +169,24 @@ def _check_units(vessel: Vessel) -> None:
             documents.get(vessel.document, path)
         except KeyError:
             group, name = path.rsplit(".", 1)
-            raise DocumentError(f"missing: a term needs {name}, here or in its own block", file=vessel.file, path=f"{group}.{name}") from None
+            message = f"missing: a term needs {name}, here or in its own block"
+            raise DocumentError(message, file=vessel.file, path=f"{group}.{name}") from None
 
 
-def bind(document: Document, path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
-    """Keyword -> dotted path (or list, table of paths, or default value) for one physics function."""
-    result: Binding = {}
-    for parameter in declared:
-        name = parameter.name
-        if parameter.kind == "open":
-            closed = {other.name for other in declared} | {"source", "off", "kind"}
-            result.update({key: f"{path}.{key}" for key in block if key not in closed})
-        elif parameter.kind == "list":
-            result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]
-        elif parameter.kind == "table":
-            result[name] = {key: f"{path}.{name}.{key}" for key in block[name]}
-        elif name in block:
-            result[name] = f"{path}.{name}"
-        elif name in SHARED:
-            result[name] = f"{SHARED[name]}.{name}"
-        elif parameter.default is not None:
-            result[name] = parameter.default
-    return result
-
-
-def bindings(vessel: Vessel) -> dict[str, Binding]:
-    """Dotted path of every block that the equations use -> the binding of its function's keywords."""
-    document = vessel.document
-    found = {"inertia": bind(document, "inertia", document["inertia"], parameters(rigid_body))}
-    found["added_mass"] = bind(document, "added_mass", document.get("added_mass", {}), parameters(added_mass))
-    for path, key, block in term_blocks(document):
-        found[path] = bind(document, path, block, parameters(TERMS[key].function))
-        for command, actuator in (block.get("actuator") or {}).items():
-            if isinstance(actuator, Mapping):
-                where = f"{path}.actuator.{command}"
-                found[where] = bind(document, where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
-    return found
-
-
-def _all_units(vessel: Vessel) -> list[tuple[str, str]]:
-    document = vessel.document
-    functions: dict[str, Any] = {"inertia": rigid_body, "added_mass": added_mass}
-    for path, key, block in term_blocks(document):
-        functions[path] = TERMS[key].function
-        for command, actuator in (block.get("actuator") or {}).items():
-            if isinstance(actuator, Mapping):
-                functions[f"{path}.actuator.{command}"] = ACTUATORS[actuator["kind"]].advance
-    rows: list[tuple[str, str]] = []
-    for where, binding in bindings(vessel).items():
-        declared = {parameter.name: parameter for parameter in parameters(functions[where])}
-        table = next((parameter for parameter in declared.values() if parameter.kind == "open"), None)
-        for keyword, target in binding.items():
-            parameter = declared.get(keyword, table)
-            assert parameter is not None
-            unit = parameter.unit
-            if isinstance(target, str):
-                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else unit))
-            elif isinstance(target, list):
-                rows += [(path, str(unit)) for path in target]
-            elif isinstance(target, dict):
-                assert isinstance(unit, Grammar)
-                rows += [(path, unit.unit(key)) for key, path in target.items()]
-    return list(dict.fromkeys(rows))
+def _check_inertia(vessel: Vessel) -> None:
+    """Refuse mass plus added mass that is not positive definite in the vessel's own degrees of freedom."""
+    bound, value_of = bindings(vessel.document), vessel.parameters
+    known: dict[str, dict[str, Any]] = {
+        block: {key: value_of[target] if isinstance(target, str) else target for key, target in bound[block].items()}
+        for block in ("inertia", "added_mass")
+    }
+    M = rigid_body(**known["inertia"]) + added_mass(**known["added_mass"])
+    own = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
+    if np.linalg.eigvalsh(own + own.T)[0] <= 0:
+        remedy = (
+            "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
+        )
+        raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
 def _without_words(document: Document) -> Document:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,7 +22,7 @@ from shipid.physics.grammar import derivative
 from shipid.vessel.load import Vessel
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
-_RELATIONS = {
+_RELATIONS: dict[str, Callable[[int, int], bool]] = {
     ">=": lambda a, b: a >= b,
     "<=": lambda a, b: a <= b,
     "==": lambda a, b: a == b,
@@ -97,7 +97,9 @@ class Variant:
         patch["name"] = self.name
         patch["base"] = self.base
         patch["base_digest"] = self.base_digest
-        patch["source"] = f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
+        patch["source"] = (
+            f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
+        )
         table = tomlkit.table()
         for path, value in self.values.items():
             table[path] = value
@@ -150,10 +152,10 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
                 )
             values[path] = value
         paths = _select(block.parameters, original, file, f"{where}.parameters")
-        for path in paths:
-            key = f"together {block.parameters[0]}" if block.together else path
-            times[path] = times.get(path, -1) + 1
-            values[path] = values.get(path, original[path]) * _factor(block, family, member, key, times[path], counter)
+        keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
+        times.update({key: times.get(key, -1) + 1 for key in keys.values()})
+        for path, key in keys.items():
+            values[path] = values.get(path, original[path]) * _factor(block, family, member, key, times[key], counter)
     factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
     name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
     return Variant(

@@ -6,9 +6,10 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import GenericAlias
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
 from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
 from shipid.physics.grammar import POSITIVE, Grammar
@@ -24,7 +25,7 @@ PARTICULARS = {
     "C_b": "-",
 }
 CONSTANTS = {"rho": "kg m^-3", "rho_a": "kg m^-3", "g": "m s^-2"}
-SHARED = {**{name: "particulars" for name in PARTICULARS}, **{name: "constants" for name in CONSTANTS}}
+SHARED = {**dict.fromkeys(PARTICULARS, "particulars"), **dict.fromkeys(CONSTANTS, "constants")}
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def counts(term: Term) -> tuple[str, ...]:
 class Block(BaseModel):
     """Part of a vessel document: nothing but what is declared, and a word on where the numbers come from."""
 
-    model_config = ConfigDict(extra="forbid", strict=False, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
     source: str | None = Field(default=None, description="where the numbers come from")
 
 
@@ -97,8 +98,6 @@ def _checked_table(grammar: Grammar) -> Any:
         grammar.check(table)
         return table
 
-    from pydantic import AfterValidator
-
     return Annotated[dict[str, FiniteFloat], AfterValidator(check)]
 
 
@@ -106,12 +105,12 @@ def block_model(name: str, function: Callable[..., Any], **extra: Any) -> type[B
     """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
     fields: dict[str, Any] = dict(extra)
     validators: dict[str, Any] = {}
-    config = ConfigDict(extra="forbid", populate_by_name=True)
+    config = ConfigDict(extra="forbid", strict=True)
     for parameter in parameters(function):
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
-            config = ConfigDict(extra="allow", populate_by_name=True)
+            config = ConfigDict(extra="allow", strict=True)
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
             continue
@@ -146,7 +145,8 @@ def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
     return create_model(name, __base__=Block, **fields)
 
 
-def _term_model(key: str) -> type[Block]:
+@cache
+def term_model(key: str) -> type[Block]:
     """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
     term = TERMS[key]
     group, kind = key.split(".")
@@ -184,35 +184,41 @@ def kinds(group: str) -> list[str]:
 
 
 def _named(group: str) -> Any:
-    return _union([_term_model(f"{group}.{kind}") for kind in kinds(group)])
+    return _union([term_model(f"{group}.{kind}") for kind in kinds(group)])
 
 
 @cache
 def vessel_model() -> type[BaseModel]:
     """Pydantic model of a whole vessel document; its JSON schema serves editors."""
-    hull_fields: dict[str, Any] = {kind: (_term_model(f"hull.{kind}") | None, None) for kind in kinds("hull")}
-    hull = create_model("hull", __base__=Block, **hull_fields)
-    component = Annotated[dict[str, _named("thruster")], Field(default_factory=dict)]
-    current = create_model("current", __base__=Block, kind=(Literal["uniform"], ...))
-    return create_model(
-        "vessel",
-        __base__=Block,
-        name=(str, ...),
-        description=(str | None, None),
-        dof=(Literal[3, 4, 6], ...),
-        particulars=(_dimension_model("particulars", PARTICULARS) | None, None),
-        constants=(_dimension_model("constants", CONSTANTS) | None, None),
-        inertia=(block_model("inertia", rigid_body), ...),
-        added_mass=(block_model("added_mass", added_mass) | None, None),
-        hull=(hull | None, None),
-        wind=(_named("wind") | None, None),
-        thruster=(component, ...),
-        current=(current | None, None),
-    )
+    hull: dict[str, Any] = {kind: (term_model(f"hull.{kind}") | None, None) for kind in kinds("hull")}
+    current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
+    fields: dict[str, Any] = {
+        "name": (str, ...),
+        "description": (str | None, None),
+        "dof": (Literal[3, 4, 6], ...),
+        "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
+        "constants": (_dimension_model("constants", CONSTANTS) | None, None),
+        "inertia": (block_model("inertia", rigid_body), ...),
+        "added_mass": (block_model("added_mass", added_mass) | None, None),
+        "hull": (create_model("hull", __base__=Block, **hull) | None, None),
+        "wind": (_named("wind") | None, None),
+        "thruster": (GenericAlias(dict, (str, _named("thruster"))), {}),
+        "current": (create_model("current", __base__=Block, **current) | None, None),
+    }
+    return create_model("vessel", __base__=Block, **fields)
 
 
-def term_blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Dotted path, TERMS key and block of every term of a vessel document that is not off."""
+def components(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
+    """Dotted path, group and entry of every block that must name its `kind`, whatever it holds."""
+    if "wind" in document:
+        yield "wind", "wind", document["wind"]
+    thrusters = document.get("thruster")
+    for name, entry in thrusters.items() if isinstance(thrusters, Mapping) else ():
+        yield f"thruster.{name}", "thruster", entry
+
+
+def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Dotted path, TERMS key and block of every term of a vessel document that acts, or of those that are off."""
     groups = dict.fromkeys(key.split(".")[0] for key in TERMS)
     for group in groups:
         block = document.get(group)
@@ -220,5 +226,5 @@ def term_blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping
             continue
         named = {"": block} if "kind" in block else {k: v for k, v in block.items() if isinstance(v, Mapping)}
         for name, entry in named.items():
-            if not entry.get("off", False):
+            if bool(entry.get("off", False)) == off:
                 yield (f"{group}.{name}" if name else group), f"{group}.{entry.get('kind', name)}", entry

@@ -59,7 +59,7 @@ def as_dataset(*frames: pd.DataFrame, names: tuple[str, ...] = (), **metadata: o
     runs = []
     for index, frame in enumerate(frames):
         name = names[index] if names else "abcdefghijklmnopqrstuvwxyz"[index]
-        flags = frame["flags"] if "flags" in frame else 0
+        flags = frame.get("flags", 0)
         runs.append(frame.assign(run=pd.Series([name] * len(frame), dtype="str"), flags=flags))
     return Dataset(pd.concat(runs, ignore_index=True).astype({"flags": "int64"}), {"flags": ["break"], **metadata})
 

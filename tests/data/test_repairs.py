@@ -69,25 +69,28 @@ def flagged(dataset: Dataset, kind: str) -> pd.Series:
     return dataset.frame["flags"] & flag_bit(dataset.metadata, kind) != 0
 
 
-def wrapped_and_interpolated(tmp_path: Path) -> tuple[Path, int]:
-    """A log whose 0..360 heading was brought from 1.5 s to 0.5 s by linear interpolation; false steps counted by hand."""
-    coarse = T[::3]
-    heading = np.degrees(MOTION["psi"].to_numpy()[::3]) % 360.0
-    false = 3 * int((np.abs(np.diff(heading)) > 180).sum())  # three steps of 0.5 s across every wrap
+def wrapped_and_interpolated(tmp_path: Path, early: float) -> tuple[Path, int]:
+    """A log whose 0..360 heading was interpolated linearly to 0.5 s from every 1.5 s, and how often it wraps."""
+    coarse = np.arange(0.0, 240.0, 1.5) - early
+    heading = np.degrees(np.interp(coarse, T, MOTION["psi"])) % 360.0
+    wraps = int((np.abs(np.diff(heading)) > 180).sum())
     log = as_log(MOTION, tmp_path / "log.csv")
     frame = pd.read_csv(log)
     frame["heading"] = np.interp(T, coarse, heading)
     frame.to_csv(log, index=False)
-    return log, false
+    return log, wraps
 
 
-def test_interpolated_wraps_are_found_and_healed(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
-    log, false = wrapped_and_interpolated(tmp_path)
+@pytest.mark.parametrize("early", [0.0, 0.02])  # 0.02 s: the first false sample is only 5 deg wrong
+def test_interpolated_wraps_are_found_and_healed(
+    early: float, plain_mapping: Callable[..., Path], tmp_path: Path
+) -> None:
+    log, wraps = wrapped_and_interpolated(tmp_path, early)
     repair = '\n[[repair]]\nkind = "wrap_interpolation"\ncolumns = ["psi"]\nthreshold = 20.0\nunit = "deg"\n'
     mapping = read_mapping(plain_mapping(repair + 'reason = "a test"\n'))
     dataset = import_log(mapping, log)
-    inside = T[::3][-1] >= T
-    assert dataset.metadata["repairs"][0]["count"] == false > 0
+    inside = T < 238.0
+    assert dataset.metadata["repairs"][0]["count"] == 3 * wraps > 0  # three steps of 0.5 s over each
     np.testing.assert_allclose(dataset.frame["psi"][inside], MOTION["psi"][inside], atol=1e-9)
     spoiled = import_log(mapping, log, without=("wrap_interpolation",))
     assert np.abs(spoiled.frame["psi"] - MOTION["psi"])[inside].max() > 0.5

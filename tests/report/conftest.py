@@ -84,9 +84,7 @@ def _errors(models: list[Model], sizes: list[int], axis: pd.DataFrame, growth: n
     return pd.concat(parts, ignore_index=True)
 
 
-def _snapshots(
-    models: list[Model], sizes: list[int], runs: list[str], times: np.ndarray, ahead: int
-) -> list[Snapshot]:
+def _snapshots(models: list[Model], sizes: list[int], runs: list[str], times: np.ndarray, ahead: int) -> list[Snapshot]:
     steps, result = np.arange(ahead + 1.0), []
     for number, run in enumerate(runs):
         for t in times:
@@ -158,7 +156,9 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
             Sentence("These data say nothing about waves."),
         ],
         findings=[
-            Finding("R1", "Cooperative beats its own physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."),
+            Finding(
+                "R1", "Cooperative beats its own physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."
+            ),
             Finding("R2", "Inaccurate and compensated is as good as accurate alone.", "undecided", "2.05 m, 2.10 m."),
             Finding("R4", "Pure data-driven is worst over the whole horizon.", "refuted", "Not in the first 2 s."),
         ],

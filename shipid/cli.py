@@ -1,0 +1,361 @@
+"""The command line: arguments to calls, events to lines; no logic. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shipid.errors import DocumentError, ShipidError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from shipid.report import ReportContent
+    from shipid.study.results import Results
+    from shipid.study.run import Event
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="How good must the physics be, and how much data is needed, to predict a ship's trajectory?",
+)
+vessel_app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or your own.")
+data_app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
+study_app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
+app.add_typer(vessel_app, name="vessel")
+app.add_typer(data_app, name="data")
+app.add_typer(study_app, name="study")
+
+Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
+Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
+Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
+Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
+Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
+
+
+def main() -> None:
+    """Entry point: what the user can mend is one line, never a traceback."""
+    try:
+        app()
+    except ShipidError as error:
+        sys.stderr.write(f"error: {error}\n")
+        sys.exit(1)
+    except BrokenPipeError:
+        sys.exit(141)
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="show the version")] = False) -> None:
+    if version:
+        from shipid import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@vessel_app.command("list")
+def vessel_list() -> None:
+    """List the bundled vessels."""
+    from shipid.document import bundled, read
+
+    _print(_table(["name", "vessel"], ((name, read(file)["name"]) for name, file in bundled("models").items())))
+
+
+@vessel_app.command("show")
+def vessel_show(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")] = "",
+    schema: Annotated[bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")] = False,
+) -> None:
+    """Show particulars, terms, and every parameter with its dotted path and unit."""
+    if schema:
+        import json
+
+        from shipid.vessel.schema import vessel_model
+
+        typer.echo(json.dumps(vessel_model().model_json_schema(), indent=1))
+        return
+    if not vessel:
+        raise ShipidError("name a vessel (see `shipid vessel list`), or ask for --schema")
+    from shipid.vessel.load import load_vessel
+    from shipid.vessel.schema import PARTICULARS, term_blocks
+
+    found = load_vessel(vessel)
+    document = found.document
+    typer.echo(f"{found.name}\n{document.get('description', '')}\nfile {found.file}, digest {found.digest}")
+    particulars = document.get("particulars", {})
+    typer.echo("particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars))
+    rows = [(path, key, block.get("source") or document.get("source", "")) for path, key, block in term_blocks(document)]
+    rows += [(path, f"{key}, off", block.get("source", "")) for path, key, block in term_blocks(document, off=True)]
+    _print(_table(["term", "kind", "source"], rows))
+    values = found.parameters
+    _print(_table(["parameter", "value", "unit"], ((path, f"{values[path]:.10g}", unit) for path, unit in found.units.items())))
+
+
+@data_app.command("fetch")
+def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
+    """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
+    from shipid.data.catalogue import fetch
+
+    typer.echo(str(fetch(name)))
+
+
+@data_app.command("import")
+def data_import(
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
+    out: Annotated[Path | None, typer.Option(help="Parquet file to write; default: beside you, named like the mapping")] = None,
+    without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
+) -> None:
+    """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    from shipid.data.catalogue import fetch
+    from shipid.data.dataset import write_dataset
+    from shipid.data.importing import import_log
+    from shipid.data.mapping import read_mapping
+
+    declared = read_mapping(mapping)
+    dataset = import_log(declared, log or fetch(mapping), without=without or ())
+    file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
+    repairs = dataset.metadata.get("repairs", [])
+    if repairs:
+        rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
+        _print(_table(["repair", "column", "rows", "why"], rows))
+    typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
+
+
+@data_app.command("check")
+def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")]) -> None:
+    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
+    from shipid.data.checks import check_dataset
+    from shipid.data.dataset import read_dataset
+
+    checks = check_dataset(read_dataset(dataset))
+    columns = ["run", "check", "ok", "sentence"]
+    _print(_table(columns, ((str(r.run), str(r.check), "yes" if r.ok else "NO", str(r.sentence)) for r in checks.itertuples())))
+    failed = int((~checks["ok"].astype(bool)).sum())
+    typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
+    if failed:
+        raise typer.Exit(1)
+
+
+@study_app.command("list")
+def study_list() -> None:
+    """List the bundled studies."""
+    from shipid.document import bundled, read
+
+    _print(_table(["name", "question"], ((name, read(file)["question"]) for name, file in bundled("studies").items())))
+
+
+@study_app.command("variants")
+def study_variants(
+    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    save: Annotated[Path | None, typer.Option(help="folder for one patch document per variant")] = None,
+    accuracy: Annotated[bool, typer.Option(help="also simulate or import the data, and show A")] = True,
+    changes: Changes = None,
+) -> None:
+    """Show the models of a study with their factors and accuracy A; save patches that rebuild them exactly."""
+    from shipid.study.plan import read_plan
+    from shipid.study.prepare import obtain, prepare
+
+    plan = read_plan(study, _parsed(changes))
+    models, scores = plan.models, {}
+    if accuracy:
+        prepared = prepare(plan, obtain(plan))
+        models = prepared.models
+        scores = {model.name: prepared.accuracy(model.name)["mean"] for model in models if model.vessel}
+    rows = []
+    for model in models:
+        factors = model.variant.factors if model.variant else {}
+        shown = ", ".join(f"{path.rsplit('.', 1)[-1]} x{factor:.2f}" for path, factor in factors.items())
+        score = scores.get(model.name)
+        rows.append((model.name, "-" if score is None else f"{score:.2f}", str(len(factors)), shown))
+    _print(_table(["model", "A [m]", "changed", "factors"], rows))
+    if save is not None:
+        from shipid.study.store import write_text
+
+        patches = [model.variant for model in models if model.variant]
+        for variant in patches:
+            write_text(save / f"{variant.name}.toml", variant.document())
+        typer.echo(f"{len(patches)} patches -> {save}")
+
+
+@study_app.command("run")
+def study_run(
+    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
+    changes: Changes = None,
+    device: Device = "cpu",
+) -> None:
+    """Run a study and write its report; an interrupted run resumes when started again."""
+    from shipid.study.plan import read_plan
+
+    plan = read_plan(study, _parsed(changes))
+    _run(plan, out or Path("results") / f"{plan.name}-{plan.digest[:8]}", workers, scheduler, device)
+
+
+@study_app.command("resume")
+def study_resume(folder: Folder, workers: Workers = None, scheduler: Scheduler = None, device: Device = "cpu") -> None:
+    """Continue an interrupted run."""
+    from shipid.study.store import stored_plan
+
+    _run(stored_plan(folder), folder, workers, scheduler, device)
+
+
+@study_app.command("report")
+def study_report(folder: Folder) -> None:
+    """Write report.html, summary.md and results.parquet from what is stored."""
+    typer.echo(str(_report(folder)))
+
+
+@app.command("predict")
+def predict(
+    folder: Folder,
+    log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
+    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
+    mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
+    out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv")] = None,
+) -> None:
+    """Write physics and cooperative paths in north-east for every instant of a log."""
+    from shipid.study.apply import predict_log
+
+    file = out or Path(f"{cell}.parquet")
+    frame, outside = predict_log(folder, cell, log, mapping, file)
+    typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
+    if outside:
+        typer.echo(f"{outside:.0%} of the instants lie outside what the compensator was trained on (column `outside`)")
+
+
+def _run(plan: Any, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:
+    from shipid.study.run import run_study
+
+    try:
+        _draw(run_study(plan, folder, workers=workers, scheduler=scheduler, device=device))
+    except KeyboardInterrupt:
+        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: shipid study resume {folder}\n")
+        sys.exit(130)
+    report = _report(folder)
+    for line in (folder / "answer.txt").read_text(encoding="utf-8").splitlines():
+        typer.echo(f"  {line}")
+    typer.echo(f"report: {report}")
+
+
+def _draw(events: Iterable[Event]) -> None:
+    """Live progress on a terminal; plain lines, one per finished cell, anywhere else."""
+    from rich.console import Console
+
+    console = Console()
+    if not console.is_terminal:
+        for event in events:
+            line = _line(event)
+            if line:
+                typer.echo(line)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    best: dict[str, Any] = {}
+    worst: dict[str, Any] = {}
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("cells", total=None)
+        for event in events:
+            if event.kind == "note":
+                progress.console.print(event.text, markup=False, highlight=False)
+            elif event.kind == "start":
+                progress.update(task, total=event.total, completed=event.done)
+            elif event.kind == "cell":
+                row = event.row
+                if row["status"] == "ok":
+                    best = min((best or row, row), key=lambda r: r["H"])
+                    worst = max((worst or row, row), key=lambda r: r["H"])
+                label = f"best {best['cell']} {best['H']:.2f} m, worst {worst['cell']} {worst['H']:.2f} m" if best else "cells"
+                progress.update(task, completed=event.done, description=label)
+
+
+def _line(event: Event) -> str:
+    row = event.row
+    if event.kind != "cell":
+        return {"note": event.text, "start": f"{event.total - event.done} of {event.total} cells to do"}.get(event.kind, "")
+    result = f"H {row['H']:.3f} m, H_90 {row['H_90']:.3f} m" if row["status"] == "ok" else f"{row['status']}: {row['sentence']}"
+    return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"
+
+
+def _report(folder: Path) -> Path:
+    from shipid.report import write_report, write_summary
+    from shipid.study.results import read_results
+    from shipid.study.store import write_results, write_text
+
+    results = read_results(folder)
+    write_results(folder, results.cells)
+    content = _content(results)
+    write_text(folder / "answer.txt", "\n".join(sentence.text for sentence in content.answer) + "\n")
+    write_summary(content, folder / "summary.md")
+    return write_report(content, folder / "report.html")
+
+
+def _content(results: Results) -> ReportContent:
+    from shipid.report import Finding, ReportContent, Sentence, Snapshot
+    from shipid.study import advise
+    from shipid.study import results as frames
+
+    return ReportContent(
+        title=results.plan.study.question,
+        name=results.plan.name,
+        answer=[Sentence(text, figure) for text, figure in advise.answer(results)],
+        findings=[Finding(**finding) for finding in advise.findings(results)],  # type: ignore[arg-type]
+        cells=results.cells,
+        naive=frames.naive_summary(results),
+        models=results.models.rename(columns={"family": "kind"}),
+        horizon=frames.horizon_frame(results),
+        over_time=frames.time_frame(results),
+        commands=frames.commands_frame(results),
+        snapshots=[Snapshot(**snapshot) for snapshot in frames.snapshots(results)],
+        tracks=frames.tracks_frame(results),
+        envelope=frames.envelope_frame(results),
+        repairs=frames.repairs_frame(results),
+        provenance=frames.provenance_words(results),
+        study_document=results.plan.text(),
+        command=f"shipid study run {results.plan.name}",
+    )
+
+
+def _parsed(changes: list[str] | None) -> dict[str, Any]:
+    """`path=value` pairs; a value is TOML, or text as it stands."""
+    import tomllib
+
+    result: dict[str, Any] = {}
+    for change in changes or []:
+        path, equals, text = change.partition("=")
+        if not equals or not path:
+            raise DocumentError(f"{change!r}: write --set path=value, such as --set grid.N_D=[10,30]", path="--set")
+        try:
+            result[path] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            result[path] = text
+    return result
+
+
+def _table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(*columns, box=box.SIMPLE_HEAD)
+    for row in rows:
+        table.add_row(*(Text(str(cell)) for cell in row))
+    return table
+
+
+def _print(table: Table) -> None:
+    from rich.console import Console
+
+    console = Console()
+    if console.is_terminal:
+        console.print(table)
+    else:
+        Console(width=200).print(table)

@@ -1,0 +1,71 @@
+"""Use a finished cell: its predictor along a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset, pieces, read_dataset
+from shipid.data.importing import import_log
+from shipid.data.mapping import read_mapping
+from shipid.data.windows import from_frame
+from shipid.errors import DataError, ResultError, choices
+from shipid.predictor import Predictor, check_columns
+from shipid.study.prepare import states_along
+from shipid.study.store import cell_file
+
+FORMATS = (".parquet", ".csv")
+
+
+def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Path) -> tuple[pd.DataFrame, float]:
+    """Write physics and cooperative paths in north-east for every instant of a log.
+
+    Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m],
+    outside) and the share of instants outside the training's limits. Pure data-driven cells have NaN for physics.
+    """
+    if out.suffix not in FORMATS:
+        raise DataError(f"{out.suffix or 'no ending'}: write to a file ending in {' or '.join(FORMATS)}", file=out)
+    predictor = Predictor.load(_known_cell(folder, cell))
+    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    if predictor.vessel is not None:
+        check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
+    parts = [_along(predictor, dataset, run, rows) for run, rows in pieces(dataset)]
+    frame = pd.concat(parts, ignore_index=True)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    if out.suffix == ".csv":
+        frame.to_csv(out, index=False)
+    else:
+        frame.to_parquet(out, index=False)
+    return frame, float(frame["outside"].mean())
+
+
+def _known_cell(folder: Path, cell: str) -> Path:
+    available = {file.stem for file in (folder / "cells").glob("*.npz")}
+    if not available:
+        raise ResultError("holds no finished cells: is it the folder of a run?", file=folder)
+    if cell not in available:
+        raise ResultError(f"no such cell: {choices(cell, available)}", file=folder, path=f"--cell {cell}")
+    return cell_file(folder, cell)
+
+
+def _along(predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame) -> pd.DataFrame:
+    columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
+    memory = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
+    origin = (columns["north"], columns["east"], columns["psi"])
+    steps, count = predictor.horizon, len(rows)
+    result = {
+        "run": np.full(steps * count, run),
+        "t": np.repeat(columns["t"], steps),
+        "ahead": np.tile(predictor.step * np.arange(1, steps + 1), count),
+    }
+    physics = predictor.physics(columns, memory)
+    cooperative = physics if predictor.compensator is None else physics + predictor.compensator.predict(columns)
+    if predictor.vessel is None:
+        physics = np.full_like(physics, np.nan)
+    for name, path in (("physics", physics), ("cooperative", cooperative)):
+        north, east = from_frame(path[..., 0], path[..., 1], *origin)
+        result[f"{name}_north"], result[f"{name}_east"] = north.T.ravel(), east.T.ravel()
+    result["outside"] = np.repeat(predictor.outside(columns), steps)
+    return pd.DataFrame(result)

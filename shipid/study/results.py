@@ -1,0 +1,269 @@
+"""From a run's folder to frames: what a report shows, computed from what was stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset, read_dataset
+from shipid.data.windows import Windows
+from shipid.metrics import over_horizon, over_time, position_error, summary
+from shipid.predictor import Predictor
+from shipid.study import store
+from shipid.study.plan import NO_MODEL, Plan
+
+MOST_TEST_RUNS = 4  # shown over time and in the window browser
+MOST_POINTS = 400  # of a track on the map: more than its pixels can show
+INSTANTS = 7  # windows of a test run in the browser
+RPM, DEGREE = 60.0, 180.0 / np.pi
+SAILORS = {"n": ("shaft", "rpm", RPM), "alpha": ("azimuth", "deg", DEGREE), "delta": ("rudder", "deg", DEGREE)}
+ENVELOPE = {"u": ("m/s", 1.0), "v": ("m/s", 1.0), "r": ("deg/s", DEGREE), "u_rw": ("m/s", 1.0), "v_rw": ("m/s", 1.0)}
+
+
+@dataclass(frozen=True)
+class Results:
+    """A run's folder, read: the plan, one row per cell, models, test windows, and errors (T, S) of every cell.
+
+    errors : cell -> position error (T, S) [m]; paths : cell -> predicted path (T, S, 2) [m] in the frame (11).
+    """
+
+    folder: Path
+    plan: Plan
+    cells: pd.DataFrame
+    models: pd.DataFrame
+    test: Windows
+    physics: Mapping[str, np.ndarray]
+    naive: np.ndarray
+    paths: Mapping[str, np.ndarray]
+    dataset: Dataset
+    provenance: Mapping[str, Any]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every cell of the plan is there."""
+        return len(self.cells) == self.plan.cells
+
+
+def read_results(folder: Path) -> Results:
+    """Read a run's folder and predict every test window with every stored cell."""
+    plan = store.stored_plan(folder)
+    cells = store.read_rows(folder)
+    test, physics, naive = store.read_test(folder)
+    paths = {}
+    for row in cells.itertuples():
+        if row.status == "ok":
+            compensator = Predictor.load(store.cell_file(folder, str(row.cell))).compensator
+            if compensator is not None:
+                paths[str(row.cell)] = physics[str(row.model)] + compensator.predict(test.columns)
+    return Results(
+        folder=folder,
+        plan=plan,
+        cells=cells,
+        models=_models(folder, physics, test),
+        test=test,
+        physics=physics,
+        naive=naive,
+        paths=paths,
+        dataset=read_dataset(folder / store.DATASET),
+        provenance=store.read_json(folder / store.PROVENANCE),
+    )
+
+
+def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
+    frame = pd.DataFrame(store.read_json(folder / store.MODELS))
+    for name in ("A", "A_90", "A_rms"):
+        frame[name] = frame[name].astype(float)
+    diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
+    frame["status"] = ["diverged" if diverged[name] else "ok" for name in frame["model"]]
+    return frame
+
+
+def horizon_frame(results: Results) -> pd.DataFrame:
+    """Mean and 90th percentile error [m] per step ahead [s], of physics, cooperative models and the naive floor."""
+    ahead = results.test.step * np.arange(1, results.test.horizon + 1)
+    parts = [_horizon(results.naive, ahead, "naive", 0, 0, "naive")]
+    for model, path in results.physics.items():
+        if model != NO_MODEL and np.isfinite(path).all():
+            parts.append(_horizon(position_error(path, results.test.future), ahead, model, 0, 0, "physics"))
+    for row in results.cells.itertuples():
+        if row.cell in results.paths:
+            error = position_error(results.paths[str(row.cell)], results.test.future)
+            parts.append(_horizon(error, ahead, str(row.model), int(row.N_D), int(row.seed), "cooperative"))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _horizon(error: np.ndarray, ahead: np.ndarray, model: str, N_D: int, seed: int, source: str) -> pd.DataFrame:
+    keys = {"model": model, "N_D": N_D, "seed": seed, "source": source, "ahead": ahead}
+    return pd.DataFrame({**keys, **over_horizon(error)})
+
+
+def shown_runs(results: Results) -> list[str]:
+    """Test runs that figures over time show."""
+    return list(results.test.spans)[:MOST_TEST_RUNS]
+
+
+def time_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon [m] per instant of prediction [s] in the shown test runs, first seed."""
+    parts = []
+    seed = int(results.cells["seed"].min())
+    mask = np.isin(results.test.run, shown_runs(results))
+
+    def add(error: np.ndarray, model: str, N_D: int, source: str) -> None:
+        keys = {"run": results.test.run[mask], "t": results.test.t[mask], "model": model, "N_D": N_D, "seed": seed}
+        parts.append(pd.DataFrame({**keys, "source": source, "error": over_time(error)[mask]}))
+
+    add(results.naive, "naive", 0, "naive")
+    for model, path in results.physics.items():
+        if model != NO_MODEL and np.isfinite(path).all():
+            add(position_error(path, results.test.future), model, 0, "physics")
+    for row in results.cells.itertuples():
+        if row.cell in results.paths and row.seed == seed:
+            add(position_error(results.paths[str(row.cell)], results.test.future), str(row.model), int(row.N_D), "cooperative")
+    return pd.concat(parts, ignore_index=True)
+
+
+def commands_frame(results: Results) -> pd.DataFrame:
+    """Commands over time in the shown test runs, in the units of sailors; equal commands are shown once."""
+    frame = results.dataset.frame
+    frame = frame[frame["run"].isin(shown_runs(results))]
+    result = frame[["run", "t"]].reset_index(drop=True)
+    shown: dict[str, str] = {}
+    for name in results.dataset.commands:
+        twin = next((other for other in shown if np.allclose(frame[other], frame[name], atol=1e-9)), None)
+        if twin is None:
+            shown[name] = name.partition(".")[0]
+        else:
+            shown[twin] += f" and {name.partition('.')[0]}"
+    for name, components in shown.items():
+        word, unit, factor = SAILORS[name.rpartition(".")[2]]
+        result[f"{components} {word} [{unit}]"] = frame[name].to_numpy() * factor
+    return result
+
+
+def snapshots(results: Results) -> list[dict[str, Any]]:
+    """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
+    particulars = next((m.vessel.document.get("particulars", {}) for m in results.plan.models if m.vessel), {})
+    outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
+    seed, test = int(results.cells["seed"].min()), results.test
+    found = []
+    for run in shown_runs(results):
+        indices = np.flatnonzero(test.run == run)
+        for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
+            paths = {
+                (model, "physics", 0): path[:, index]
+                for model, path in results.physics.items()
+                if model != NO_MODEL and np.isfinite(path[:, index]).all()
+            }
+            for row in results.cells.itertuples():
+                if row.cell in results.paths and row.seed == seed:
+                    paths[str(row.model), "cooperative", int(row.N_D)] = results.paths[str(row.cell)][:, index]
+            origin = np.zeros((1, 2))
+            found.append(
+                {
+                    "run": run,
+                    "t": float(test.t[index]),
+                    "outline": outline,
+                    "psi_end": _final_heading(results, run, float(test.t[index])),
+                    "truth": np.concatenate([origin, test.future[:, index]]),
+                    "paths": {key: np.concatenate([origin, path]) for key, path in paths.items()},
+                    "wind": _wind(test, int(index)),
+                }
+            )
+    return found
+
+
+def ship_outline(length: float, beam: float) -> np.ndarray:
+    """(k, 2) outline of a ship from above [m], body axes: a box with a pointed bow, for drawings to scale."""
+    half, shoulder = beam / 2, length / 2 - 0.25 * length
+    stern = -length / 2
+    points = [(stern, -half), (shoulder, -half), (length / 2, 0.0), (shoulder, half), (stern, half), (stern, -half)]
+    return np.array(points)
+
+
+def _final_heading(results: Results, run: str, t: float) -> float:
+    rows = results.dataset.frame[results.dataset.frame["run"] == run]
+    psi = np.unwrap(rows["psi"].to_numpy())
+    end = t + results.test.horizon * results.test.step
+    return float(np.interp(end, rows["t"], psi) - np.interp(t, rows["t"], psi))
+
+
+def _wind(test: Windows, index: int) -> tuple[float, float] | None:
+    if "V_w" not in test.columns:
+        return None
+    columns = test.columns
+    return float(columns["V_w"][index]), float(columns["beta_w"][index] - columns["psi"][index])
+
+
+def tracks_frame(results: Results) -> pd.DataFrame:
+    """Path of every run [m] and its part in the study, thinned to what pixels can show."""
+    test = set(results.test.spans)
+    parts = []
+    for run, rows in results.dataset.frame.groupby("run", sort=False):
+        thin = rows.iloc[:: max(1, len(rows) // MOST_POINTS)]
+        part = "test" if run in test else "training and validation"
+        parts.append(pd.DataFrame({"run": run, "set": part, "north": thin["north"], "east": thin["east"]}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def envelope_frame(results: Results) -> pd.DataFrame:
+    """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
+    frame = results.dataset.frame
+    columns = {name: frame[name].to_numpy() for name in frame.columns}
+    quantities = {name: (unit, factor) for name, (unit, factor) in ENVELOPE.items() if name in columns}
+    if "V_w" in columns:
+        angle = columns["beta_w"] - columns["psi"]
+        columns["u_rw"] = columns["u"] - columns["V_w"] * np.cos(angle)
+        columns["v_rw"] = columns["v"] - columns["V_w"] * np.sin(angle)
+        quantities |= {name: ENVELOPE[name] for name in ("u_rw", "v_rw")}
+    for name in results.dataset.commands:
+        _, unit, factor = SAILORS[name.rpartition(".")[2]]
+        quantities[name] = (unit, factor)
+    test = np.isin(columns["run"], list(results.test.spans))
+    rows = []
+    for part, mask in (("training and validation", ~test), ("test", test)):
+        for name, (unit, factor) in quantities.items():
+            values = columns[name][mask] * factor
+            low, mean, high = values.min(), values.mean(), values.max()
+            rows.append({"set": part, "quantity": name, "unit": unit, "min": low, "mean": mean, "max": high})
+    return pd.DataFrame(rows)
+
+
+def repairs_frame(results: Results) -> pd.DataFrame:
+    """Every repair that the importer made, with its count."""
+    rows = results.dataset.metadata.get("repairs", [])
+    return pd.DataFrame(rows, columns=["kind", "column", "count", "note"])
+
+
+def naive_summary(results: Results) -> dict[str, float]:
+    """Mean, p90 and rms [m] of constant u, v, r on the test windows."""
+    found = summary(results.naive)
+    return {"mean": found["mean"], "p90": found["p90"], "rms": found["rms"]}
+
+
+def provenance_words(results: Results) -> dict[str, str]:
+    """What the results stand on, as label -> text."""
+    record, study = results.provenance, results.plan.study
+    machine = record.get("machine", {})
+    words = {
+        "study": f"{results.plan.name}, digest {record['digest']}",
+        "vessels": "; ".join(sorted({f"{m.vessel.key} {m.vessel.digest}" for m in results.plan.models if m.vessel})),
+        "data": str(results.dataset.metadata.get("source", "")),
+        "cells": f"{len(results.cells)} of {results.plan.cells} finished",
+        "seeds": ", ".join(map(str, study.grid.seeds)),
+        "recipe": f"{study.recipe.get('kind', 'fast')}: {results.plan.recipe.trials} trials",
+        "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, {machine.get('cores', '?')} cores",
+        "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
+        "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s",
+    }
+    redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
+    if redrawn:
+        words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)
+    notes = record.get("notes", [])
+    if notes:
+        words["notes"] = "; ".join(notes)
+    return words

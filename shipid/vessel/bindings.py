@@ -1,0 +1,74 @@
+"""Which number of a document feeds which keyword of the physics, and in what unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from shipid.document import Document
+from shipid.physics import ACTUATORS, TERMS
+from shipid.physics.grammar import Grammar
+from shipid.physics.inertia import added_mass, rigid_body
+from shipid.vessel.schema import SHARED, Parameter, parameters, term_blocks
+
+Binding = dict[str, str | list[str] | dict[str, str] | float]
+
+
+def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
+    """Keyword -> dotted path (or list, table of paths, or default value) for one physics function."""
+    result: Binding = {}
+    for parameter in declared:
+        name = parameter.name
+        if parameter.kind == "open":
+            closed = {other.name for other in declared} | {"source", "off", "kind"}
+            result.update({key: f"{path}.{key}" for key in block if key not in closed})
+        elif parameter.kind == "list":
+            result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]
+        elif parameter.kind == "table":
+            result[name] = {key: f"{path}.{name}.{key}" for key in block[name]}
+        elif name in block:
+            result[name] = f"{path}.{name}"
+        elif name in SHARED:
+            result[name] = f"{SHARED[name]}.{name}"
+        elif parameter.default is not None:
+            result[name] = parameter.default
+    return result
+
+
+def bindings(document: Document) -> dict[str, Binding]:
+    """Dotted path of every block that the equations use -> the binding of its function's keywords."""
+    found = {"inertia": bind("inertia", document["inertia"], parameters(rigid_body))}
+    found["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
+    for path, key, block in term_blocks(document):
+        found[path] = bind(path, block, parameters(TERMS[key].function))
+        for command, actuator in (block.get("actuator") or {}).items():
+            if isinstance(actuator, Mapping):
+                where = f"{path}.actuator.{command}"
+                found[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
+    return found
+
+
+def units(document: Document) -> dict[str, str]:
+    """Dotted path -> unit of every parameter, in the order of use."""
+    functions: dict[str, Any] = {"inertia": rigid_body, "added_mass": added_mass}
+    for path, key, block in term_blocks(document):
+        functions[path] = TERMS[key].function
+        for command, actuator in (block.get("actuator") or {}).items():
+            if isinstance(actuator, Mapping):
+                functions[f"{path}.actuator.{command}"] = ACTUATORS[actuator["kind"]].advance
+    rows: list[tuple[str, str]] = []
+    for where, binding in bindings(document).items():
+        declared = {parameter.name: parameter for parameter in parameters(functions[where])}
+        table = next((parameter for parameter in declared.values() if parameter.kind == "open"), None)
+        for keyword, target in binding.items():
+            parameter = declared.get(keyword, table)
+            assert parameter is not None
+            unit = parameter.unit
+            if isinstance(target, str):
+                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else unit))
+            elif isinstance(target, list):
+                rows += [(path, str(unit)) for path in target]
+            elif isinstance(target, dict):
+                assert isinstance(unit, Grammar)
+                rows += [(path, unit.unit(key)) for key, path in target.items()]
+    return dict(rows)

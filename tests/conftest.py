@@ -1,0 +1,92 @@
+"""What the tests of all floors share: the data folder, and vessels of every structure that the equations know."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from shipid.document import bundled
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+
+torch.set_num_threads(1)  # the machine is shared
+
+LAG = {
+    "n": {"kind": "first_order", "T": 1.0, "rate": 0.17},
+    "alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21},
+}
+ROLL = {"inertia.I_x": 4.8e6, "inertia.z_G": -0.9, "added_mass.K_pdot": -2.3e6, "hull.derivatives.K_p": -4e5}
+PITCH = {"inertia.I_y": 3.8e7, "added_mass.Z_wdot": -1.2e6, "added_mass.M_qdot": -8e7, "added_mass.K_vdot": -1e5}
+PRIME = {"L_pp": 28.9, "Y_v": -0.03, "Y_r": 0.008, "N_v": -0.01, "N_r": -0.006, "X_vv": -0.004, "Y_v|r|": -0.03}
+
+#: name -> base and what is added: structures that no bundled vessel has (yet)
+PATCHED: dict[str, tuple[str, Mapping[str, Any]]] = {
+    "actuators": ("gunnerus-28.9", {"thruster.port.actuator": LAG, "thruster.starboard.actuator": LAG}),
+    "tunnel": ("gunnerus-28.9", {"thruster.bow.off": False}),
+    "current": ("gunnerus-28.9", {"current.kind": "uniform"}),
+    "prime": ("gunnerus-28.9", {"hull.prime_derivatives": PRIME}),
+    "many-strips": ("gunnerus-33.9", {"hull.crossflow.strips": 40}),
+    "roll": ("gunnerus-33.9", {"dof": 4, **ROLL}),
+    "six": ("gunnerus-33.9", {"dof": 6, "current.kind": "uniform", **ROLL, **PITCH}),
+}
+
+
+def variety() -> dict[str, Vessel]:
+    """Bundled vessels and patched ones, by name."""
+    found = {name: load_vessel(name) for name in bundled("models")}
+    return found | {name: load_vessel(base).with_values(values) for name, (base, values) in PATCHED.items()}
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of public recorded data: SHIPID_DATA, else beside the repository."""
+    folder = Path(os.environ.get("SHIPID_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip("no folder with recorded data: set SHIPID_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session", params=list(variety()))
+def vessel(request: pytest.FixtureRequest) -> Vessel:
+    """Every structure in turn."""
+    return variety()[request.param]
+
+
+@pytest.fixture(scope="session", params=list(bundled("models")))
+def bundled_vessel(request: pytest.FixtureRequest) -> Vessel:
+    """Every vessel that comes with shipid, in turn."""
+    return load_vessel(request.param)
+
+
+Inputs = dict[str, dict[str, np.ndarray]]
+ENVELOPE = {
+    **{"north": (-200, 200), "east": (-200, 200), "down": (-0.2, 0.2), "phi": (-0.1, 0.1), "theta": (-0.05, 0.05)},
+    **{"psi": (-3, 3), "u": (0, 6), "v": (-1, 1), "w": (-0.2, 0.2), "p": (-0.1, 0.1), "q": (-0.05, 0.05)},
+    **{"r": (-0.13, 0.13), "n": (0, 3.4), "alpha": (-0.9, 0.9), "delta": (-0.6, 0.6), "V_w": (0, 12)},
+    **{"beta_w": (0, 6.3), "V_c": (0, 1), "beta_c": (0, 6.3)},
+}
+
+
+@pytest.fixture(scope="session")
+def draw_inputs() -> Callable[[Vessel, int], Inputs]:
+    """Start, commands and environment of a rollout, drawn from the envelope of the vessels."""
+
+    def draw(vessel: Vessel, num_samples: int, seed: int = 7) -> Inputs:
+        rng, model = np.random.default_rng(seed), dynamics(vessel)
+
+        def group(names: tuple[str, ...]) -> dict[str, np.ndarray]:
+            return {name: rng.uniform(*ENVELOPE[name.rsplit(".", 1)[-1]], num_samples) for name in names}
+
+        return {
+            "start": group(model.state),
+            "commands": group(model.commands),
+            "environment": group(model.environment),
+        }
+
+    return draw

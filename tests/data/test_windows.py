@@ -1,0 +1,231 @@
+"""Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipid.data.windows import (
+    Windows,
+    concatenate,
+    cut_windows,
+    fold_masks,
+    from_frame,
+    nested_runs,
+    split_folds,
+    split_runs,
+    to_frame,
+)
+from shipid.errors import DataError
+from tests.data.conftest import as_dataset, turning
+
+T = np.arange(0.0, 60.5, 0.5)
+finite = st.floats(-1e4, 1e4)
+NAMES = [f"run {number}" for number in range(17)]
+
+
+def runs_at(*starts_and_ends: tuple[float, float], **metadata: object) -> Windows:
+    """Windows of 10 s of runs a, b, ... on one clock."""
+    frames = [turning(np.arange(start, end + 0.25, 0.5)) for start, end in starts_and_ends]
+    return cut_windows(as_dataset(*frames, **metadata), horizon=10)
+
+
+@given(finite, finite, finite, finite, st.floats(-20, 20))
+def test_frames_are_inverse_and_keep_distances(north: float, east: float, n0: float, e0: float, psi0: float) -> None:
+    x, y = to_frame(north, east, n0, e0, psi0)
+    np.testing.assert_allclose(from_frame(x, y, n0, e0, psi0), (north, east), atol=1e-8)
+    assert np.hypot(x, y) == pytest.approx(np.hypot(north - n0, east - e0), abs=1e-8)
+
+
+def test_frame_points_ahead_and_to_starboard() -> None:
+    """Heading east: what lies east is ahead (x), what lies south is to starboard (y)."""
+    np.testing.assert_allclose(to_frame(0.0, 7.0, 0.0, 0.0, np.pi / 2), (7.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(to_frame(-7.0, 0.0, 0.0, 0.0, np.pi / 2), (0.0, 7.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("path", ["position", "velocity"])
+def test_straight_ahead(path: str) -> None:
+    t = np.arange(0.0, 30.0, 0.5)
+    u, v, psi = 5.0, -0.3, 4.0
+    frame = turning(t).assign(
+        psi=psi,
+        r=0.0,
+        u=u,
+        v=v,
+        north=100 + t * (u * np.cos(psi) - v * np.sin(psi)),
+        east=-50 + t * (u * np.sin(psi) + v * np.cos(psi)),
+    )
+    windows = cut_windows(as_dataset(frame), horizon=15, path=path)  # type: ignore[arg-type]
+    steps = np.arange(1, 16)[:, None]
+    np.testing.assert_allclose(windows.future[..., 0], np.broadcast_to(u * steps, (15, len(windows))), atol=1e-9)
+    np.testing.assert_allclose(windows.future[..., 1], np.broadcast_to(v * steps, (15, len(windows))), atol=1e-9)
+
+
+@pytest.mark.parametrize(("path", "tolerance"), [("position", 1e-9), ("velocity", 60 * (0.05 * 0.5) ** 2 / 12)])
+def test_steady_turn(path: str, tolerance: float) -> None:
+    """x_i = (u sin(r t) - v (1 - cos(r t))) / r, y_i = (u (1 - cos(r t)) + v sin(r t)) / r, the same everywhere."""
+    u, v, r = 4.0, -0.5, 0.05
+    windows = cut_windows(as_dataset(turning(T)), horizon=15, path=path)  # type: ignore[arg-type]
+    turn = r * np.arange(1, 16)[:, None]
+    x, y = (u * np.sin(turn) - v * (1 - np.cos(turn))) / r, (u * (1 - np.cos(turn)) + v * np.sin(turn)) / r
+    np.testing.assert_allclose(windows.future[..., 0], np.broadcast_to(x, (15, 46)), atol=tolerance)
+    np.testing.assert_allclose(windows.future[..., 1], np.broadcast_to(y, (15, 46)), atol=tolerance)
+
+
+def weaving(t: np.ndarray) -> pd.DataFrame:
+    """A consistent log on an irregular clock; positions by the trapezoid rule on a clock a hundred times finer."""
+    fine = np.interp(np.linspace(0, len(t) - 1, 100 * (len(t) - 1) + 1), np.arange(len(t)), t)
+    psi, u, v = 3.1 + 0.5 * np.sin(0.1 * fine), 5 + np.cos(0.07 * fine), 0.4 * np.sin(0.1 * fine)
+    rates = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    north, east = (np.append(0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(fine))) for rate in rates)
+    values = {"t": fine, "north": north, "east": east, "psi": psi, "u": u, "v": v, "r": 0.05 * np.cos(0.1 * fine)}
+    return pd.DataFrame({name: column[::100] for name, column in values.items()}).assign(**{"port.n": 2.0})
+
+
+def test_velocity_path_is_the_position_path_on_a_consistent_log() -> None:
+    rng = np.random.default_rng(3)
+    frame = weaving(np.append(0.0, np.cumsum(rng.uniform(0.2, 0.6, 300))))
+    windows = [cut_windows(as_dataset(frame), horizon=15, path=path) for path in ("position", "velocity")]
+    # positions are interpolated linearly between rows 0.6 s apart, 0.05 rad/s, 6 m/s: error under v r dt^2 / 8
+    np.testing.assert_allclose(windows[0].future, windows[1].future, atol=2 * 6 * 0.06 * 0.6**2 / 8)
+    np.testing.assert_array_equal(windows[0].columns["north"], windows[1].columns["north"])
+
+
+def test_velocity_path_does_not_see_positions() -> None:
+    frame = turning(T)
+    jitter = frame.assign(north=frame["north"] + np.random.default_rng(1).normal(0, 3, len(T)))
+    first, second = (cut_windows(as_dataset(f), horizon=15, path="velocity") for f in (frame, jitter))
+    np.testing.assert_array_equal(first.future, second.future)
+
+
+@pytest.mark.parametrize("path", ["position", "velocity"])
+def test_futures_do_not_depend_on_where_the_log_lies(path: str) -> None:
+    frame = turning(T)
+    c, s = np.cos(2.0), np.sin(2.0)
+    moved = frame.assign(
+        north=c * frame["north"] - s * frame["east"] + 4e3,
+        east=s * frame["north"] + c * frame["east"] - 9e3,
+        psi=(frame["psi"] + 2.0) % (2 * np.pi),  # wrapped, too
+        t=frame["t"] + 1e4,
+    )
+    first, second = (cut_windows(as_dataset(f), horizon=15, path=path) for f in (frame, moved))  # type: ignore[arg-type]
+    np.testing.assert_allclose(first.future, second.future, atol=1e-7)
+
+
+def test_instants_commands_and_columns() -> None:
+    """The command of step i is the order in force from i-1 to i; n changes every 7 s in this log."""
+    windows = cut_windows(as_dataset(turning(T)), horizon=15, step=2.0, interval=3.0)
+    assert windows.t.tolist() == list(range(0, 31, 3))
+    expected = np.floor((windows.t + 2.0 * np.arange(15)[:, None]) / 7.0)
+    np.testing.assert_array_equal(windows.planned["port.n"], expected)
+    np.testing.assert_array_equal(windows.columns["port.n"], expected[0])
+    assert set(windows.columns) == {"north", "east", "psi", "u", "v", "r", "port.n", "flags"}
+    assert windows.future.shape == (15, 11, 2)
+
+
+def test_no_future_leaves_its_run_or_crosses_a_break() -> None:
+    broken = turning(T).assign(flags=np.where(T == 25.0, 1, 0))
+    windows = cut_windows(as_dataset(broken, turning(T[:41])), horizon=10)
+    starts = [float(t) for t in windows.t[windows.run == "a"]]
+    assert starts == [float(t) for t in (*range(15), *range(25, 51))]
+    assert windows.t[windows.run == "b"].max() == 10.0
+
+
+def test_select_and_concatenate_are_inverse() -> None:
+    windows = runs_at((0, 30), (50, 80))
+    mask = windows.run == "a"
+    again = concatenate([windows.select(mask), windows.select(~mask)])
+    np.testing.assert_array_equal(again.future, windows.future)
+    np.testing.assert_array_equal(again.run, windows.run)
+    assert len(windows.select([0, 5])) == 2
+    np.testing.assert_array_equal(windows.select(slice(3, 5)).planned["port.n"], windows.planned["port.n"][:, 3:5])
+    with pytest.raises(DataError, match="horizons"):
+        concatenate([windows, cut_windows(as_dataset(turning(T)), horizon=5)])
+
+
+def test_touching_is_closed_and_counts_the_future() -> None:
+    windows = runs_at((0, 60))
+    assert windows.t[windows.touching([(20.0, 25.0)])].tolist() == list(range(10, 26))
+    assert windows.touching([]).sum() == 0
+
+
+@pytest.mark.parametrize("options", [{"horizon": 200}, {"horizon": 0}, {"horizon": 5, "step": 0.0}])
+def test_impossible_windows(options: dict[str, float]) -> None:
+    with pytest.raises(DataError, match="horizon"):
+        cut_windows(as_dataset(turning(T)), **options)  # type: ignore[arg-type]
+
+
+spans = st.tuples(st.integers(0, 150), st.integers(20, 60)).map(lambda pair: (float(pair[0]), float(sum(pair))))
+
+
+@given(st.lists(spans, min_size=2, max_size=6), st.data())
+def test_no_moment_is_seen_by_both_parts(runs: list[tuple[float, float]], data: st.DataObject) -> None:
+    windows = runs_at(*runs)
+    names = sorted(windows.spans)
+    validating = data.draw(st.lists(st.sampled_from(names), min_size=1, unique=True))
+    others = ~np.isin(windows.run, validating)
+    if windows.touching([windows.spans[name] for name in validating])[others].all():
+        with pytest.raises(DataError, match="no training window is left"):
+            fold_masks(windows, validating)
+        return
+    training, validation = fold_masks(windows, validating)
+    assert set(windows.run[validation]) == set(validating)
+    apart = (windows.end[training][:, None] < windows.t[validation]) | (
+        windows.t[training][:, None] > windows.end[validation]
+    )
+    assert apart.all()
+    lost = ~training & ~validation
+    inside = [windows.touching([windows.spans[name]]) for name in validating]
+    np.testing.assert_array_equal(lost, np.any(inside, axis=0) & ~validation)  # and none is lost in vain
+
+
+def test_runs_with_their_own_clocks_do_not_exclude_each_other() -> None:
+    windows = runs_at((0, 30), (0, 30), (0, 30), clock="run")
+    training, validation = fold_masks(windows, ["b"])
+    assert (training.sum(), validation.sum()) == (42, 21)
+    with pytest.raises(DataError, match="no training window"):
+        fold_masks(runs_at((0, 30), (0, 30), (0, 30)), ["b"])
+    with pytest.raises(DataError, match="no windows of the runs z"):
+        fold_masks(windows, ["z"])
+
+
+@given(st.integers(2, 17), st.integers(0, 2**32))
+def test_folds_deal_every_run_once(num_folds: int, seed: int) -> None:
+    folds = split_folds(NAMES, num_folds, seed)
+    assert sorted(name for fold in folds for name in fold) == sorted(NAMES)
+    assert max(map(len, folds)) - min(map(len, folds)) <= 1
+    assert folds == split_folds(reversed(NAMES), num_folds, seed)
+
+
+@given(st.sets(st.integers(1, 17), min_size=1), st.integers(0, 2**32))
+def test_draws_are_nested(amounts: set[int], seed: int) -> None:
+    draws = nested_runs(NAMES, amounts, seed)
+    assert {amount: len(set(names)) for amount, names in draws.items()} == {amount: amount for amount in amounts}
+    ordered = [set(draws[amount]) for amount in sorted(amounts)]
+    assert all(smaller < larger for smaller, larger in pairwise(ordered))
+    assert draws[max(amounts)] == nested_runs(NAMES, [max(amounts)], seed)[max(amounts)]
+
+
+@given(st.floats(0.01, 0.99), st.integers(0, 2**32))
+def test_held_out_share(share: float, seed: int) -> None:
+    rest, held = split_runs(NAMES, share, seed)
+    assert sorted(rest + held) == sorted(NAMES)
+    assert abs(len(held) - share * 17) <= 1
+    assert rest
+    assert held
+
+
+def test_splits_depend_on_the_seed() -> None:
+    assert len({nested_runs(NAMES, [5], seed)[5] for seed in range(20)}) == 20
+
+
+def test_impossible_splits() -> None:
+    with pytest.raises(DataError, match="choose 2 to 17"):
+        split_folds(NAMES, 18, 0)
+    with pytest.raises(DataError, match="choose 1 to 17"):
+        nested_runs(NAMES, [3, 18], 0)
+    with pytest.raises(DataError, match="two runs"):
+        split_runs(["a"], 0.2, 0)

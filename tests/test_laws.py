@@ -1,0 +1,308 @@
+"""One law, all members: every term of the physics obeys these, and a new term is tested unasked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipid import document as documents
+from shipid.physics import SIGNALS, TERMS
+from shipid.physics.grammar import Grammar
+from shipid.simulation.lowering import lower
+from shipid.vessel.bindings import bindings
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.perturb import uniform
+from shipid.vessel.schema import SHARED, counts, parameters, signals, term_blocks
+
+ALL = pytest.mark.parametrize("key", list(TERMS))
+DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
+
+VECTORS = ("eta", "nu", "nu_r")
+MOTION_RANGE = np.array([6.0, 1.5, 0.3, 0.1, 0.05, 0.15])  # m/s, rad/s; surge is drawn from -1/3 of it
+RANGES = {
+    **{"psi": (-np.pi, np.pi), "n": (-3.5, 3.5), "alpha": (-np.pi, np.pi), "delta": (-0.7, 0.7)},
+    **{"V_w": (0.0, 20.0), "beta_w": (-np.pi, np.pi), "V_c": (0.0, 2.0), "beta_c": (-np.pi, np.pi)},
+}
+MIRROR = {  # port <-> starboard: sign of each signal, then of each wrench entry
+    "eta": np.array([1, -1, 1, -1, 1, -1]),
+    **dict.fromkeys(("nu", "nu_r"), np.array([1, -1, 1, -1, 1, -1])),
+    **dict.fromkeys(("psi", "alpha", "delta", "beta_w", "beta_c"), -1),
+}
+MIRRORED_WRENCH = np.array([1, -1, 1, -1, 1, -1])
+MIRROR_OF_A_TERM = {"thruster.tunnel": {"n": -1}}  # its shaft drives sideways, so the mirrored unit turns the other way
+DISSIPATIVE = ("hull.crossflow", "hull.resistance")
+AT_REST = 0.1  # N: what the floor of the shaft speed (1e-3 rev/s) leaves of a thruster at n = 0
+
+
+@dataclass(frozen=True)
+class Example:
+    """A term with the numbers of a bundled vessel (else made-up ones) as one SX function.
+
+    function : signals in order, then parameters -> wrench (6).
+    """
+
+    function: ca.Function
+    signals: tuple[str, ...]
+    paths: tuple[str, ...]
+    values: np.ndarray
+    units: tuple[str, ...]
+
+    def wrench(self, drawn: Mapping[str, Any], values: np.ndarray | None = None) -> np.ndarray:
+        given = [drawn[name] for name in self.signals]
+        return np.array(self.function(*given, self.values if values is None else values)).ravel()
+
+
+@cache
+def example(key: str) -> Example:
+    vessel, path = _with_term(key)
+    block = documents.get(vessel.document, path)
+    binding = bindings(vessel.document)[path]
+    paths = tuple(dict.fromkeys(p for target in binding.values() for p in _paths(target)))
+    symbols = ca.SX.sym("parameters", len(paths))
+    value_of = dict(zip(paths, ca.vertsplit(symbols), strict=True))
+    term = TERMS[key]
+    columns = term.components(**{name: block[name] for name in counts(term)}) if term.components else {}
+    names = tuple(name for name in signals(term.function) if name not in columns)
+    inputs = {name: ca.SX.sym(name, 6 if name in VECTORS else 1) for name in names}
+    keywords = {keyword: _symbols(target, value_of) for keyword, target in binding.items()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] or [{}]
+    wrench = sum((term.function(**inputs, **row, **keywords) for row in rows), ca.SX(6, 1))
+    function = ca.Function(
+        key.replace(".", "_"), [*inputs.values(), symbols], [ca.densify(wrench)], [*names, "parameters"], ["wrench"]
+    )
+    values = np.array([vessel.parameters[path] for path in paths])
+    return Example(function, names, paths, values, tuple(vessel.units[path] for path in paths))
+
+
+def _with_term(key: str) -> tuple[Vessel, str]:
+    """A vessel that has this term, switched on, and where; made up if no bundled vessel has one."""
+    for name in documents.bundled("models"):
+        document = load_vessel(name).document
+        off = [path for path, value in documents.leaves(document) if path.endswith(".off") and value]
+        vessel = check_vessel(documents.replace(document, dict.fromkeys(off, False)), name)
+        for path, found, _ in term_blocks(vessel.document):
+            if found == key:
+                return vessel, path
+    group, kind = key.split(".")
+    path = {"hull": key, "wind": "wind"}.get(group, f"{group}.{kind}")
+    base = load_vessel(next(iter(documents.bundled("models"))))
+    return check_vessel(documents.replace(base.document, {path: _made_up(key)}), "made up"), path
+
+
+def _made_up(key: str) -> dict[str, Any]:
+    group, kind = key.split(".")
+    block: dict[str, Any] = {} if group == "hull" else {"kind": kind}
+    block |= dict.fromkeys(counts(TERMS[key]), 5)
+    candidates = ["X_u|u|", "Y_v", "Y_v|v|", "N_r", "N_rrr", "X_udot", "Y_vdot", "1", "J", "yy"]
+    for parameter in parameters(TERMS[key].function):
+        name = parameter.name
+        if isinstance(parameter.unit, Grammar):
+            accepted = {c: -0.5 - uniform(key, name, c) for c in candidates if _accepts(parameter.unit, c)}
+            block |= accepted if parameter.kind == "open" else {name: accepted}
+        elif parameter.kind == "list":
+            block[name] = [0.0, 45.0, 90.0, 135.0, 180.0] if name.endswith("_deg") else [0.0, 0.7, 0.9, 0.4, 0.0]
+        elif name not in SHARED:
+            block[name] = 0.5 + uniform(key, name)
+    return block
+
+
+def _accepts(grammar: Grammar, name: str) -> bool:
+    try:
+        grammar.check([name])
+    except ValueError:
+        return False
+    return True
+
+
+def _paths(target: Any) -> list[str]:
+    if isinstance(target, str):
+        return [target]
+    if isinstance(target, list):
+        return target
+    return list(target.values()) if isinstance(target, dict) else []
+
+
+def _symbols(target: Any, value_of: Mapping[str, ca.SX]) -> Any:
+    if isinstance(target, str):
+        return value_of[target]
+    if isinstance(target, list):
+        return [value_of[path] for path in target]
+    return {k: value_of[path] for k, path in target.items()} if isinstance(target, dict) else target
+
+
+def rest(found: Example) -> dict[str, Any]:
+    return {name: np.zeros(6) if name in VECTORS else 0.0 for name in found.signals}
+
+
+def random_signals(found: Example, seed: int) -> dict[str, Any]:
+    rng = np.random.default_rng(seed)
+    low = MOTION_RANGE * [-1 / 3, -1, -1, -1, -1, -1]
+    return {
+        name: rng.uniform(low, MOTION_RANGE) if name in VECTORS else rng.uniform(*RANGES[name])
+        for name in found.signals
+    }
+
+
+@st.composite
+def envelope(draw: st.DrawFn, names: tuple[str, ...]) -> dict[str, Any]:
+    """Signals anywhere in the envelope; hypothesis likes its corners and zeros."""
+
+    def motion() -> np.ndarray:
+        return np.array([draw(st.floats(-limit, limit)) for limit in MOTION_RANGE])
+
+    return {name: motion() if name in VECTORS else draw(st.floats(*RANGES[name])) for name in names}
+
+
+@cache
+def jacobian(key: str) -> ca.Function:
+    """Signals and parameters -> d(wrench)/d(signals, parameters) (6, count)."""
+    f = example(key).function
+    inputs = [ca.SX.sym(f.name_in(i), f.size1_in(i)) for i in range(f.n_in())]
+    return ca.Function("jacobian", inputs, [ca.jacobian(f(*inputs), ca.vertcat(*inputs))])
+
+
+def jacobian_at(key: str, drawn: Mapping[str, Any]) -> np.ndarray:
+    found = example(key)
+    return np.array(jacobian(key)(*(drawn[name] for name in found.signals), found.values))
+
+
+def test_the_signals_of_every_term_are_declared() -> None:
+    declared = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment}
+    assert {name for key in TERMS for name in example(key).signals} <= declared
+    assert declared <= {*VECTORS, *RANGES}, "a new signal needs a range here"
+
+
+@ALL
+@pytest.mark.parametrize("seed", range(5))
+def test_mirror_port_starboard(key: str, seed: int) -> None:
+    found = example(key)
+    drawn = random_signals(found, seed)
+    signs = {**MIRROR, **MIRROR_OF_A_TERM.get(key, {})}
+    mirrored = {name: value * signs.get(name, 1) for name, value in drawn.items()}
+    sideways = [path.endswith(".y") and unit == "m" for path, unit in zip(found.paths, found.units, strict=True)]
+    flipped = np.where(sideways, -found.values, found.values)
+    wrench = found.wrench(drawn)
+    assert np.abs(wrench).max() > 0
+    expected = MIRRORED_WRENCH * wrench
+    np.testing.assert_allclose(found.wrench(mirrored, flipped), expected, rtol=1e-9, atol=1e-9 * np.abs(wrench).max())
+
+
+@ALL
+def test_zero_at_rest(key: str) -> None:
+    found = example(key)
+    assert np.abs(found.wrench(rest(found))).max() < AT_REST
+
+
+@ALL
+def test_finite_at_rest(key: str) -> None:
+    found = example(key)
+    assert np.isfinite(found.wrench(rest(found))).all()
+    assert np.isfinite(jacobian_at(key, rest(found))).all()
+
+
+@ALL
+@DRAWN
+@given(data=st.data())
+def test_finite_everywhere(key: str, data: st.DataObject) -> None:
+    found = example(key)
+    drawn = data.draw(envelope(found.signals))
+    assert np.isfinite(found.wrench(drawn)).all()
+    assert np.isfinite(jacobian_at(key, drawn)).all()
+
+
+@ALL
+@pytest.mark.parametrize("seed", range(5))
+def test_derivative_is_finite_difference(key: str, seed: int) -> None:
+    found = example(key)
+    drawn = random_signals(found, seed)
+    point = np.concatenate([*(np.atleast_1d(drawn[name]) for name in found.signals), found.values])
+    sizes = np.cumsum([found.function.size1_in(i) for i in range(found.function.n_in() - 1)])
+
+    def wrench(at: np.ndarray) -> np.ndarray:
+        return np.array(found.function(*np.split(at, sizes))).ravel()
+
+    exact = jacobian_at(key, drawn)
+    for column, value in enumerate(point):
+        h = 1e-6 * max(abs(value), 1e-2)
+        ahead, behind = point.copy(), point.copy()
+        ahead[column] += h
+        behind[column] -= h
+        slope = (wrench(ahead) - wrench(behind)) / (2 * h)
+        scale = np.abs(exact[:, column]).max() + 1e-9 * np.abs(wrench(point)).max() / h
+        np.testing.assert_allclose(slope, exact[:, column], rtol=0, atol=1e-5 * scale, err_msg=f"{column}")
+
+
+@pytest.mark.parametrize("key", DISSIPATIVE)
+@DRAWN
+@given(data=st.data())
+def test_drag_takes_energy(key: str, data: st.DataObject) -> None:
+    found = example(key)
+    drawn = data.draw(envelope(found.signals))
+    assert found.wrench(drawn) @ drawn["nu_r"] <= 1e-9
+
+
+def _powers(unit: str) -> tuple[float, float, float]:
+    """Exponents of mass, length and time in a unit; angles and pure numbers have none."""
+    base = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2)}
+    total = np.zeros(3)
+    for token in unit.split():
+        symbol, power = re.fullmatch(r"([a-zA-Z-]+)(?:\^(-?\d+))?", token).groups()  # type: ignore[union-attr]
+        total += np.array(base.get(symbol, (0, 0, 0))) * int(power or 1)
+    return tuple(total)
+
+
+@ALL
+@pytest.mark.parametrize("seed", range(3))
+def test_froude_scaling(key: str, seed: int) -> None:
+    """A ship scaled by 25 in length, by the units that its parameters claim: forces 25^3, moments 25^4."""
+    scale, found = 25.0, example(key)
+
+    def factor(mass: float, length: float, time: float) -> float:
+        return float(scale ** (3 * mass + length + time / 2))
+
+    values = found.values * [factor(*_powers(unit)) for unit in found.units]
+    motion = np.array([scale**0.5] * 3 + [scale**-0.5] * 3)
+    signal = {"n": scale**-0.5, "V_w": scale**0.5, "V_c": scale**0.5, "nu": motion, "nu_r": motion}
+    drawn = random_signals(found, seed)
+    for name in VECTORS:
+        if name in drawn:
+            drawn[name][0] = abs(drawn[name][0]) + 2.0  # far above the floors of speed, which do not scale
+    scaled = {name: value * signal.get(name, 1.0) for name, value in drawn.items()}
+    expected = found.wrench(drawn) * scale ** np.array([3, 3, 3, 4, 4, 4])
+    np.testing.assert_allclose(found.wrench(scaled, values), expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())
+
+
+@ALL
+def test_lowered_equals_casadi(key: str) -> None:
+    """Values to rounding, and PyTorch's gradient against CasADi's, for a batch with rest and corners in it."""
+    found = example(key)
+    batch = [rest(found), *(random_signals(found, seed) for seed in range(20))]
+    lowered = lower(found.function)
+    signal_tensors = [
+        torch.tensor(np.stack([np.atleast_1d(drawn[name]) for drawn in batch], axis=-1)).requires_grad_()
+        for name in found.signals
+    ]
+    parameter_tensor = torch.tensor(found.values)[:, None]
+    channels = lowered.main(*signal_tensors, lowered.prologue(parameter_tensor))
+    wrench = torch.stack([torch.as_tensor(c, dtype=torch.float64).expand(len(batch)) for c in channels])
+    expected = np.stack([found.wrench(drawn) for drawn in batch], axis=-1)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(wrench.detach().numpy(), expected, rtol=1e-12, atol=1e-12 * scale)
+
+    exact = np.stack([jacobian_at(key, drawn) for drawn in batch], axis=-1)  # (6, inputs, batch)
+    for row in np.flatnonzero([c.requires_grad for c in wrench]):
+        gradients = torch.autograd.grad(wrench[row].sum(), signal_tensors, retain_graph=True, allow_unused=True)
+        pairs = zip(gradients, signal_tensors, strict=True)
+        own = np.concatenate([(torch.zeros_like(x) if g is None else g).numpy() for g, x in pairs])
+        columns = exact[row, : len(own), 1:]  # at rest kinks have no one derivative
+        np.testing.assert_allclose(own[:, 1:], columns, rtol=1e-9, atol=1e-9 * np.abs(columns).max())

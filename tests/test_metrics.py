@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from shipid import metrics
+
+
+@pytest.fixture
+def paths():
+    rng = np.random.default_rng(0)
+    true = rng.normal(size=(30, 40, 2)).cumsum(axis=0)
+    return true + rng.normal(size=true.shape), true
+
+
+def test_position_error_by_hand():
+    predicted = np.array([[[3.0, 4.0], [1.0, 1.0]]])
+    assert metrics.position_error(predicted, np.zeros((1, 2, 2))) == pytest.approx(np.array([[5.0, 2**0.5]]))
+
+
+def test_the_error_knows_no_frame(paths):
+    predicted, true = paths
+    angle = 0.7
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    shift = np.array([120.0, -40.0])
+    turned = metrics.position_error(predicted @ turn.T + shift, true @ turn.T + shift)
+    np.testing.assert_allclose(turned, metrics.position_error(predicted, true), rtol=1e-12, atol=1e-12)
+
+
+def test_summary_by_hand():
+    error = np.arange(11.0).reshape(1, 11)
+    assert metrics.summary(error) == {
+        "mean": pytest.approx(5.0),
+        "p90": pytest.approx(9.0),
+        "rms": pytest.approx(35.0**0.5),  # (0 + 1 + ... + 100) / 11 = 385 / 11
+        "status": "ok",
+        "failed_share": 0.0,
+    }
+
+
+def test_a_diverged_window_is_said_and_not_averaged_away():
+    error = np.ones((3, 8))
+    error[2, 5] = np.inf
+    error[1:, 6] = np.nan
+    result = metrics.summary(error)
+    assert result["status"] == "diverged"
+    assert result["failed_share"] == 2 / 8
+    assert np.isnan([result["mean"], result["p90"], result["rms"]]).all()
+
+
+def test_horizon_and_time_are_the_two_margins(paths):
+    error = metrics.position_error(*paths)
+    horizon = metrics.over_horizon(error)
+    assert horizon["mean"].shape == horizon["p90"].shape == (30,)
+    assert metrics.over_time(error).shape == (40,)
+    assert horizon["mean"].mean() == pytest.approx(metrics.summary(error)["mean"])
+    assert metrics.over_time(error).mean() == pytest.approx(metrics.summary(error)["mean"])
+    assert horizon["p90"][4] == pytest.approx(np.sort(error[4])[35] * 0.9 + np.sort(error[4])[36] * 0.1)
+
+
+def test_roughness_is_zero_for_straight_lines_and_known_for_a_parabola():
+    i = np.arange(30.0)[:, None]
+    line = np.stack([2.0 * i + 1.0, -3.0 * i], axis=-1)
+    parabola = np.stack([1.5 * i**2, 2.0 * i**2], axis=-1)  # second difference (3, 4)
+    assert metrics.roughness(line) == pytest.approx(0.0, abs=1e-12)
+    assert metrics.roughness(parabola) == pytest.approx(5.0)
+
+
+def test_skill_of_the_perfect_the_same_and_the_worse():
+    reference = np.full((3, 4), 2.0)
+    assert metrics.skill(np.zeros((3, 4)), reference) == 1.0
+    assert metrics.skill(reference, reference) == 0.0
+    assert metrics.skill(3.0 * reference, reference) == -2.0
+
+
+def test_shapes_that_cannot_be_meant_are_refused(paths):
+    with pytest.raises(ValueError, match="T, S, 2"):
+        metrics.position_error(paths[0][..., 0], paths[1][..., 0])
+    with pytest.raises(ValueError, match="3 steps"):
+        metrics.roughness(paths[0][:2])
+    with pytest.raises(ValueError, match="no window"):
+        metrics.summary(np.empty((30, 0)))
