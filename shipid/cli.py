@@ -310,7 +310,7 @@ def _content(results: Results) -> ReportContent:
         findings=[Finding(**finding) for finding in advise.findings(results)],  # type: ignore[arg-type]
         cells=results.cells,
         naive=frames.naive_summary(results),
-        models=results.models.rename(columns={"family": "kind"}),
+        models=results.models,
         horizon=frames.horizon_frame(results),
         over_time=frames.time_frame(results),
         commands=frames.commands_frame(results),

@@ -9,7 +9,8 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
 
@@ -118,17 +119,20 @@ def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
 
 
 def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
-    """Validate plain data by a pydantic model; the first complaint becomes one line with path, value and remedy."""
+    """Validate plain data by a pydantic model; the first complaint becomes one line with path, value and remedy.
+
+    An unknown key is told before a missing one: it is most often the same key, mistyped.
+    """
     from pydantic import ValidationError
 
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        parts = [str(part) for part in first["loc"]]
-        path = ".".join(([prefix] if prefix else []) + parts)
+        found = error.errors(include_url=False)
+        first = next((entry for entry in found if entry["type"] == "extra_forbidden"), found[0])
+        path = ".".join(filter(None, (prefix, *_place(data, first["loc"]))))
         if first["type"] == "extra_forbidden":
-            message = f"unknown key: {choices(parts[-1], _fields(model, parts[:-1]))}"
+            message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
             message = "missing"
         else:
@@ -137,18 +141,39 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         raise DocumentError(message, file=file, path=path) from None
 
 
-def _fields(model: Any, parts: list[str]) -> list[str]:
-    """Keys that a pydantic model allows at a place inside it; what cannot be followed has none."""
-    for part in parts:
-        if part.isdecimal() or not hasattr(model, "model_fields"):
+def _place(data: Any, location: tuple[int | str, ...]) -> Iterator[str]:
+    """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
+    for position, part in enumerate(location):
+        if isinstance(data, Mapping):
+            if part not in data and position < len(location) - 1:
+                continue
+            data = data.get(part)
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
             continue
-        by_key = {field.alias or name: field for name, field in model.model_fields.items()}
-        if part not in by_key:
-            return []
-        candidates = [by_key[part].annotation]
-        while candidates and not hasattr(candidates[0], "model_fields"):
-            candidates = [*get_args(candidates[0]), *candidates[1:]]
-        if not candidates:
-            return []
-        model = candidates[0]
-    return [field.alias or name for name, field in model.model_fields.items()]
+        yield str(part)
+
+
+def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
+    """Keys that a pydantic model allows at a place inside it, over all members of a union."""
+    kinds = [model]
+    for part in location:
+        inner: list[Any] = []
+        for kind in kinds:
+            if hasattr(kind, "model_fields"):
+                field = kind.model_fields.get(str(part))
+                inner += _alternatives(field.annotation) if field else []
+            elif get_args(kind):
+                inner += _alternatives(get_args(kind)[-1])
+        kinds = inner or kinds  # the name of a union member is no key
+    return [name for kind in kinds if hasattr(kind, "model_fields") for name in kind.model_fields]
+
+
+def _alternatives(annotation: Any) -> list[Any]:
+    """Members of a union, seen through Annotated and None."""
+    if get_origin(annotation) is Annotated:
+        return _alternatives(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return [leaf for member in get_args(annotation) for leaf in _alternatives(member)]
+    return [annotation]

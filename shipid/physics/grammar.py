@@ -50,16 +50,16 @@ class Monomial:
 
 def monomial(name: str, alphabet: str, axes: str = AXES) -> Monomial:
     """Read a name; ValueError says what it should look like."""
-    axis, _, body = name.rpartition("_")
-    tokens = re.fullmatch(rf"(?:[{alphabet}]|\|[{alphabet}]\|)+", body)
-    if tokens is None or (axis not in axes or len(axis) != 1 if axes else axis):
+    factor, before = rf"[{alphabet}]|\|[{alphabet}]\|", rf"([{axes}])_" if axes else "()"
+    parts = re.fullmatch(rf"{before}((?:{factor})+)", name)
+    if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
         example = "Y_v|r|" if axes else "J|y|"
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    found = re.findall(rf"[{alphabet}]|\|[{alphabet}]\|", body)
-    return Monomial(axis, tuple((token.strip("|"), token.startswith("|")) for token in found))
+    found = re.findall(factor, parts[2])
+    return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in found))
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def horizon(content: ReportContent) -> Figure | None:
         title="Error over the horizon",
         takeaway=_takeaway_horizon(content, means, counts[-1]),
         how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
-        "mean over seeds. " + _drawn(content),
+        "mean over seeds." + _drawn(content),
         alternative="Lines of the position error that grow with the time ahead, one per model with and without "
         "compensation.",
         height=420,
@@ -67,7 +67,7 @@ def over_time(content: ReportContent) -> Figure | None:
         title="Error over time",
         takeaway=_takeaway_time(means[means.N_D.isin([0, counts[-1]])]),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
-        "The commands that were given are below. "
+        "The commands that were given are below."
         + _drawn(content)
         + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
@@ -102,7 +102,7 @@ def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
 def _drawn(content: ReportContent) -> str:
     """Sentence that says which models are drawn, if not all are."""
     total, shown = content.models.model.nunique(), exemplars(content)
-    return "" if len(shown) >= total else f"Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
+    return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
 
 
 def _size_control(counts: Sequence[int]) -> Control:

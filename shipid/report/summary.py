@@ -26,7 +26,7 @@ def summary(content: ReportContent) -> str:
     ]
     for table in (tables.models(content), tables.cells(content)):
         rows = [[cell.text for cell in row] for row in table.rows]
-        parts += [f"## {table.title}", table.takeaway, _grid(table.columns, rows)]
+        parts += [f"## {table.title}", _plain(table.takeaway), _grid(table.columns, rows)]
     parts += ["## Provenance", _grid(["", ""], [[key, value] for key, value in content.provenance.items()])]
     if content.command:
         parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))

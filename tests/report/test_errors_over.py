@@ -1,0 +1,88 @@
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipid.report.errors_over import _changes, horizon, over_time
+
+
+def lines(figure, view):
+    return {trace.name: trace for trace in figure.views[view][0].figure.data}
+
+
+@pytest.mark.parametrize(("statistic", "column"), [(0, "mean"), (1, "p90")])
+@pytest.mark.parametrize(("index", "size"), [(0, 10), (2, 100)])
+def test_horizon_draws_the_rows_of_its_size(simulation, statistic, column, index, size):
+    drawn = lines(horizon(simulation), f"{statistic}-{index}")
+    frame = simulation.horizon
+    for name, model, source, count in [
+        ("moderate-2, compensated", "moderate-2", "cooperative", size),
+        ("moderate-2, physics alone", "moderate-2", "physics", 0),
+        ("no model", "no model", "cooperative", size),
+        ("constant velocity", "", "naive", 0),
+    ]:
+        rows = frame[(frame.model == model) & (frame.source == source) & frame.N_D.eq(count)]
+        # Lines are thinned to what a pixel shows, so they are compared where they have points.
+        at = np.interp(drawn[name].x, rows.ahead, rows[column])
+        np.testing.assert_allclose(drawn[name].y, at, rtol=1e-6)
+        whole = np.interp(rows.ahead, drawn[name].x, drawn[name].y)
+        assert np.abs(whole - rows[column]).max() <= np.ptp(rows[column]) / 1000
+
+
+def test_seeds_become_their_mean(full_scale):
+    one = full_scale.horizon
+    both = pd.concat([one, one.assign(seed=1, mean=3 * one["mean"])])
+    before, after = (lines(horizon(replace(full_scale, horizon=frame)), "0-0") for frame in (one, both))
+    name = "inaccurate, compensated"
+    assert after[name].y[-1] == pytest.approx(2 * before[name].y[-1])
+
+
+def test_a_close_up_of_many_models_says_which(simulation, full_scale):
+    figure = horizon(simulation)
+    assert "Of 7 models, the middle one of each family by A: nominal, moderate-2, high-2 and no model." in figure.how
+    assert "high-1, compensated" not in lines(figure, "0-0")
+    assert "middle one" not in horizon(full_scale).how
+
+
+def test_what_failed_has_no_compensated_line(full_scale):
+    names = [name for name in lines(horizon(full_scale), "0-0") if name.startswith("bare hull")]
+    assert len(names) == 1
+    assert names[0].endswith("physics alone")
+
+
+def test_takeaway_of_the_horizon(full_scale):
+    last = full_scale.horizon[full_scale.horizon.ahead == 15].set_index(["model", "source"])["mean"]
+    best = "accurate (Gunnerus, 28.9 m)"
+    expected = (
+        f"{best} is {last[best, 'cooperative']:.2f} m off on average, its physics alone {last[best, 'physics']:.2f} m"
+    )
+    assert expected in horizon(full_scale).takeaway
+
+
+def test_commands_share_the_time_axis_and_have_their_own_units(full_scale):
+    figure = over_time(full_scale)
+    plot = figure.views["0-0"][0].figure
+    titles = [plot.layout[name].title.text for name in ("yaxis", "yaxis2", "yaxis3")]
+    assert titles == ["position error [m]", "azimuth [deg]", "shaft [rpm]"]
+    domains = [plot.layout[name].domain for name in ("yaxis", "yaxis2", "yaxis3")]
+    assert domains[0][0] > domains[1][1] > domains[1][0] > domains[2][1] > domains[2][0] >= 0
+    assert {trace.xaxis for trace in plot.data} <= {None, "x"}
+    assert {chip.label for chip in figure.chips} >= {"port azimuth", "starboard shaft"}
+
+
+def test_takeaway_names_the_worst_instant(simulation):
+    frame = simulation.over_time
+    mine = frame[(frame.model == "nominal") & (frame.N_D == 100)]
+    worst = mine.loc[mine.error.idxmax()]
+    assert f"in {worst.run} at t = {worst.t:g} s: {worst.error:.2f} m" in over_time(simulation).takeaway
+
+
+@given(st.lists(st.integers(-2, 2), min_size=1, max_size=60))
+def test_kept_changes_give_the_whole_command_back(values):
+    held = np.asarray(values, dtype=float)
+    kept = _changes(held)
+    back = held[kept[np.searchsorted(kept, np.arange(len(held)), side="right") - 1]]
+    np.testing.assert_array_equal(back, held)

@@ -1,0 +1,85 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.report.figure import Figure
+from shipid.report.gain import gain
+
+
+def traces(figure: Figure, view: str) -> dict[str, list]:
+    """Traces of a view by name."""
+    found: dict[str, list] = {}
+    for trace in figure.views[view][0].figure.data:
+        found.setdefault(trace.name, []).append(trace)
+    return found
+
+
+@pytest.mark.parametrize(("view", "column", "floor"), [("0", "H", 5.01), ("1", "H_90", 11.2), ("2", "rms", 6.3)])
+def test_lines_are_means_over_seeds(simulation, view, column, floor):
+    drawn = traces(gain(simulation), view)
+    cells = simulation.cells
+    for model in cells.model.unique():
+        (line,) = drawn[model]
+        expected = [cells[(cells.model == model) & cells.N_D.eq(size)][column].mean() for size in (10, 30, 100)]
+        assert list(line.x) == [10, 30, 100]
+        np.testing.assert_allclose(line.y, expected, rtol=1e-6)
+        (points,) = drawn[f"{model}, seed"]
+        np.testing.assert_allclose(sorted(points.y), sorted(cells[cells.model == model][column]), rtol=1e-6)
+    np.testing.assert_allclose(drawn["constant velocity"][0].y, floor, rtol=1e-6)
+
+
+def test_a_failed_size_leaves_a_gap(simulation):
+    cells = simulation.cells.copy()
+    failed = (cells.model == "high-1") & (cells.N_D == 30)
+    cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[failed, "status"] = "diverged"
+    figure = gain(replace(simulation, cells=cells))
+    (line,) = traces(figure, "0")["high-1"]
+    assert list(np.isfinite(line.y)) == [True, False, True]
+    assert line.connectgaps is False
+    assert "Not plotted: high-1 at N_D = 30 (diverged)" in figure.how
+
+
+def test_takeaway_counts_what_physics_is_worth(simulation):
+    cells = simulation.cells
+    means = cells[cells.N_D == 10].groupby("model").H.mean()
+    better = (means.drop("no model") < means["no model"]).sum()
+    text = gain(simulation).takeaway
+    assert f"At N_D = 10, nominal is best with H = {means['nominal']:.2f} m" in text
+    assert f"{better} of 6 physics models beat pure data-driven ({means['no model']:.2f} m)" in text
+
+
+def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
+    drawn = {name: found[0] for name, found in traces(gain(simulation), "0").items()}
+    assert drawn["no model"].line.color == "var(--ink)"
+    assert drawn["no model"].line.width > drawn["nominal"].line.width
+    models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
+    levels = [int(drawn[name].line.color.removeprefix("var(--scale-").rstrip(")")) for name in models]
+    assert levels == sorted(levels)
+    assert levels[0] == 0
+    assert levels[-1] == 23
+
+
+def test_one_size_is_a_dumbbell(full_scale):
+    figure = gain(full_scale)
+    drawn = traces(figure, "0")
+    bar, before, after = drawn["inaccurate"]
+    np.testing.assert_allclose(bar.x, [5.2, 2.05], rtol=1e-6)
+    assert (before.x[0], after.x[0]) == pytest.approx((5.2, 2.05))
+    assert before.marker.symbol == "circle-open"
+    assert after.marker.symbol == "circle"
+    assert figure.takeaway == (
+        "accurate (Gunnerus, 28.9 m) predicts best, H = 0.94 m; compensation improves 2 of 2 physics models; "
+        "pure data-driven stands at 4.30 m; the naive floor is 5.01 m."
+    )
+
+
+def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):
+    figure = gain(full_scale)
+    plot = figure.views["0"][0].figure
+    drawn = [t for t in plot.data if t.name.startswith("bare hull")]
+    assert [np.isfinite(np.asarray(t.x)).tolist() for t in drawn] == [[True, False], [True], [False]]
+    (text,) = (a.text for a in plot.layout.annotations if "bare hull" in a.text)
+    assert "6.40 m → no result" in text
+    assert "<script>" not in text

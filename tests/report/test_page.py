@@ -1,0 +1,214 @@
+import itertools
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from shipid.errors import ResultError
+from shipid.report import ANCHORS, ReportContent, Sentence, write_report
+from shipid.report.figure import Figure
+from shipid.report.page import render, sections
+
+NASTY = "<script>alert('x')</script>"
+VOID = {"meta", "input", "br", "link", "img"}
+
+
+class Page(HTMLParser):
+    """Elements of a page: (tag, attributes, text) in the order in which they open."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None], list[str]]] = []
+        self.open: list[tuple[str, dict[str, str | None], list[str]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes), []))
+        if tag not in VOID:
+            self.open.append(self.elements[-1])
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag, f"</{tag}> closes another element"
+
+    def handle_data(self, data):
+        for element in self.open:
+            element[2].append(data)
+
+    def all(self, *tags):
+        return [(attributes, "".join(text)) for tag, attributes, text in self.elements if tag in tags]
+
+
+@pytest.fixture(scope="module")
+def pages(simulation, full_scale):
+    return {
+        content.name: (content, text, Page(text)) for content in (simulation, full_scale) for text in [render(content)]
+    }
+
+
+@pytest.fixture(params=[0, 1], ids=["simulation", "full scale"])
+def page(request, pages):
+    return list(pages.values())[request.param]
+
+
+def test_one_plotly_and_a_file_that_fits_a_mail(page):
+    _, text, parsed = page
+    assert text.count("plotly.js v") == 1
+    assert len(text.encode()) < 10_000_000
+    assert not parsed.open, "every element is closed"
+
+
+def test_nothing_is_fetched(page):
+    _, _text, parsed = page
+    for tag, attributes, _ in parsed.elements:
+        assert "src" not in attributes
+        assert "srcset" not in attributes
+        assert tag not in ("link", "iframe", "object", "img")
+        assert (attributes.get("href") or "#").startswith("#")
+        assert not any(name.startswith("on") for name in attributes)
+    (style,) = (style for _, style in parsed.all("style"))
+    assert "url(" not in style
+    assert "@import" not in style
+    policy = next(a["content"] for a, _ in parsed.all("meta") if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+
+
+def test_names_of_the_user_stay_text(page):
+    content, text, parsed = page
+    assert NASTY not in text
+    # A name that became an element would be one script more.
+    with_views = [s for s in sections(content) for i in s.items if isinstance(i, Figure) and (i.views or i.windows)]
+    assert len(parsed.all("script")) == len(with_views) + 3
+    for attributes, data in parsed.all("script"):
+        if attributes.get("type") == "application/json":
+            json.loads(data)
+            assert "<" not in data
+
+
+def test_every_model_run_and_finding_is_named(page):
+    content, _, parsed = page
+    words = " ".join(text for _, text in parsed.all("body"))
+    expected = [
+        *content.models.model,
+        *{s.run for s in content.snapshots},
+        content.title,
+        content.name,
+        content.command,
+    ]
+    expected += [part for f in content.findings for part in (f.id, f.claim, f.verdict)]
+    expected += [part for item in content.provenance.items() for part in item]
+    assert [name for name in expected if name not in words] == []
+    assert content.study_document in words
+
+
+def test_a_failed_cell_says_so(full_scale, pages):
+    _, _, parsed = pages[full_scale.name]
+    (row,) = (text for _, text in parsed.all("tr") if "diverged: 4 % of the test windows left the sea" in text)
+    assert row.split("\n")[1:4] == [f"bare hull {NASTY}", "bare", "6.40"]
+    assert row.count("–") == 3  # H, H_90, rms
+    assert any("Not plotted: bare hull" in text for _, text in parsed.all("figcaption"))
+
+
+def test_sentences_link_to_what_is_there(page):
+    _content, _, parsed = page
+    ids = [attributes["id"] for _, attributes, _ in parsed.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    assert {a["href"][1:] for a, _ in parsed.all("a")} <= set(ids)
+    answers = [text for _, text in parsed.all("li") if "Figure" in text and "With 30" in text]
+    assert len(answers) == 1
+    assert set(ANCHORS) <= set(ids)
+
+
+def test_a_link_to_a_figure_without_data_is_left_out(simulation):
+    bare = replace(simulation, horizon=simulation.horizon.iloc[:0])
+    page = Page(render(bare))
+    assert "#horizon" not in [a["href"] for a, _ in page.all("a")]
+    with pytest.raises(ValueError, match="valid: findings, gain"):
+        Sentence("Nothing.", "horizons")
+
+
+def test_structure_for_those_who_listen(page):
+    _, text, parsed = page
+    assert '<html lang="en">' in text
+    levels = [int(tag[1]) for tag, _, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in itertools.pairwise(levels)), "no heading level is skipped"
+    assert {"header", "nav", "main", "footer"} <= {tag for tag, _, _ in parsed.elements}
+    labelled = {a.get("for") for a, _ in parsed.all("label")}
+    for attributes, _ in parsed.all("select"):
+        assert attributes["id"] in labelled
+    for attributes, _ in parsed.all("input"):
+        assert attributes["type"] == "radio" or attributes["id"] in labelled
+    assert all(a.get("scope") in ("col", "row") for a, _ in parsed.all("th"))
+    plots = [a for a, _ in parsed.all("div") if a.get("class") == "plot"]
+    assert plots
+    assert all(a["role"] == "img" and len(a["aria-label"]) > 40 for a in plots)
+
+
+def test_every_figure_speaks(content):
+    for section in sections(content):
+        for item in section.items:
+            if isinstance(item, Figure):
+                assert re.search(r"\d.*\.$", item.takeaway), item.id
+                assert re.fullmatch(r"(\S+ )+\S+\.", item.how), item.id
+
+
+def test_axes_have_units(content):
+    seen = 0
+    for section in sections(content):
+        for item in section.items:
+            for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
+                for name, axis in panel.figure.layout.to_plotly_json().items():
+                    if re.fullmatch(r"[xy]axis\d*", name):
+                        named = axis.get("ticktext") or axis.get("showticklabels") is False
+                        assert named or re.search(r"\S \[[^\]]+\]$", axis["title"]["text"]), (item.id, name)
+                        seen += 1
+    assert seen > 20
+
+
+def test_a_line_of_a_model_has_its_colour_everywhere(content):
+    found: dict[str, set[str]] = {}
+    for section in sections(content):
+        for item in section.items:
+            for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
+                for trace in panel.figure.data:
+                    for key in trace.meta or []:
+                        if key.startswith("model:"):
+                            found.setdefault(key, set()).add(trace.line.color or trace.marker.color)
+            for chip in getattr(item, "chips", ()):
+                if chip.key.startswith("model:"):
+                    found.setdefault(chip.key, set()).add(chip.colour)
+    assert len(found) >= 4
+    assert {key: colours for key, colours in found.items() if len(colours) > 1} == {}
+
+
+def test_views_exist_for_every_choice(content):
+    for section in sections(content):
+        for item in section.items:
+            if isinstance(item, Figure) and item.views and item.controls:
+                shape = [len(control.options) for control in item.controls]
+                assert set(item.views) == {"-".join(map(str, index)) for index in np.ndindex(*shape)}
+
+
+def test_it_stands_on_cells_alone(full_scale):
+    content = ReportContent("Question?", "bare", [], [], full_scale.cells, full_scale.naive, full_scale.models)
+    page = Page(render(content))
+    assert [a["id"] for a, _ in page.all("figure")] == ["gain"]
+
+
+def test_it_stands_when_every_cell_failed(content):
+    cells = content.cells.assign(H=np.nan, H_90=np.nan, rms=np.nan, status="failed", sentence="no memory left")
+    text = render(replace(content, cells=cells))
+    assert "No cell gave a result." in text
+    assert "failed: no memory left" in text
+
+
+def test_write_report(tmp_path, full_scale):
+    file = write_report(full_scale, tmp_path / "new" / "report.html")
+    assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
+    with pytest.raises(ResultError, match="cannot be written"):
+        write_report(full_scale, file / "report.html")

@@ -1,0 +1,76 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.report.paths import browser, snapshots, window_data
+
+
+def test_windows_hold_truth_and_paths_to_the_centimetre(full_scale):
+    data = window_data(full_scale)
+    json.dumps(data, allow_nan=False)
+    (run,) = data["runs"]
+    by_time = {snapshot.t: snapshot for snapshot in full_scale.snapshots}
+    for window in run:
+        source = by_time[window["t"]]
+        np.testing.assert_allclose(np.transpose(window["truth"]), source.truth, atol=0.0051)
+        assert len(window["paths"]) == len(source.paths)
+        for line, size, x, y, end in window["paths"]:
+            name = data["lines"][line]["name"]
+            key = next(k for k in source.paths if name.startswith(k[0]) and (size == 0) == (k[1] == "cooperative"))
+            np.testing.assert_allclose(np.column_stack([x, y]), source.paths[key], atol=0.0051)
+            assert end == pytest.approx(np.hypot(*(source.paths[key] - source.truth)[-1]), abs=0.0051)
+
+
+def test_axes_are_equal_and_in_metres(content):
+    layout = window_data(content)["layout"]
+    assert layout["xaxis"]["scaleanchor"] == "y"
+    assert layout["xaxis"]["scaleratio"] == 1
+    assert [layout[axis]["title"]["text"] for axis in ("xaxis", "yaxis")] == ["y, to starboard [m]", "x, ahead [m]"]
+
+
+def test_many_instants_are_spread_with_both_ends(full_scale):
+    (run,) = window_data(full_scale)["runs"]
+    times = [window["t"] for window in run]
+    assert len(times) == 120
+    assert times == sorted(set(times))
+    assert (times[0], times[-1]) == (4150, 4329)
+
+
+def test_a_diverged_path_becomes_gaps(full_scale):
+    first = full_scale.snapshots[0]
+    paths = {key: np.where(np.arange(16)[:, None] > 7, np.inf, path) for key, path in first.paths.items()}
+    text = json.dumps(window_data(replace(full_scale, snapshots=[replace(first, paths=paths)])), allow_nan=False)
+    assert "null" in text
+    assert snapshots(replace(full_scale, snapshots=[replace(first, paths=paths)])) is not None
+
+
+def test_sizes_are_small_middle_large_of_one_window(simulation):
+    figure = snapshots(simulation)
+    assert [window.size for window in figure.windows] == [0, 1, 2]
+    assert len({(window.run, window.instant) for window in figure.windows}) == 1
+    assert [window.caption.rsplit(", ")[-1] for window in figure.windows] == ["N_D = 10", "N_D = 30", "N_D = 100"]
+
+
+def test_one_size_gives_three_instants_of_one_run(full_scale):
+    figure = snapshots(full_scale)
+    times = [float(window.caption.split("t = ")[1].split()[0]) for window in figure.windows]
+    np.testing.assert_allclose(times, 4150 + 179 * np.array([1, 3, 5]) / 6, atol=2)
+
+
+def test_takeaway_is_the_mean_end_error(full_scale):
+    ends = {"cooperative": [], "physics": []}
+    for snapshot in full_scale.snapshots:
+        for (model, source, _), path in snapshot.paths.items():
+            if model != "no model":
+                ends[source].append(np.linalg.norm(path[-1] - snapshot.truth[-1]))
+    text = browser(full_scale).takeaway
+    assert f"compensated paths by {np.mean(ends['cooperative']):.2f} m" in text
+    assert f"physics alone by {np.mean(ends['physics']):.1f} m" in text
+
+
+def test_no_windows_no_browser(full_scale):
+    empty = replace(full_scale, snapshots=[])
+    assert browser(empty) is None
+    assert snapshots(empty) is None

@@ -1,0 +1,20 @@
+from shipid.report import write_summary
+from shipid.report.summary import summary
+
+
+def test_summary_holds_answer_numbers_and_provenance(tmp_path, full_scale):
+    text = write_summary(full_scale, tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert text.startswith("# How much does the cooperative model gain")
+    for part in ("0.94", "2.05", "4.30", "mean 5.01 m", "90th percentile 11.2 m", "09f6a2c1d4e5b7a8", "| R2 |"):
+        assert part in text
+    assert "diverged: 4 % of the test windows left the sea" in text
+    assert "    shipid study run simulation" in text
+
+
+def test_names_are_text_and_rows_stay_rows(full_scale):
+    text = summary(full_scale)
+    assert "<script>" not in text
+    tables = [line for line in text.splitlines() if line.startswith("|")]
+    row = next(line for line in tables if "diverged" in line)
+    header = next(line for line in tables if line.startswith("| model | family | A [m] | N_D"))
+    assert row.count("|") == header.count("|")

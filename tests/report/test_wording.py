@@ -1,0 +1,32 @@
+import math
+
+from shipid.report.wording import bound, counted, distance, listed, metres, number
+
+
+def test_three_digits():
+    assert [number(x) for x in (0.834, 9.994, 9.996, 12.44, 99.96, 131.4)] == [
+        "0.83",
+        "9.99",
+        "10.0",
+        "12.4",
+        "100",
+        "131",
+    ]
+    assert number(-1.5) == "−1.50"
+    assert number(math.nan) == number(math.inf) == "–"
+    assert metres(0.5) == "0.50 m"
+    assert distance(963.2) == "963 m"
+    assert distance(1240) == "1.2 km"
+
+
+def test_lists():
+    assert listed([]) == "none"
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b"]) == "a and b"
+    assert listed(list("abcdef")) == "a, b, c and 3 more"
+    assert counted(1, "run") == "1 run"
+    assert counted(2412, "sample") == "2,412 samples"
+
+
+def test_units_stay_with_their_numbers():
+    assert bound("H = 0.94 m, 5 models") == "H\u00a0=\u00a00.94\u00a0m, 5 models"

@@ -1,0 +1,108 @@
+"""Broken vessel documents: one line each, with the file, the dotted path and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.vessel.load import load_vessel
+
+FOLDER = Path(__file__).parents[1] / "bad" / "vessels"
+
+#: file -> dotted path that must be named, and a piece of the remedy
+BROKEN = {
+    "broken-syntax": ("", "not valid TOML"),
+    "duplicate-key": ("", "overwrite"),
+    "unknown-top-level-key": ("speed", "valid: added_mass"),
+    "typo-in-block": ("hull.derivativs", "did you mean 'derivatives'?"),
+    "typo-in-thruster": ("thruster.stern.F2", "did you mean 'F_2'?"),
+    "missing-mass": ("inertia.m", "missing"),
+    "negative-mass": ("inertia.m", "-1000.0: Input should be greater than 0"),
+    "zero-length": ("wind.L_oa", "greater than 0"),
+    "text-for-number": ("inertia.I_z", "'2000': Input should be a valid number"),
+    "truth-for-number": ("inertia.I_z", "valid number"),
+    "not-a-number": ("inertia.x_G", "finite"),
+    "infinite": ("inertia.I_z", "finite"),
+    "unknown-derivative": ("hull.derivatives", "factors of u, v, w, p, q, r"),
+    "duplicate-monomial": ("hull.derivatives", "'Y_rv' and 'Y_vr' name the same monomial: keep one"),
+    "duplicate-modulus": ("hull.derivatives", "'Y_|v|v' and 'Y_v|v|' name the same monomial: keep one"),
+    "added-mass-in-hull": ("hull.derivatives", "it belongs in [added_mass]"),
+    "hull-name-in-added-mass": ("added_mass", "write it like 'X_udot'"),
+    "added-mass-with-wrong-sign": ("inertia", "X_udot < 0"),
+    "unknown-thruster-kind": ("thruster.stern.kind", "did you mean 'tunnel'?"),
+    "missing-kind": ("thruster.stern.kind", "valid: azimuth, tunnel"),
+    "unequal-wind-columns": ("wind", "gamma_deg 3, C_X 3, C_Y 4, C_N 3"),
+    "wind-angles-not-rising": ("wind.gamma_deg", "must rise"),
+    "wind-table-of-one": ("wind.gamma_deg", "at least 2"),
+    "missing-rho": ("constants.rho", "a term needs rho"),
+    "no-strips": ("hull.crossflow.strips", "greater than or equal to 1"),
+    "half-a-strip": ("hull.crossflow.strips", "valid integer"),
+    "five-degrees-of-freedom": ("dof", "3, 4 or 6"),
+    "six-degrees-without-inertia": ("inertia", "need I_x"),
+    "two-components-of-one-name": ("thruster.wind", "choose another"),
+    "dot-in-a-name": ("thruster", "use letters, digits, _ and -"),
+    "thruster-is-a-number": ("thruster.stern", "must be a table with a `kind`"),
+    "off-is-a-word": ("thruster.stern.off", "valid boolean"),
+    "unknown-actuator": ("thruster.stern.actuator.n.kind", "'first_order'"),
+    "actuator-of-no-command": ("thruster.stern.actuator.alpha", "valid: n"),
+    "current-without-kind": ("current.kind", "missing"),
+    "empty": ("name", "missing"),
+    "not-utf-8": ("", "save it as UTF-8"),
+    "patch-with-unknown-path": ("set.inertia.mass", "no such parameter: "),
+    "patch-with-wrong-digest": ("base_digest", "make the patch anew"),
+    "patch-with-missing-base": ("base", "'./gone.toml': no such file"),
+    "patch-with-unknown-base": ("base", "did you mean 'gunnerus-28.9'?"),
+    "patch-of-itself": ("base", "name a vessel"),
+    "patch-with-unknown-key": ("sets", "did you mean 'set'?"),
+    "patch-with-nested-values": ("set.inertia", "valid number"),
+    "patch-that-breaks-the-base": ("inertia.m", "greater than 0"),
+}
+
+
+def test_every_document_of_the_folder_is_tested() -> None:
+    assert {file.stem for file in FOLDER.glob("*.toml")} == {"plain", *BROKEN}
+
+
+def test_the_plain_one_is_in_order() -> None:
+    """What the broken ones differ from loads, so that their flaw is the one that is meant."""
+    assert load_vessel(str(FOLDER / "plain.toml")).parameters["inertia.m"] == 1000.0
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken(name: str) -> None:
+    path, remedy = BROKEN[name]
+    with pytest.raises(DocumentError) as caught:
+        load_vessel(str(FOLDER / f"{name}.toml"))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(str(FOLDER / f"{name}.toml") + ": ")
+    assert (caught.value.path or "") == path
+    assert remedy in line
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    for name in (str(tmp_path / "gone.toml"), str(tmp_path)):
+        with pytest.raises(DocumentError, match="no such file") as caught:
+            load_vessel(name)
+        assert name in str(caught.value)
+    folder = tmp_path / "folder.toml"
+    folder.mkdir()
+    with pytest.raises(DocumentError, match="no such file"):
+        load_vessel(str(folder))
+
+
+def test_unknown_name_is_corrected() -> None:
+    with pytest.raises(DocumentError, match="did you mean 'gunnerus-28.9'"):
+        load_vessel("gunnerus-28")
+
+
+def test_fault_in_the_base_names_the_base(tmp_path: Path) -> None:
+    """A patch on a broken vessel is not the one to mend."""
+    broken = FOLDER / "missing-mass.toml"
+    patch = tmp_path / "patch.toml"
+    patch.write_text(f'base = "{broken.as_posix()}"\n[set]\n"inertia.m" = 2.0\n')
+    with pytest.raises(DocumentError, match="missing") as caught:
+        load_vessel(str(patch))
+    assert caught.value.file == str(broken)

@@ -1,0 +1,173 @@
+"""Assembled equations of every vessel: laws of the whole, and numbers computed apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.physics.inertia import added_mass, rigid_body
+from shipid.vessel import dynamics as module
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
+
+
+def values(vessel: Vessel) -> np.ndarray:
+    return np.array(list(vessel.parameters.values()))
+
+
+def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
+    """d(state)/dt by name; what is not given is zero; actuators have reached their commands."""
+    model = dynamics(vessel)
+    groups = [[given.get(name.replace(".", "_"), 0.0) for name in names] for names in (model.state, model.memory)]
+    groups += [[given.get(name.replace(".", "_"), 0.0) for name in names] for names in (model.commands, model.environment)]
+    force = np.zeros(model.num_dof) if tau is None else np.asarray(tau, dtype=float)
+    for term in model.sums:
+        mapped = [np.tile(np.array(group, ndmin=2).T, (1, len(term.arrays))) for group in [*groups, values(vessel)]]
+        force = force + np.array(term.function.map(len(term.arrays))(*mapped, term.arrays.T)).sum(axis=1)
+    found = np.array(model.rates(*groups, values(vessel), force)).ravel()
+    return dict(zip(model.state, found, strict=True))
+
+
+def mass_matrix(vessel: Vessel) -> np.ndarray:
+    inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
+    added = {k: v for k, v in vessel.document["added_mass"].items() if k != "source"}
+    M = np.array(ca.evalf(ca.densify(rigid_body(**inertia) + added_mass(**added))))
+    return M[np.ix_(vessel.axes, vessel.axes)]
+
+
+def test_mass_is_positive_definite(vessel: Vessel) -> None:
+    M = mass_matrix(vessel)
+    assert np.linalg.eigvalsh((M + M.T) / 2)[0] > 0
+
+
+def test_extra_force_at_rest_is_force_over_mass(vessel: Vessel) -> None:
+    tau = np.array([1e4, -2e4, 3e5] if len(vessel.axes) == 3 else [1e4, -2e4, *[1e4] * (len(vessel.axes) - 3), 3e5])
+    without, found = rates(vessel), rates(vessel, tau)
+    names = [name for name in dynamics(vessel).state[len(vessel.axes) :]]
+    difference = np.array([found[name] - without[name] for name in names])
+    np.testing.assert_allclose(difference, np.linalg.solve(mass_matrix(vessel), tau), rtol=1e-9, atol=1e-12)
+
+
+def test_rest_stays_rest(vessel: Vessel) -> None:
+    assert max(abs(rate) for rate in rates(vessel).values()) < 1e-6
+
+
+def test_planar_equations_by_hand() -> None:
+    """Set A with its rudderless hull only, section 3 of the parameters' source, re-computed in NumPy."""
+    vessel = load_vessel("gunnerus-28.9").with_values(
+        {"wind.off": True, "thruster.port.off": True, "thruster.starboard.off": True, "inertia.x_G": -0.7}
+    )
+    u, v, r, psi = 4.0, -0.5, 0.06, 0.4
+    d = vessel.document["hull"]["derivatives"]
+    motion = {"u": u, "v": v, "r": r}
+
+    def force(axis: str) -> float:
+        total = 0.0
+        for name, value in d.items():
+            if name.startswith(f"{axis}_"):
+                pieces = name[2:].split("|")  # every second piece stands between bars
+                bare, modulus = "".join(pieces[::2]), "".join(pieces[1::2])
+                total += value * np.prod([motion[s] for s in bare]) * np.prod([abs(motion[s]) for s in modulus])
+        return total
+
+    a = vessel.document["added_mass"]
+    m, x_G, I_z = 410931.81, -0.7, 21450896.0
+    M_RB = np.array([[m, 0, 0], [0, m, m * x_G], [0, m * x_G, I_z]])
+    M_A = -np.array([[a["X_udot"], 0, 0], [0, a["Y_vdot"], a["Y_rdot"]], [0, a["N_vdot"], a["N_rdot"]]])
+
+    def coriolis(M: np.ndarray) -> np.ndarray:
+        sway = M[1, 1] * v + (M[1, 2] + M[2, 1]) / 2 * r
+        return np.array([-sway * r, M[0, 0] * u * r, sway * u - M[0, 0] * u * v])
+
+    hull = np.array([force(axis) for axis in "XYN"])
+    expected = np.linalg.solve(M_RB + M_A, hull - coriolis(M_RB) - coriolis(M_A))
+    found = rates(vessel, u=u, v=v, r=r, psi=psi)
+    np.testing.assert_allclose([found["u"], found["v"], found["r"]], expected, rtol=1e-11)
+    np.testing.assert_allclose(
+        [found["north"], found["east"], found["psi"]],
+        [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r],
+    )
+
+
+def test_a_current_carries_the_ship_along() -> None:
+    """Drifting with a steady current, straight and unpowered: no relative motion, so no force (Galilei)."""
+    vessel = load_vessel("gunnerus-28.9").with_values(
+        {"current.kind": "uniform", "wind.off": True, "thruster.port.off": True, "thruster.starboard.off": True}
+    )
+    V_c, beta_c, psi = 0.9, 2.0, 0.5
+    u, v = V_c * np.cos(beta_c - psi), V_c * np.sin(beta_c - psi)
+    found = rates(vessel, u=u, v=v, psi=psi, V_c=V_c, beta_c=beta_c)
+    np.testing.assert_allclose([found["u"], found["v"], found["r"]], 0, atol=1e-15)
+    turning = rates(vessel, u=u + 3.0, v=v, r=0.05, psi=psi, V_c=V_c, beta_c=beta_c)
+    still = rates(vessel, u=3.0, v=0.0, r=0.05, psi=psi)
+    carried = np.array([0.05 * v, -0.05 * u])  # velocities in turning axes: nu_dot = nu_r_dot + d(nu_c)/dt
+    np.testing.assert_allclose([turning["u"] - still["u"], turning["v"] - still["v"]], carried, rtol=1e-9)
+    assert turning["r"] == pytest.approx(still["r"], rel=1e-9)
+
+
+def test_commands_and_environment_are_what_the_terms_ask_for() -> None:
+    base = load_vessel("gunnerus-28.9")
+    model = dynamics(base)
+    assert model.commands == ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
+    assert model.environment == ("V_w", "beta_w")
+    assert dynamics(base.with_values({"wind.off": True})).environment == ()
+    assert dynamics(base.with_values({"current.kind": "uniform"})).environment == ("V_w", "beta_w", "V_c", "beta_c")
+    assert dynamics(base.with_values({"thruster.bow.off": False})).commands[-1] == "bow.n"
+
+
+def test_switching_the_wind_off_takes_its_force_away() -> None:
+    vessel = load_vessel("gunnerus-28.9")
+    calm = rates(vessel, u=3.0, psi=0.2, V_w=0.0)
+    off = rates(vessel.with_values({"wind.off": True}), u=3.0, psi=0.2)
+    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of her own speed
+    assert calm["u"] - off["u"] == pytest.approx(-headwind, rel=1e-9)
+
+
+def test_vessels_of_one_structure_share_one_compilation() -> None:
+    base = load_vessel("gunnerus-28.9")
+    assert dynamics(base) is dynamics(base.with_values({"inertia.m": 5e5, "wind.C_X.3": 0.1}))
+    assert dynamics(base) is not dynamics(base.with_values({"wind.off": True}))
+
+
+def test_the_order_of_keys_does_not_mix_up_numbers() -> None:
+    """The same document with its derivatives upside down: other input vector, same equations."""
+    base = load_vessel("gunnerus-28.9")
+    document = {**base.document, "hull": {"derivatives": dict(reversed(base.document["hull"]["derivatives"].items()))}}
+    turned = check_vessel(document, "turned.toml")
+    assert list(turned.parameters) != list(base.parameters)
+    given = {"u": 4.0, "v": 0.4, "r": -0.05, "port_n": 2.0, "starboard_n": 2.0}
+    for name, value in rates(base, **given).items():
+        assert rates(turned, **given)[name] == pytest.approx(value, rel=1e-12)
+
+
+def test_written_out_sum_equals_mapped_sum(monkeypatch: pytest.MonkeyPatch) -> None:
+    vessel = load_vessel("gunnerus-33.9").with_values({"hull.crossflow.strips": 30})
+    given = {"u": 3.0, "v": 0.6, "r": 0.07, "port_n": 2.0}
+    written_out = rates(vessel, **given)
+    assert not dynamics(vessel).sums
+    monkeypatch.setattr(module, "_compiled", {})
+    monkeypatch.setattr(module, "UNROLL_UP_TO", 10)
+    assert len(dynamics(vessel).sums) == 1
+    for name, value in rates(vessel, **given).items():
+        assert value == pytest.approx(written_out[name], rel=1e-12)
+
+
+def test_actuator_memory_stands_for_the_command(draw_inputs: Callable[..., Mapping[str, Any]]) -> None:
+    base = load_vessel("gunnerus-28.9")
+    lag = {"kind": "first_order", "T": 1.0, "rate": 0.17}
+    lagged = base.with_values({"thruster.port.actuator.n": lag})
+    model = dynamics(lagged)
+    assert model.memory == {"port.n": "rev/s"}
+    drawn = draw_inputs(base, 1)
+    state, commands = ([float(x[0]) for x in drawn[group].values()] for group in ("start", "commands"))
+    environment = [float(x[0]) for x in drawn["environment"].values()]
+    direct = dynamics(base).rates(state, [], commands, environment, values(base), np.zeros(3))
+    ordered_otherwise = [99.0, *commands[1:]]
+    through = model.rates(state, commands[:1], ordered_otherwise, environment, values(lagged), np.zeros(3))
+    np.testing.assert_allclose(np.array(through), np.array(direct), rtol=1e-14)
+    after = float(model.advance(state, [1.0], [1.1, 0, 0, 0], environment, values(lagged), 0.5))
+    assert after == pytest.approx(1.1 + (1.0 - 1.1) * np.exp(-0.5))
