@@ -15,7 +15,7 @@ from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, listed, metres
 
 ROW = 46  # height of a model in the dumbbell figure [px]
-LONGEST = 24  # characters of a name that fit beside its numbers on a phone
+LONGEST = 28  # characters of a name that fit beside its numbers on a phone
 
 
 class Statistic(NamedTuple):
@@ -207,6 +207,7 @@ def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
         "y": row,
         "yshift": 17,
         "showarrow": False,
+        "font": {"size": 12},
         "text": f"<b>{label(short)}</b>  {numbers}",
     }
 

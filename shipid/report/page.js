@@ -163,6 +163,10 @@
 
   const repaint = () => redraws.forEach((redraw) => redraw());
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
-  addEventListener("beforeprint", () => { root.dataset.theme = "light"; repaint(); });
+  addEventListener("beforeprint", () => {
+    root.dataset.theme = "light";
+    for (const details of document.querySelectorAll("details")) details.open = true;
+    repaint();
+  });
   addEventListener("afterprint", () => { delete root.dataset.theme; repaint(); });
 })();

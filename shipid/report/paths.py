@@ -1,10 +1,11 @@
 """Look at predictions: a window browser, and three windows side by side.
 
-The page holds every window once, as numbers in centimetres' precision, and draws it itself (page.js).
+The page holds every window once, as finely as a pixel can show, and draws it itself (page.js).
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,12 @@ from shipid.report.content import Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
 from shipid.report.figure import Chip, Control, Figure, FixedWindow, plane
 from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
-from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread
+from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread, thinned
 from shipid.report.wording import counted, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
+MOST_WINDOWS = 600  # in all: with six models at three N_D this is about 3 MB of the page
+PIXELS = 1000  # a window is drawn about half as large
 HOW = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
     "where the ship truly was at the end. The pale band is the true path. "
@@ -25,14 +28,14 @@ HOW = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
-    """Test run -> its windows by rising time, at most `FEW_RUNS` runs of `MOST_INSTANTS` windows."""
+    """Sort windows by test run and time and thin them: `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` in all."""
     by_run: dict[str, list[Snapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
-    result = {}
+    result, most = {}, min(MOST_INSTANTS, MOST_WINDOWS // max(1, min(FEW_RUNS, len(by_run))))
     for run in spread(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
-        chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), MOST_INSTANTS)).round().astype(int)
+        chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), most)).round().astype(int)
         result[run] = [ordered[i] for i in chosen]
     return result
 
@@ -100,10 +103,11 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`; `line` is an index into `lines`, `size` into the N_D offered or -1
-    for what holds at every N_D. Lengths are metres to the centimetre, angles radians.
+    for what holds at every N_D. Lengths are metres, angles radians.
     """
     runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
     lines: dict[tuple[str, str], int] = {}
+    detail = _detail([window for windows in runs.values() for window in windows])
     packed: dict[str, list[dict[str, Any]]] = {}
     for run, windows in runs.items():
         packed[run] = []
@@ -114,16 +118,16 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                     continue
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
-                paths.append([which, at, *_rounded(points), _rounded_value(_end_error(window, points))])
+                paths.append([which, at, *_drawable(points, detail), _rounded(_end_error(window, points), 0.001)])
             wind = None if window.wind is None else [round(value, 3) for value in window.wind]
             packed[run].append(
-                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _rounded(window.truth)}
+                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _drawable(window.truth, detail)}
                 | {"paths": paths}
             )
     first = next(iter(runs.values()))[0] if runs else None
     return {
         "runs": list(packed.values()),
-        "outline": _rounded(first.outline) if first else [[], []],
+        "outline": _drawable(first.outline, 0.0) if first else [[], []],
         "lines": [_line(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
         "layout": plane("y, to starboard [m]", "x, ahead [m]"),
@@ -147,13 +151,24 @@ def _chips(content: ReportContent) -> list[Chip]:
     return [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
 
 
-def _rounded(points: Floats) -> list[list[float | None]]:
-    """(n, 2) -> [x, y], each a list rounded to the centimetre; a path that diverged has gaps."""
-    return [[_rounded_value(value) for value in column] for column in np.asarray(points).T]
+def _detail(windows: list[Snapshot]) -> float:
+    """Half of what a pixel shows of a usual window [m]: a ship, or what it covers over the horizon."""
+    extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
+    return float(np.median(extents)) / PIXELS if extents else 0.0
 
 
-def _rounded_value(value: float) -> float | None:
-    return round(float(value), 2) if np.isfinite(value) else None
+def _drawable(points: Floats, detail: float) -> list[list[float | None]]:
+    """Reduce a path (n, 2) to [x, y] of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
+    path = np.asarray(points, dtype=float)
+    if detail > 0 and np.isfinite(path).all():
+        path = path[thinned(path, detail)]
+    return [[_rounded(value, detail) for value in column] for column in path.T]
+
+
+def _rounded(value: float, detail: float) -> float | None:
+    """Round to as many decimals as `detail` needs (to the millimetre where it is 0); None for what is not finite."""
+    decimals = max(0, math.ceil(-math.log10(detail or 0.001)))
+    return round(float(value), decimals) if math.isfinite(value) else None
 
 
 def _end_error(window: Snapshot, points: Floats) -> float:

@@ -83,8 +83,8 @@ def thinned(points: Floats, tolerance: float) -> Indices:
         along = points[last] - points[first]
         inner = points[first + 1 : last] - points[first]
         # Distance from the segment, not from its line: a track may come back to where it began.
-        share = np.clip(inner @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        away = np.linalg.norm(inner - share[:, None] * along, axis=1)
+        share = np.minimum(np.maximum(inner @ along / max(float(along @ along), 1e-12), 0.0), 1.0)
+        away = np.hypot(inner[:, 0] - share * along[0], inner[:, 1] - share * along[1])
         worst = int(np.argmax(away))
         if away[worst] > tolerance:
             middle = first + 1 + worst

@@ -261,7 +261,7 @@ def _run_casadi(
 
     def over_time(held: Array) -> Array:  # (T, C, S) -> (C, S * num_steps), a sample's steps side by side
         full = np.broadcast_to(held, (num_steps, *held.shape[1:]))
-        return full.transpose(1, 2, 0).reshape(held.shape[1], -1)
+        return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
 
     inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
     mapped = scan.map(num_samples, "thread", min(2, num_samples))

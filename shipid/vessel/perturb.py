@@ -156,6 +156,7 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
         times.update({key: times.get(key, -1) + 1 for key in keys.values()})
         for path, key in keys.items():
             values[path] = values.get(path, original[path]) * _factor(block, family, member, key, times[key], counter)
+    _check(family, member, base, values, file)
     factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
     name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
     return Variant(
@@ -166,6 +167,15 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
 def members(family: Family, base: Vessel, file: str | Path | None = None) -> list[Variant]:
     """All members of a resolved family, none redrawn."""
     return [draw(family, member, base, file=file) for member in range(family.members)]
+
+
+def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float], file: str | Path | None) -> None:
+    """Refuse a member that is no vessel, such as one of negative mass."""
+    try:
+        base.with_values(values)
+    except DocumentError as error:
+        message = f"member {member + 1} would be no vessel: {error.path}: {error.message}"
+        raise DocumentError(message, file=file, path=f"family {family.name!r}") from None
 
 
 def _factor(block: Perturbation, family: Family, member: int, key: str, times: int, counter: int) -> float:

@@ -164,3 +164,14 @@ def test_a_diverged_member_harms_nobody(problem):
     assert np.isnan(bad.loss[1])
     np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
     assert all(np.isfinite(weight).all() for layers in bad.layers for pair in layers for weight in pair)
+
+
+def test_who_has_stopped_does_not_start_again():
+    weights = torch.zeros(2, 3)
+    watch = training._Watch(weights, patience=2)
+    for epoch, losses in enumerate([[3.0, 9.0], [4.0, 8.0], [5.0, 7.0], [1.0, 6.0]], start=1):
+        weights.fill_(epoch)
+        watch.compare(torch.zeros(2), torch.tensor(losses))
+    assert watch.best.tolist() == [3.0, 6.0]
+    assert watch.kept[:, 0].tolist() == [1.0, 4.0]
+    assert watch.epochs.tolist() == [3, 4]

@@ -63,7 +63,9 @@ def test_different_monomials_may_stand_together(names: list[str]) -> None:
     DERIVATIVES.check(names)
 
 
-@pytest.mark.parametrize("name", ["", "Y", "Y_", "Q_uv", "Y_ux", "Yuv", "Y_u|v", "Y_u||", "XY_u", "y_v", "Y_v2", "Y_u v"])
+@pytest.mark.parametrize(
+    "name", ["", "Y", "Y_", "Q_uv", "Y_ux", "Yuv", "Y_u|v", "Y_u||", "XY_u", "y_v", "Y_v2", "Y_u v"]
+)
 def test_what_is_no_derivative_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match="not a coefficient"):
         derivative(name)

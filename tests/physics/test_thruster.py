@@ -91,7 +91,9 @@ def test_continuations_join_the_polynomial(entry: str, values: tuple[float, floa
         wrenches = []
         for step in (-1e-7, 1e-7):
             speed = (value + step) * n * D_p
-            wrenches.append(numbers(azimuth()([speed, 0, 0, 0, 0, 0] if entry == "J" else [1, speed, 0, 0, 0, 0], n, 0)))
+            wrenches.append(
+                numbers(azimuth()([speed, 0, 0, 0, 0, 0] if entry == "J" else [1, speed, 0, 0, 0, 0], n, 0))
+            )
         np.testing.assert_allclose(wrenches[0], wrenches[1], atol=0.2)
 
 

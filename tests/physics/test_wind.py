@@ -55,7 +55,9 @@ def test_relative_wind_follows_the_method() -> None:
 
 def test_a_ship_drifting_with_the_wind_feels_none() -> None:
     drifting = ca.SX(ca.DM([2.0, 0, 0, 0, 0, 0]))
-    assert numbers(wind.table(drifting, ca.SX(0.3), ca.SX(2.0), ca.SX(0.3), **parameters("gunnerus-28.9", 1.23)))[0] == 0
+    assert (
+        numbers(wind.table(drifting, ca.SX(0.3), ca.SX(2.0), ca.SX(0.3), **parameters("gunnerus-28.9", 1.23)))[0] == 0
+    )
 
 
 def test_interpolation_is_piecewise_linear_and_flat_beyond() -> None:

@@ -6,7 +6,7 @@ import pandas as pd
 from shipid.report.logs import _takeaway, envelope, manoeuvres
 
 
-def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content):
+def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
     figure = manoeuvres(content)
     plot = figure.views[""][0].figure
     assert plot.layout.xaxis.scaleanchor == "y"
@@ -17,11 +17,7 @@ def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content):
         mine = content.tracks[content.tracks.run == run][["east", "north"]].to_numpy()
         kept = np.column_stack([trace.x, trace.y])
         assert len(kept) < len(mine)
-        start, along = kept[:-1], np.diff(kept, axis=0)
-        offset = mine[:, None] - start
-        share = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0, 1)
-        away = np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
-        assert away.max() < extent / 1500
+        assert away(mine, kept).max() < extent / 1500
 
 
 def test_the_test_lies_on_top_in_its_own_colour(simulation):

@@ -23,7 +23,9 @@ def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
     """d(state)/dt by name; what is not given is zero; actuators have reached their commands."""
     model = dynamics(vessel)
     groups = [[given.get(name.replace(".", "_"), 0.0) for name in names] for names in (model.state, model.memory)]
-    groups += [[given.get(name.replace(".", "_"), 0.0) for name in names] for names in (model.commands, model.environment)]
+    groups += [
+        [given.get(name.replace(".", "_"), 0.0) for name in names] for names in (model.commands, model.environment)
+    ]
     force = np.zeros(model.num_dof) if tau is None else np.asarray(tau, dtype=float)
     for term in model.sums:
         mapped = [np.tile(np.array(group, ndmin=2).T, (1, len(term.arrays))) for group in [*groups, values(vessel)]]

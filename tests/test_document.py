@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field
+
+from shipid import document as documents
+from shipid.errors import DocumentError
+
+NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
+
+
+def test_leaves_have_dotted_paths() -> None:
+    assert list(documents.leaves(NESTED)) == [("a.b", 1), ("a.c.0", 10), ("a.c.1.d", 2), ("e", "x")]
+
+
+def test_every_leaf_is_got_by_its_path() -> None:
+    for path, value in documents.leaves(NESTED):
+        assert documents.get(NESTED, path) == value
+
+
+@pytest.mark.parametrize(("path", "part"), [("a.x", "x"), ("a.c.2", "2"), ("a.b.c", "c"), ("a.c.x", "x"), ("", "")])
+def test_get_names_what_is_missing(path: str, part: str) -> None:
+    with pytest.raises(KeyError, match=f"there is no '{part}'"):
+        documents.get(NESTED, path)
+
+
+def test_replace_leaves_the_original_alone() -> None:
+    changed = documents.replace(NESTED, {"a.b": 5, "a.c.1.d": 6, "f.g.h": 7})
+    assert changed == {"a": {"b": 5, "c": [10, {"d": 6}]}, "e": "x", "f": {"g": {"h": 7}}}
+    assert NESTED == {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "found"),
+    [
+        ("hull.*", ["hull.Y_v", "hull.Y_v|v|"]),
+        ("*.D_p", ["thruster.port.D_p", "thruster.starboard.D_p"]),
+        ("thruster.*.D_p", ["thruster.port.D_p", "thruster.starboard.D_p"]),
+        ("hull.Y_v|v|", ["hull.Y_v|v|"]),
+        ("hull.Y_.", []),
+        ("hull", []),
+        ("*", ["hull.Y_v", "hull.Y_v|v|", "thruster.port.D_p", "thruster.starboard.D_p"]),
+    ],
+)
+def test_match_takes_names_literally_but_for_the_star(pattern: str, found: list[str]) -> None:
+    paths = ["hull.Y_v", "hull.Y_v|v|", "thruster.port.D_p", "thruster.starboard.D_p"]
+    assert documents.match(pattern, paths) == found
+
+
+def test_digest_does_not_depend_on_the_order_of_keys() -> None:
+    assert documents.digest({"a": 1, "b": {"c": 2.5, "d": 3}}) == documents.digest({"b": {"d": 3, "c": 2.5}, "a": 1})
+    assert documents.digest({"a": 1}) != documents.digest({"a": 2})
+    assert documents.digest({"a": 0.1}) != documents.digest({"a": 0.1 + 1e-17 + 2**-55})
+    assert len(documents.digest({})) == 16
+
+
+def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
+    for content, remedy in ((b"a = 1\na = 2", "not valid TOML"), (b"a = \xff", "UTF-8"), (b"a =", "not valid TOML")):
+        file = tmp_path / "x.toml"
+        file.write_bytes(content)
+        with pytest.raises(DocumentError, match=remedy) as caught:
+            documents.read(file)
+        assert caught.value.file == str(file)
+        assert "\n" not in str(caught.value)
+    for missing in (tmp_path / "gone.toml", tmp_path):
+        with pytest.raises(DocumentError, match="cannot be read"):
+            documents.read(missing)
+
+
+def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "x.toml").write_text("a = 1")
+    (tmp_path / "x.toml").write_text("a = 2")
+    monkeypatch.chdir(tmp_path)
+    assert documents.read(documents.find("./x.toml", "models", tmp_path / "here")) == {"a": 1}
+    assert documents.read(documents.find("./x.toml", "models")) == {"a": 2}
+    assert documents.find("gunnerus-28.9", "models").name == "gunnerus-28.9.toml"
+
+
+@pytest.mark.parametrize("kind", ["models", "studies"])
+def test_find_corrects_names(kind: str) -> None:
+    with pytest.raises(DocumentError, match="a file of your own needs a slash"):
+        documents.find("nothing-like-it", kind)
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    speed: float = Field(gt=0)
+    depth: float | None = None
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    inner: Inner
+    rows: list[Inner] = []
+
+
+@pytest.mark.parametrize(
+    ("data", "path", "message"),
+    [
+        ({"inner": {"speed": 1, "deep": 2}}, "top.inner.deep", "unknown key: did you mean 'depth'?"),
+        ({"iner": {"speed": 1}, "inner": {"speed": 1}}, "top.iner", "did you mean 'inner'?"),
+        ({"inner": {}}, "top.inner.speed", "missing"),
+        ({"inner": {"speed": -1}}, "top.inner.speed", "-1: Input should be greater than 0"),
+        ({"inner": {"speed": 1}, "rows": [{"speed": 1, "sped": 2}]}, "top.rows.0.sped", "did you mean 'speed'?"),
+        ({"inner": 5}, "top.inner", "5: "),
+    ],
+)
+def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, message: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        documents.parse(Outer, data, "x.toml", "top")
+    assert caught.value.path == path
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices
+
+ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError, ResultError])
+
+
+@ERRORS
+def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
+    found = error("first\n  second", file="a.toml", path="hull.x")
+    assert str(found) == "a.toml: hull.x: first second"
+    assert str(error("only this")) == "only this"
+    assert isinstance(found, ShipidError)
+
+
+@ERRORS
+def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
+    found = pickle.loads(pickle.dumps(error("message", file="a.toml", path="hull.x")))
+    assert type(found) is error
+    assert (found.message, found.file, found.path) == ("message", "a.toml", "hull.x")
+
+
+def test_choices_suggest_what_is_close() -> None:
+    assert choices("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
+
+
+def test_choices_list_what_is_valid() -> None:
+    assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
+    assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
+    assert choices("zzz", []) == "nothing is defined there"

@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.document import bundled, leaves, replace
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
+
+UNIT = re.compile(r"-|prime|deg|1/s of the command|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
+
+
+def test_every_parameter_has_a_unit_and_a_value(vessel: Vessel) -> None:
+    assert list(vessel.units) == list(vessel.parameters)
+    assert [unit for unit in vessel.units.values() if not UNIT.fullmatch(unit)] == []
+    assert np.isfinite(list(vessel.parameters.values())).all()
+
+
+def test_every_number_of_a_switched_on_block_is_a_parameter(bundled_vessel: Vessel) -> None:
+    """No number of a bundled vessel is read over: what is no parameter is structure, a particular, or switched off."""
+    spare = ("particulars.", "constants.", "dof", "hull.crossflow.strips", "thruster.bow.")
+    numbers = [path for path, value in leaves(bundled_vessel.document) if type(value) in (int, float)]
+    assert [path for path in numbers if path not in bundled_vessel.parameters and not path.startswith(spare)] == []
+
+
+def test_every_block_names_its_source(bundled_vessel: Vessel) -> None:
+    document = bundled_vessel.document
+    blocks = [document, *(document[key] for key in ("particulars", "inertia", "added_mass", "wind"))]
+    blocks += [*document["hull"].values(), *document["thruster"].values()]
+    assert all(len(block["source"]) > 10 for block in blocks)
+
+
+def test_set_a_has_its_32_derivatives() -> None:
+    """8 X, 12 Y and 12 N, as the method perturbs them."""
+    names = list(load_vessel("gunnerus-28.9").document["hull"]["derivatives"])
+    names.remove("source")
+    assert [sum(name.startswith(axis) for name in names) for axis in "XYN"] == [8, 12, 12]
+
+
+def test_units_follow_from_names() -> None:
+    units = load_vessel("gunnerus-28.9").units
+    assert units["inertia.m"] == "kg"
+    assert units["hull.derivatives.N_rrr"] == "kg m^2 s"
+    assert units["added_mass.N_vdot"] == "kg m"
+    assert units["thruster.port.D_p"] == "m"
+    assert units["wind.gamma_deg.3"] == "deg"
+    assert units["constants.rho"] == "kg m^-3"
+
+
+def test_a_number_of_the_block_goes_before_the_shared_one() -> None:
+    """33.9 m: T of the cross-flow stands in its block; rho comes from [constants]; both are parameters once."""
+    vessel = load_vessel("gunnerus-33.9")
+    assert "hull.crossflow.T" in vessel.parameters
+    assert "particulars.T" not in vessel.parameters
+    shared = vessel.with_values({"hull": {"crossflow": _without(vessel.document["hull"]["crossflow"], "T")}})
+    assert shared.parameters["particulars.T"] == 2.6
+    own = vessel.with_values({"thruster.port.rho": 1000.0})
+    assert (own.parameters["thruster.port.rho"], own.parameters["constants.rho"]) == (1000.0, 1025.0)
+
+
+def _without(block: dict[str, object], key: str) -> dict[str, object]:
+    return {name: value for name, value in block.items() if name != key}
+
+
+def test_structure_is_what_compiles() -> None:
+    base = load_vessel("gunnerus-28.9")
+    numbers = {path: value * 1.1 + 0.1 for path, value in base.parameters.items() if "gamma_deg" not in path}
+    same = [base.with_values(numbers), base.with_values({"name": "other", "inertia.source": "other", "inertia.m": 1e6})]
+    assert {vessel.structure for vessel in same} == {base.structure}
+    other = [
+        {"wind.off": True},
+        {"thruster.bow.off": False},
+        {"current.kind": "uniform"},
+        {"hull.derivatives.Y_v": 0.0},
+        {"thruster.port.K_x.JJJJ": 0.0},
+    ]
+    structures = {base.with_values(values).structure for values in other}
+    assert len(structures | {base.structure}) == len(other) + 1
+    crossflow = load_vessel("gunnerus-33.9")
+    assert crossflow.with_values({"hull.crossflow.strips": 16}).structure != crossflow.structure
+
+
+def test_the_digest_changes_with_every_number() -> None:
+    base = load_vessel("gunnerus-28.9")
+    digests = {base.with_values({path: value * 1.0000001 + 1e-9}).digest for path, value in base.parameters.items()}
+    assert len(digests | {base.digest}) == len(base.parameters) + 1
+
+
+def test_new_values_leave_the_old_vessel_alone() -> None:
+    base = load_vessel("gunnerus-28.9")
+    assert base.with_values({"inertia.m": 1.0e6}).parameters["inertia.m"] == 1.0e6
+    assert base.parameters["inertia.m"] == 410931.81
+
+
+def test_patches_may_be_stacked(tmp_path: Path) -> None:
+    (tmp_path / "lower.toml").write_text('base = "gunnerus-28.9"\n[set]\n"inertia.m" = 4e5\n"inertia.I_z" = 2e7\n')
+    (tmp_path / "upper.toml").write_text('base = "./lower.toml"\nname = "upper"\n[set]\n"inertia.m" = 5e5\n')
+    vessel = load_vessel(str(tmp_path / "upper.toml"))
+    assert (vessel.parameters["inertia.m"], vessel.parameters["inertia.I_z"]) == (5e5, 2e7)
+    assert (vessel.name, vessel.key) == ("upper", "upper")
+
+
+def test_bundled_vessels_are_addressed_by_name_and_by_path() -> None:
+    for name, file in bundled("models").items():
+        assert load_vessel(name).digest == load_vessel(str(file)).digest
+        assert load_vessel(name).key == name
+
+
+def test_a_switched_off_block_is_still_checked() -> None:
+    document = replace(load_vessel("gunnerus-28.9").document, {"thruster.bow.F_1": "much"})
+    with pytest.raises(Exception, match=r"thruster\.bow\.F_1"):
+        check_vessel(document, "x.toml")

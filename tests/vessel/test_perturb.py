@@ -1,0 +1,257 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from shipid.errors import DocumentError
+from shipid.physics.grammar import derivative
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import Family, Perturbation, Variant, draw, members, resolve, uniform
+
+HULL = {"parameters": ["hull.derivatives.*"], "factor": (0.4, 1.6)}
+MASS = {"parameters": ["inertia.m"], "factor": (0.6, 1.4)}
+PROPELLERS = {
+    "parameters": ["thruster.port.D_p", "thruster.starboard.D_p"],
+    "factor": (0.6, 1.4),
+    "together": True,
+}
+
+
+@pytest.fixture(scope="module")
+def base() -> Vessel:
+    return load_vessel("gunnerus-28.9")
+
+
+def family(*perturb: dict[str, Any], **more: Any) -> Family:
+    given = {"name": "high", "base": "gunnerus-28.9", "members": 8, "seed": 2, "perturb": list(perturb)}
+    return Family(**{**given, **more})
+
+
+HIGH = family(HULL, MASS, PROPELLERS)
+
+
+def test_draws_are_pinned_to_the_bit(base: Vessel) -> None:
+    """Studies are repeated years later on other machines: these three may never change."""
+    assert draw(HIGH, 0, base).values["hull.derivatives.Y_uv"] == float.fromhex("-0x1.b61404608a1acp+14")
+    assert draw(HIGH, 3, base).values["inertia.m"] == float.fromhex("0x1.ab6a56474a5bbp+18")
+    assert draw(HIGH, 7, base).values["thruster.port.D_p"] == float.fromhex("0x1.0760ee106f0c7p+1")
+
+
+def test_more_members_change_no_draw(base: Vessel) -> None:
+    few, many = members(HIGH, base), members(family(HULL, MASS, PROPELLERS, members=20), base)
+    assert [variant.values for variant in many[:8]] == [variant.values for variant in few]
+
+
+def test_more_paths_change_no_other_draw(base: Vessel) -> None:
+    one = draw(family({**MASS, "parameters": ["inertia.m"]}), 4, base)
+    two = draw(family({**MASS, "parameters": ["inertia.*", "added_mass.X_udot"]}), 4, base)
+    assert two.values["inertia.m"] == one.values["inertia.m"]
+    assert len(two.values) > len(one.values)
+    longer = draw(family({**PROPELLERS, "parameters": [*PROPELLERS["parameters"], "thruster.*.k_T"]}), 4, base)
+    assert longer.factors["thruster.port.k_T"] == draw(HIGH, 4, base).factors["thruster.port.D_p"]
+
+
+def test_another_family_changes_no_draw_and_has_its_own(base: Vessel) -> None:
+    other = draw(family(HULL, MASS, PROPELLERS, name="higher"), 0, base)
+    alone = draw(resolve([HIGH])[0], 0, base)
+    beside = draw(resolve([family(HULL, name="moderate"), HIGH])[1], 0, base)
+    assert beside == alone
+    assert other.values["inertia.m"] != alone.values["inertia.m"]
+
+
+@pytest.mark.parametrize("change", [{"seed": 3}, {"name": "other"}])
+def test_seed_and_name_make_other_draws(base: Vessel, change: dict[str, Any]) -> None:
+    assert draw(family(HULL, **change), 0, base).values != draw(family(HULL), 0, base).values
+
+
+def test_a_redrawn_member_is_another_one_and_says_so(base: Vessel) -> None:
+    first, second = draw(HIGH, 2, base), draw(HIGH, 2, base, counter=1)
+    assert all(first.values[path] != second.values[path] for path in first.values)
+    assert (second.counter, second.name) == (1, first.name)
+
+
+def test_members_differ_and_each_parameter_has_its_own_draw(base: Vessel) -> None:
+    drawn = members(family(HULL), base)
+    assert len({variant.values["hull.derivatives.Y_uv"] for variant in drawn}) == 8
+    assert len(set(drawn[0].factors.values())) == 32
+
+
+def test_factors_keep_their_bounds(base: Vessel) -> None:
+    factors = np.array([list(variant.factors.values()) for variant in members(family(HULL, members=40), base)])
+    assert factors.shape == (40, 32)
+    assert 0.4 <= factors.min() < 0.45
+    assert 1.55 < factors.max() <= 1.6
+
+
+def test_uniform_is_uniform() -> None:
+    """Kolmogorov-Smirnov distance of 4,000 draws below its 0.1 % limit; neighbours are not correlated."""
+    drawn = np.array([uniform(2, "high", member, "inertia.m", 0, 0) for member in range(4000)])
+    assert drawn.min() >= 0
+    assert drawn.max() < 1
+    steps = np.arange(4000) / 4000
+    assert np.abs(np.sort(drawn) - steps).max() < 1.95 / np.sqrt(4000)
+    assert abs(np.corrcoef(drawn[:-1], drawn[1:])[0, 1]) < 0.06
+
+
+def test_keys_of_a_draw_do_not_run_together() -> None:
+    assert uniform("a", "bc") != uniform("ab", "c")
+    assert uniform(1, 23) != uniform(12, 3)
+
+
+def test_together_is_one_factor(base: Vessel) -> None:
+    for variant in members(HIGH, base):
+        assert variant.values["thruster.port.D_p"] == variant.values["thruster.starboard.D_p"] != 1.9
+
+
+def test_together_holds_when_one_of_them_was_drawn_before(base: Vessel) -> None:
+    port_first = {"parameters": ["thruster.port.D_p"], "factor": (0.9, 1.1)}
+    alone, both = draw(family(port_first), 0, base), draw(family(port_first, PROPELLERS), 0, base)
+    common = both.factors["thruster.starboard.D_p"]
+    assert both.factors["thruster.port.D_p"] == pytest.approx(alone.factors["thruster.port.D_p"] * common)
+
+
+def test_a_path_drawn_twice_multiplies_two_draws(base: Vessel) -> None:
+    once, twice = draw(family(MASS), 0, base), draw(family(MASS, MASS), 0, base)
+    second = twice.factors["inertia.m"] / once.factors["inertia.m"]
+    assert 0.6 <= second <= 1.4
+    assert second != pytest.approx(once.factors["inertia.m"])
+
+
+def test_a_single_number_is_a_fixed_factor(base: Vessel) -> None:
+    variant = draw(family({"parameters": ["hull.derivatives.N_*"], "factor": 0.6}), 0, base)
+    assert len(variant.values) == 12
+    assert all(value == base.parameters[path] * 0.6 for path, value in variant.values.items())
+
+
+def test_set_gives_a_value(base: Vessel) -> None:
+    variant = draw(family({"set": {"wind.C_X.0": -0.6, "inertia.x_G": 0.5}}), 0, base)
+    assert variant.values == {"wind.C_X.0": -0.6, "inertia.x_G": 0.5}
+    assert "inertia.x_G" not in variant.factors  # the old value is 0: no factor leads there
+
+
+def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) -> None:
+    variant = draw(family({"remove": ["hull.derivatives.*[order >= 3]"]}, members=1), 0, base)
+    third = {path for path in base.parameters if "hull.d" in path and derivative(path.rsplit(".", 1)[-1]).order >= 3}
+    assert set(variant.values) == third
+    assert len(third) == 3 + 6 + 6
+    assert set(variant.values.values()) == {0.0}
+    assert rebuilt(variant, tmp_path).structure == base.structure
+
+
+@pytest.mark.parametrize(
+    ("condition", "count"), [(">= 3", 15), ("<=2", 17), ("== 3", 15), ("> 3", 0), ("< 3", 17), (">=2", 32)]
+)
+def test_selection_by_order(base: Vessel, condition: str, count: int) -> None:
+    block = {"remove": [f"hull.derivatives.*[order {condition}]"]}
+    if count:
+        assert len(draw(family(block), 0, base).values) == count
+        return
+    with pytest.raises(DocumentError, match="selects nothing"):
+        draw(family(block), 0, base)
+
+
+def rebuilt(variant: Variant, folder: Path) -> Vessel:
+    file = folder / f"{variant.name}.toml"
+    file.write_text(variant.document())
+    return load_vessel(str(file))
+
+
+def test_the_patch_document_rebuilds_the_variant_exactly(base: Vessel, tmp_path: Path) -> None:
+    for variant in members(HIGH, base):
+        vessel = rebuilt(variant, tmp_path)
+        assert list(vessel.parameters.values()) == variant.parameters
+        assert list(vessel.parameters) == list(base.parameters)
+        assert vessel.structure == base.structure
+        assert (vessel.name, vessel.key) == (variant.name, variant.name)
+
+
+@pytest.mark.parametrize("value", [1e-7, 1e22, 123456789.123456789, 1 / 3, -0.0, 5e-324])
+def test_the_patch_document_keeps_every_bit(base: Vessel, tmp_path: Path, value: float) -> None:
+    variant = draw(family({"set": {"hull.derivatives.X_u|v|": value}}), 0, base)
+    found = rebuilt(variant, tmp_path).parameters["hull.derivatives.X_u|v|"]
+    assert found.hex() == value.hex()
+
+
+def test_a_changed_base_is_refused(base: Vessel, tmp_path: Path) -> None:
+    text = draw(HIGH, 0, base).document()
+    assert base.digest in text
+    file = tmp_path / "patch.toml"
+    file.write_text(text.replace(base.digest, "0" * 16))
+    with pytest.raises(DocumentError, match="has changed since") as caught:
+        load_vessel(str(file))
+    assert caught.value.path == "base_digest"
+
+
+def test_a_pattern_that_selects_nothing_is_refused(base: Vessel) -> None:
+    with pytest.raises(DocumentError, match="selects nothing") as caught:
+        draw(family({"parameters": ["inertia.mass"], "factor": 1.1}), 0, base, file="study.toml")
+    assert "'inertia.m'" in str(caught.value)
+    assert str(caught.value).startswith("study.toml: ")
+
+
+@pytest.mark.parametrize("pattern", ["hull.derivatives.*[power >= 3]", "hull[", "hull.*[order >= x]", ""])
+def test_what_is_no_selection_is_refused(base: Vessel, pattern: str) -> None:
+    with pytest.raises(DocumentError, match="is not a selection"):
+        draw(family({"remove": [pattern]}), 0, base)
+
+
+def test_setting_an_unknown_path_is_refused(base: Vessel) -> None:
+    with pytest.raises(DocumentError, match=r"no parameter 'inertia.M': did you mean 'inertia.m'"):
+        draw(family({"set": {"inertia.M": 1.0}}), 0, base)
+
+
+@pytest.mark.parametrize("block", [{"remove": ["inertia.m"]}, {"parameters": ["inertia.I_z"], "factor": -1.0}])
+def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, Any]) -> None:
+    with pytest.raises(DocumentError, match="would be no vessel: inertia") as caught:
+        draw(family(block), 0, base, file="study.toml")
+    assert caught.value.file == "study.toml"
+
+
+@pytest.mark.parametrize(
+    ("block", "remedy"),
+    [
+        ({"parameters": ["inertia.m"]}, "go together"),
+        ({"factor": 1.1}, "go together"),
+        ({}, "says nothing"),
+        ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "runs backwards"),
+        ({"parameters": ["inertia.m"], "factor": (0.5, float("nan"))}, "finite"),
+        ({"parameters": ["inertia.m"], "factor": 1.1, "factors": 2}, "Extra inputs"),
+    ],
+)
+def test_a_block_has_one_meaning(block: dict[str, Any], remedy: str) -> None:
+    with pytest.raises(ValidationError, match=remedy):
+        Perturbation(**block)
+
+
+def test_extends_puts_the_other_rules_first(base: Vessel) -> None:
+    moderate = family(HULL, name="moderate", seed=1)
+    high = family(MASS, name="high", base=None, extends="moderate")
+    written_out = resolve([high, moderate])[0]
+    assert (written_out.base, written_out.seed, written_out.extends) == ("gunnerus-28.9", 2, None)
+    assert draw(written_out, 0, base) == draw(family(HULL, MASS), 0, base)
+
+
+@pytest.mark.parametrize(
+    ("families", "remedy", "path"),
+    [
+        ([{"name": "a", "extends": "b"}, {"name": "b", "extends": "a"}], "extends itself", "family.0.extends"),
+        ([{"name": "a", "extends": "a"}], "extends itself", "family.0.extends"),
+        ([{"name": "a", "base": "x"}, {"name": "b", "extends": "aa"}], "did you mean 'a'", "family.1.extends"),
+        ([{"name": "a"}], "name a base vessel", "family.0.base"),
+        ([{"name": "a", "base": "x"}, {"name": "a", "base": "y"}], "two families are called 'a'", "family.1.name"),
+    ],
+)
+def test_families_that_cannot_be_written_out(families: list[dict[str, Any]], remedy: str, path: str) -> None:
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        resolve([Family(**given) for given in families], "study.toml")
+    assert caught.value.path == path
+    assert "\n" not in str(caught.value)
+
+
+def test_names_of_members(base: Vessel) -> None:
+    assert [variant.name for variant in members(family(MASS, members=2), base)] == ["high-1", "high-2"]
+    assert [variant.name for variant in members(family(MASS, members=1), base)] == ["high"]

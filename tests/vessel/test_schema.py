@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import pytest
+
+from shipid.document import bundled
+from shipid.physics import ACTUATORS, SIGNALS, TERMS
+from shipid.physics.inertia import rigid_body
+from shipid.vessel.load import load_vessel
+from shipid.vessel.schema import counts, kinds, parameters, signals, term_blocks, vessel_model
+
+
+@pytest.mark.parametrize("key", list(TERMS))
+def test_every_argument_of_a_term_is_declared(key: str) -> None:
+    """Positional arguments are signals or component arrays; keyword-only ones have a unit."""
+    term = TERMS[key]
+    given = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment}
+    if term.components is not None:
+        given |= set(term.components(**dict.fromkeys(counts(term), 3)))
+    assert set(signals(term.function)) <= given
+    assert {"return", *signals(term.function), *(p.name for p in parameters(term.function))} == {
+        name for name in term.function.__annotations__
+    }
+
+
+def test_parameters_are_read_off_the_signature() -> None:
+    found = {p.name: p for p in parameters(rigid_body)}
+    assert list(found) == ["m", "I_z", "x_G", "z_G", "I_x", "I_y"]
+    assert (found["m"].unit, found["m"].positive, found["m"].default) == ("kg", True, None)
+    assert (found["z_G"].unit, found["z_G"].positive, found["z_G"].default) == ("m", False, 0.0)
+
+
+def test_kinds_of_a_group() -> None:
+    assert kinds("thruster") == ["azimuth", "tunnel"]
+    assert kinds("wind") == ["table", "blendermann"]
+    assert kinds("rocket") == []
+
+
+def _properties(schema: dict[str, Any], node: dict[str, Any]) -> list[dict[str, Any]]:
+    """The alternatives that a node of a JSON schema allows, references followed."""
+    if "$ref" in node:
+        return _properties(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]])
+    options = [*node.get("anyOf", []), *node.get("oneOf", [])]
+    return [found for option in options for found in _properties(schema, option)] if options else [node]
+
+
+def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str) -> list[str]:
+    """Dotted paths of keys that no alternative of the schema allows."""
+    if not isinstance(value, dict):
+        return []
+    complaints = []
+    for option in _properties(schema, node):
+        declared, extra = option.get("properties", {}), option.get("additionalProperties", True)
+        if "kind" in declared and declared["kind"].get("const") != value.get("kind"):
+            continue
+        found: list[str] = []
+        for key, entry in value.items():
+            inner = declared.get(key, extra)
+            if inner is False:
+                found.append(f"{path}.{key}")
+            elif isinstance(inner, dict):
+                found += _unknown(schema, inner, entry, f"{path}.{key}")
+        complaints.append(found)
+    return min(complaints, key=len, default=[f"{path} fits nothing"])
+
+
+@pytest.mark.parametrize("name", list(bundled("models")))
+def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
+    schema = vessel_model().model_json_schema()
+    document = load_vessel(name).document
+    assert _unknown(schema, schema, document, "") == []
+    assert set(schema["required"]) <= set(document)
+    spoilt = {**document, "thruster": {"port": {**document["thruster"]["port"], "D": 1.0}}}
+    assert _unknown(schema, schema, spoilt, "") == [".thruster.port.D"]
+
+
+def test_json_schema_carries_units() -> None:
+    schema = vessel_model().model_json_schema()
+    assert schema["$defs"]["inertia"]["properties"]["m"]["description"] == "kg"
+    assert schema["$defs"]["inertia"]["properties"]["m"]["exclusiveMinimum"] == 0
+
+
+def test_term_blocks_name_path_and_kind() -> None:
+    document = load_vessel("gunnerus-28.9").document
+    assert [(path, key) for path, key, _ in term_blocks(document)] == [
+        ("hull.derivatives", "hull.derivatives"),
+        ("wind", "wind.table"),
+        ("thruster.port", "thruster.azimuth"),
+        ("thruster.starboard", "thruster.azimuth"),
+    ]
+
+
+@pytest.mark.parametrize("kind", list(ACTUATORS))
+def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
+    """`output(state)` and `advance(command, state, dt)`; a reached command stays reached."""
+    memory = ACTUATORS[kind]
+    assert signals(memory.output) == ("state",)
+    assert signals(memory.advance) == ("command", "state", "dt")
+    numbers = {p.name: 1.0 for p in parameters(memory.advance)}
+    assert float(memory.advance(ca.SX(0.7), ca.SX(0.7), ca.SX(0.5), **numbers)) == pytest.approx(0.7)
