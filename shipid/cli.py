@@ -69,7 +69,9 @@ def vessel_list() -> None:
 @vessel_app.command("show")
 def vessel_show(
     vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")] = "",
-    schema: Annotated[bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")
+    ] = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
     if schema:
@@ -88,12 +90,20 @@ def vessel_show(
     document = found.document
     typer.echo(f"{found.name}\n{document.get('description', '')}\nfile {found.file}, digest {found.digest}")
     particulars = document.get("particulars", {})
-    typer.echo("particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars))
-    rows = [(path, key, block.get("source") or document.get("source", "")) for path, key, block in term_blocks(document)]
+    typer.echo(
+        "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
+    )
+    rows = [
+        (path, key, block.get("source") or document.get("source", "")) for path, key, block in term_blocks(document)
+    ]
     rows += [(path, f"{key}, off", block.get("source", "")) for path, key, block in term_blocks(document, off=True)]
     _print(_table(["term", "kind", "source"], rows))
     values = found.parameters
-    _print(_table(["parameter", "value", "unit"], ((path, f"{values[path]:.10g}", unit) for path, unit in found.units.items())))
+    _print(
+        _table(
+            ["parameter", "value", "unit"], ((path, f"{values[path]:.10g}", unit) for path, unit in found.units.items())
+        )
+    )
 
 
 @data_app.command("fetch")
@@ -108,7 +118,9 @@ def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as g
 def data_import(
     mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
-    out: Annotated[Path | None, typer.Option(help="Parquet file to write; default: beside you, named like the mapping")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Parquet file to write; default: beside you, named like the mapping")
+    ] = None,
     without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
@@ -135,7 +147,11 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
 
     checks = check_dataset(read_dataset(dataset))
     columns = ["run", "check", "ok", "sentence"]
-    _print(_table(columns, ((str(r.run), str(r.check), "yes" if r.ok else "NO", str(r.sentence)) for r in checks.itertuples())))
+    _print(
+        _table(
+            columns, ((str(r.run), str(r.check), "yes" if r.ok else "NO", str(r.sentence)) for r in checks.itertuples())
+        )
+    )
     failed = int((~checks["ok"].astype(bool)).sum())
     typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
     if failed:
@@ -256,9 +272,22 @@ def _draw(events: Iterable[Event]) -> None:
             if line:
                 typer.echo(line)
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
     with Progress(*columns, console=console) as progress:
@@ -273,15 +302,25 @@ def _draw(events: Iterable[Event]) -> None:
                 if row["status"] == "ok":
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])
-                label = f"best {best['cell']} {best['H']:.2f} m, worst {worst['cell']} {worst['H']:.2f} m" if best else "cells"
+                label = (
+                    f"best {best['cell']} {best['H']:.2f} m, worst {worst['cell']} {worst['H']:.2f} m"
+                    if best
+                    else "cells"
+                )
                 progress.update(task, completed=event.done, description=label)
 
 
 def _line(event: Event) -> str:
     row = event.row
     if event.kind != "cell":
-        return {"note": event.text, "start": f"{event.total - event.done} of {event.total} cells to do"}.get(event.kind, "")
-    result = f"H {row['H']:.3f} m, H_90 {row['H_90']:.3f} m" if row["status"] == "ok" else f"{row['status']}: {row['sentence']}"
+        return {"note": event.text, "start": f"{event.total - event.done} of {event.total} cells to do"}.get(
+            event.kind, ""
+        )
+    result = (
+        f"H {row['H']:.3f} m, H_90 {row['H_90']:.3f} m"
+        if row["status"] == "ok"
+        else f"{row['status']}: {row['sentence']}"
+    )
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"
 
 

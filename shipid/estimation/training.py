@@ -282,3 +282,8 @@ def dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence
 
 def _tensor(values: object, device: str) -> Tensor:
     return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
+
+
+def use_threads(count: int) -> None:
+    """Set the threads of PyTorch in this process: networks this small lose time on more than one."""
+    torch.set_num_threads(count)

@@ -214,7 +214,7 @@ def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int
 
 
 @lru_cache(maxsize=32)
-def _casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, every: int) -> ca.Function:
+def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, every: int) -> ca.Function:
     """One sample: (state, memory, commands, environment, tau_extra, parameters) -> records, steps inside."""
     state, memory = ca.MX.sym("state", len(model.state)), ca.MX.sym("memory", len(model.memory))
     commands, environment = ca.MX.sym("commands", len(model.commands)), ca.MX.sym("environment", len(model.environment))
@@ -254,7 +254,7 @@ def _run_casadi(
     model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
 ) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
-    scan = _casadi_scan(model, step, num_steps, method, every)
+    scan = casadi_scan(model, step, num_steps, method, every)
     num_samples, num_records = batch.state.shape[1], num_steps // every
     start = np.concatenate([batch.state, batch.memory])
     speed_rows = slice(model.num_dof, len(model.state))

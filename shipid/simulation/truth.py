@@ -75,7 +75,9 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
             path="truth",
         )
     names = run_names(truth.manoeuvres)
-    frame = pd.DataFrame({"run": np.repeat(names, rows + 1), "t": np.tile(np.arange(rows + 1) * truth.interval, len(names))})
+    frame = pd.DataFrame(
+        {"run": np.repeat(names, rows + 1), "t": np.tile(np.arange(rows + 1) * truth.interval, len(names))}
+    )
     for name in model.state:
         frame[name] = path[name][:, 0].T.ravel()
     for name, values in {**commands, **environment}.items():

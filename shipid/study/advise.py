@@ -22,8 +22,15 @@ def by_model(results: Results) -> pd.DataFrame:
     """Mean over seeds of A, H, H_90 [m] per model and N_D, with the spread of H over seeds; failed cells left out."""
     good = results.cells[results.cells["status"] == "ok"]
     grouped = good.groupby(["model", "kind", "N_D"], sort=False)
-    frame = grouped.agg(A=("A", "mean"), H=("H", "mean"), H_90=("H_90", "mean"), rms=("rms", "mean"),
-                        low=("H", "min"), high=("H", "max"), seeds=("H", "size"))
+    frame = grouped.agg(
+        A=("A", "mean"),
+        H=("H", "mean"),
+        H_90=("H_90", "mean"),
+        rms=("rms", "mean"),
+        low=("H", "min"),
+        high=("H", "max"),
+        seeds=("H", "size"),
+    )
     return frame.reset_index()
 
 
@@ -34,13 +41,15 @@ def answer(results: Results) -> list[tuple[str, str]]:
     sentences = []
     if not results.complete:
         missing = results.plan.cells - len(results.cells)
-        sentences.append((f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.", "cells"))
+        sentences.append(
+            (f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.", "cells")
+        )
     largest = int(table["N_D"].max()) if len(table) else 0
     top = table[table["N_D"] == largest]
     physics = top[top["kind"] != NO_MODEL]
     if physics.empty:
         return [*sentences, ("No cell with physics has finished, so nothing can be said yet.", "cells")]
-    best = physics.loc[physics["H"].idxmin()]
+    best = physics.iloc[int(physics["H"].argmin())]
     sentences.append(
         (
             f"With {largest} runs, {best['model']} (mean error {_m(best['A'])} on its own) predicts {ahead:g} s ahead with "
@@ -56,7 +65,9 @@ def answer(results: Results) -> list[tuple[str, str]]:
         text = f"At {largest} runs {harmed} {'does' if len(harming) == 1 else 'do'} worse than no physics at all."
         smallest = int(table["N_D"].min())
         low = table[(table["N_D"] == smallest) & (table["kind"] != NO_MODEL)]
-        beaten = [str(r["model"]) for _, r in low.iterrows() if smallest in pure.index and r["H"] > pure.loc[smallest, "H"]]
+        beaten = [
+            str(r["model"]) for _, r in low.iterrows() if smallest in pure.index and r["H"] > pure.loc[smallest, "H"]
+        ]
         if not harming:
             text = f"At {largest} runs every physics model does better than none."
             if beaten and smallest != largest:
@@ -93,7 +104,7 @@ def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
         return f"Without physics, {fewest} runs give {_m(float(pure['H'].iloc[0]))}, where {here}."
     if enough.empty:
         last = int(pure.index.max())
-        return f"Without physics even {last} runs give {_m(float(pure.loc[last, 'H']))}, where {here}."
+        return f"Without physics even {last} runs give {_m(float(pure['H'].loc[last]))}, where {here}."
     return f"Without physics it takes {int(enough.index.min())} runs to do as well: {here}."
 
 
@@ -115,14 +126,26 @@ def findings(results: Results) -> list[dict[str, str]]:
     pairs = "; ".join(f"{row['model']} {_m(row['A'])} -> {_m(row['H'])}{_range(row)}" for _, row in physics.iterrows())
     worst, share = _worst_share(results, int(table["N_D"].max()))
     return [
-        _finding("R1", _verdict(bool((physics["high"] < physics["A"]).all()), bool((physics["H"] < physics["A"]).all())), pairs),
+        _finding(
+            "R1",
+            _verdict(bool((physics["high"] < physics["A"]).all()), bool((physics["H"] < physics["A"]).all())),
+            pairs,
+        ),
         _finding(
             "R2",
             _verdict(bad["high"] <= (1 + ABOUT) * good["A"], bad["H"] <= (1 + ABOUT) * good["A"]),
             f"inaccurate and compensated {_m(bad['H'])}{_range(bad)}, accurate alone {_m(good['A'])}",
         ),
-        _finding("R3", _verdict(gap_after < gap_before, gap_after < gap_before), f"gap {_m(gap_before)} before, {_m(gap_after)} after"),
-        _finding("R4", _verdict(share == 1.0, share > 0.5), f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; most often worst: {worst}"),
+        _finding(
+            "R3",
+            _verdict(gap_after < gap_before, gap_after < gap_before),
+            f"gap {_m(gap_before)} before, {_m(gap_after)} after",
+        ),
+        _finding(
+            "R4",
+            _verdict(share == 1.0, share > 0.5),
+            f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; most often worst: {worst}",
+        ),
     ]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
 from shipid.document import Document
@@ -42,15 +42,19 @@ class Data(Strict):
     def _one_source(self) -> Data:
         if (self.mapping is None) == (self.dataset is None):
             raise ValueError("give either `dataset`, or `mapping` (with `log` if it is not the public original)")
+        if self.dataset is not None and (self.log is not None or self.without):
+            raise ValueError("`log` and `without` go with a `mapping`: a dataset has been imported already")
         return self
 
 
 class Split(Strict):
     """`[split]`: which runs test, and how the others train and validate; always by run."""
 
-    test: list[str] | Annotated[int, Field(ge=1)] = Field(description="names of the test runs, or how many to draw")
+    test: Annotated[list[str], Field(min_length=1)] | Annotated[int, Field(ge=1)] = Field(
+        description="names of the test runs, or how many to draw"
+    )
     folds: Annotated[int, Field(ge=1)] = Field(default=1, description="1: 80 % train, 20 % validate; else k-fold")
-    seed: int = 0
+    seed: NonNegativeInt = 0
 
 
 class Prediction(Strict):
@@ -67,7 +71,7 @@ class Grid(Strict):
     """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""
 
     N_D: Annotated[list[Annotated[int, Field(ge=2)]], Field(min_length=1, description="runs for training")]
-    seeds: Annotated[list[int], Field(min_length=1)] = [0]
+    seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
 
 
 class Claims(Strict):
@@ -129,7 +133,10 @@ class Batch:
 
 @dataclass(frozen=True)
 class Plan:
-    """A study ready to run: checked document, models before any redraw, recipe and batches."""
+    """A study ready to run: checked document, models before any redraw, recipe and batches.
+
+    truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
+    """
 
     name: str
     file: str
@@ -138,11 +145,13 @@ class Plan:
     models: tuple[Model, ...]
     recipe: Recipe
     batches: tuple[Batch, ...]
+    truth: Vessel | None = None
 
     @property
     def digest(self) -> str:
         """Digest of the document and of every vessel it stands on: what the results depend on."""
-        vessels = sorted({model.vessel.digest for model in self.models if model.vessel is not None})
+        standing = [self.truth, *(model.vessel for model in self.models)]
+        vessels = sorted({vessel.digest for vessel in standing if vessel is not None})
         return documents.digest({"study": self.document, "vessels": vessels})
 
     @property
@@ -167,11 +176,12 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
         head = path.split(".", 1)[0]
         if head not in Study.model_fields:
             raise DocumentError(f"--set: no such block: {choices(head, Study.model_fields)}", file=file, path=path)
-    try:
-        document = documents.replace(document, changes or {})
-    except (ValueError, IndexError, TypeError):
-        bad = next(iter(changes or {}))
-        raise DocumentError(f"--set cannot reach this path: {choices(bad, known)}", file=file, path=bad) from None
+    for path, value in (changes or {}).items():
+        try:
+            document = documents.replace(document, {path: value})
+        except (ValueError, IndexError, TypeError, AttributeError):
+            message = f"--set cannot reach this path: {choices(path, known)}"
+            raise DocumentError(message, file=file, path=path) from None
     return build_plan(document, file)
 
 
@@ -182,43 +192,64 @@ def build_plan(document: Document, file: Path) -> Plan:
     _check_claims(study, models, file)
     recipe = _recipe(study, file)
     batches = tuple(
-        Batch(amount, seed) for amount in sorted(set(study.grid.N_D), reverse=True) for seed in sorted(set(study.grid.seeds))
+        Batch(amount, seed)
+        for amount in sorted(set(study.grid.N_D), reverse=True)
+        for seed in sorted(set(study.grid.seeds))
     )
+    truth = None
     if study.truth is not None:
-        if not isinstance(study.split.test, int):
-            raise DocumentError("runs of a [truth] are drawn: give the number of test runs", file=file, path="split.test")
-        pool = study.truth.manoeuvres - study.split.test
-        if pool < max(study.grid.N_D):
-            raise DocumentError(
-                f"{max(study.grid.N_D)}: {study.truth.manoeuvres} manoeuvres less {study.split.test} test runs leave {pool}",
-                file=file,
-                path="grid.N_D",
-            )
-        if study.truth.duration < study.prediction.horizon * study.prediction.step:
-            raise DocumentError(
-                f"{study.truth.duration:g} s: shorter than the horizon of "
-                f"{study.prediction.horizon * study.prediction.step:g} s",
-                file=file,
-                path="truth.duration",
-            )
-    return Plan(file.stem, str(file), document, study, models, recipe, batches)
+        _check_amounts(study, study.truth, file)
+        truth = _truth_vessel(study.truth, file)
+    return Plan(file.stem, str(file), document, study, models, recipe, batches, truth)
 
 
-def truth_vessel(plan: Plan) -> Vessel:
-    """The vessel that makes the truth, with the blocks that the study adds."""
-    truth = plan.study.truth
-    assert truth is not None
-    vessel = load_vessel(truth.vessel, relative_to=Path(plan.file).parent)
-    return vessel.with_values(truth.set) if truth.set else vessel
+def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
+    """Refuse a truth with too few manoeuvres for the grid, or too short ones for the horizon."""
+    test, most, ahead = study.split.test, max(study.grid.N_D), study.prediction.horizon * study.prediction.step
+    if not isinstance(test, int):
+        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", file=file, path="split.test")
+    pool = truth.manoeuvres - test
+    if pool < 2:
+        message = f"{test}: of {truth.manoeuvres} manoeuvres at most {truth.manoeuvres - 2} can test"
+        raise DocumentError(message, file=file, path="split.test")
+    if pool < most:
+        message = f"{most}: {truth.manoeuvres} manoeuvres less {test} test runs leave {pool}"
+        raise DocumentError(message, file=file, path="grid.N_D")
+    if truth.duration < ahead:
+        message = f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s"
+        raise DocumentError(message, file=file, path="truth.duration")
+
+
+def _truth_vessel(truth: Truth, file: Path) -> Vessel:
+    """The vessel that makes the truth, with the blocks that the study adds: what is wrong there is told there."""
+    vessel = _vessel(truth.vessel, file, "truth.vessel")
+    try:
+        return vessel.with_values(truth.set) if truth.set else vessel
+    except DocumentError as error:
+        raise DocumentError(error.message, file=file, path=f"truth.set.{error.path}") from None
+    except (ValueError, IndexError, TypeError, AttributeError):
+        message = f"a path runs through a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
+        raise DocumentError(message, file=file, path="truth.set") from None
+
+
+def _vessel(name: str, file: Path, path: str) -> Vessel:
+    """A vessel that the study names at a path."""
+    try:
+        found = documents.find(name, "models", file.parent)
+    except DocumentError as error:
+        raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    return load_vessel(str(found))
 
 
 def _models(study: Study, file: Path) -> tuple[Model, ...]:
     found: list[Model] = []
     for index, family in enumerate(resolve(study.family, file)):
-        assert family.base is not None
+        assert family.base is not None  # written out by resolve
         if family.name == NO_MODEL:
-            raise DocumentError("this name is taken by the model without physics", file=file, path=f"family.{index}.name")
-        vessel = load_vessel(family.base, relative_to=file.parent)
+            raise DocumentError(
+                "this name is taken by the model without physics", file=file, path=f"family.{index}.name"
+            )
+        vessel = _vessel(family.base, file, f"family.{index}.base")
         for variant in members(family, vessel, file):
             found.append(Model(variant.name, family.name, variant.member, variant, vessel, family.description or ""))
     names = [model.name for model in found]
@@ -231,15 +262,28 @@ def _models(study: Study, file: Path) -> tuple[Model, ...]:
 def _recipe(study: Study, file: Path) -> Recipe:
     """The named recipe with the changes of its block."""
     block = dict(study.recipe)
+    kind = str(block.pop("kind", "fast"))
+    unknown = next((key for key in block if key not in Recipe.model_fields), None)
+    if unknown is not None:
+        hint = choices(unknown, Recipe.model_fields)
+        raise DocumentError(f"unknown key: {hint}", file=file, path=f"recipe.{unknown}")
     try:
-        return Recipe.preset(str(block.pop("kind", "fast")), **block)
+        return Recipe.preset(kind, **block)
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
 
 
 def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
-    for role in ("accurate", "inaccurate"):
-        name = getattr(study.claims, role, None)
-        if study.claims is not None and name not in {model.family for model in models}:
-            hint = choices(str(name), {model.family for model in models})
-            raise DocumentError(f"{name!r} is not a family: {hint}", file=file, path=f"claims.{role}")
+    if study.claims is None:
+        return
+    families = [model.family for model in models if model.family != NO_MODEL]
+    for role, name in (("accurate", study.claims.accurate), ("inaccurate", study.claims.inaccurate)):
+        if name not in families:
+            raise DocumentError(
+                f"{name!r} is not a family: {choices(name, families)}", file=file, path=f"claims.{role}"
+            )
+        if families.count(name) > 1:
+            message = f"{name!r} has {families.count(name)} members: the findings compare one model with one"
+            raise DocumentError(message, file=file, path=f"claims.{role}")
+    if study.claims.accurate == study.claims.inaccurate:
+        raise DocumentError("the same family as claims.accurate", file=file, path="claims.inaccurate")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,9 +21,9 @@ from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
 from shipid.simulation.rollout import memory_along
 from shipid.simulation.truth import simulate
-from shipid.study.plan import Batch, Model, Plan, truth_vessel
+from shipid.study.plan import Batch, Model, Plan
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import draw, resolve
+from shipid.vessel.perturb import Family, draw, resolve
 
 Array = np.ndarray
 MOST_REDRAWS = 100
@@ -76,19 +76,21 @@ class Prepared:
 def obtain(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
-    if study.truth is not None:
-        frame = simulate(study.truth, truth_vessel(plan))
+    if study.truth is not None and plan.truth is not None:
+        frame = simulate(study.truth, plan.truth)
         return Dataset(frame, {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []})
     assert study.data is not None
     if study.data.dataset is not None:
         return read_dataset(_beside(folder, study.data.dataset))
     assert study.data.mapping is not None
-    mapping = read_mapping(study.data.mapping)
-    log = fetch(study.data.mapping) if study.data.log is None else _beside(folder, study.data.log)
-    return import_log(mapping, log, without=study.data.without)
+    named = study.data.mapping
+    source = str(_beside(folder, named)) if named.endswith(".toml") else named
+    log = fetch(source) if study.data.log is None else _beside(folder, study.data.log)
+    return import_log(read_mapping(source), log, without=study.data.without)
 
 
 def _beside(folder: Path, name: str) -> Path:
+    """A file that a study names: from the study's folder, else from the working folder."""
     return folder / name if (folder / name).exists() else Path(name)
 
 
@@ -98,13 +100,16 @@ def prepare(plan: Plan, dataset: Dataset) -> Prepared:
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
     """
     prediction = plan.study.prediction
-    windows = cut_windows(
-        dataset,
-        horizon=prediction.horizon,
-        step=prediction.step,
-        interval=prediction.interval,
-        path=plan.study.data.path if plan.study.data else "position",
-    )
+    try:
+        windows = cut_windows(
+            dataset,
+            horizon=prediction.horizon,
+            step=prediction.step,
+            interval=prediction.interval,
+            path=plan.study.data.path if plan.study.data else "position",
+        )
+    except DataError as error:
+        raise DocumentError(error.message, file=plan.file, path="prediction.horizon") from None
     if prediction.samples is not None:
         windows = windows.select(_place_in_run(windows) < prediction.samples)
     test_runs = _test_runs(plan, windows)
@@ -163,64 +168,77 @@ def _test_runs(plan: Plan, windows: Windows) -> list[str]:
     return wanted
 
 
+Pair = tuple[Array, Array]
+
+
 def _roll_out(
     plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str]
-) -> tuple[tuple[Model, ...], dict[str, tuple[Array, Array]]]:
+) -> tuple[tuple[Model, ...], dict[str, Pair]]:
     """Paths of every model on (pool, test), members that diverge on the pool redrawn."""
-    prediction = plan.study.prediction
     families = {family.name: family for family in resolve(plan.study.family, plan.file)}
-    finished: dict[str, tuple[Model, tuple[Array, Array]]] = {}
+    finished: dict[str, tuple[Model, Pair]] = {}
     waiting = [model for model in plan.models if model.vessel is not None]
     while waiting:
-        again: list[Model] = []
-        by_structure: dict[str, list[Model]] = {}
-        for model in waiting:
-            assert model.vessel is not None
-            by_structure.setdefault(model.vessel.structure, []).append(model)
-        for group in by_structure.values():
-            vessel = group[0].vessel
-            assert vessel is not None
-            parameters = np.array([model.variant.parameters for model in group if model.variant is not None])
-            results = [
-                physics_paths(
-                    vessel,
-                    windows.columns,
-                    prediction.horizon,
-                    prediction.step,
-                    prediction.method,
-                    parameters=parameters,
-                    memory=window_memory(vessel, dataset, windows),
-                )
-                for windows in parts
-            ]
-            for position, model in enumerate(group):
-                paths = (results[0][0][:, position], results[1][0][:, position])
-                if not results[0][1][position].any():
-                    paths[1][:, results[1][1][position]] = np.nan
-                    finished[model.name] = (model, paths)
-                    continue
-                assert model.variant is not None
-                counter, family = model.variant.counter + 1, families[model.family]
-                share = results[0][1][position].mean()
-                if counter > MOST_REDRAWS or not any(isinstance(b.factor, tuple) for b in family.perturb):
-                    raise DocumentError(
-                        f"{model.name} diverges on {share:.0%} of the training windows"
-                        + (f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else "")
-                        + ": take a smaller [prediction] step, rk4, or narrower factors",
-                        file=plan.file,
-                        path=f"family.{model.family}",
-                    )
-                notes.append(f"{model.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}")
-                assert model.vessel is not None
-                again.append(replace(model, variant=draw(family, model.member, model.vessel, counter, plan.file)))
+        again = []
+        for model, paths, share in _one_round(plan, dataset, parts, waiting):
+            if share:
+                again.append(_redraw(plan, model, families[model.family], share))
+                notes.append(f"{model.name} diverged on {share:.1%} of the training windows: redrawn")
+            else:
+                finished[model.name] = (model, paths)
         waiting = again
-    zeros = tuple(np.zeros_like(windows.future) for windows in parts)
-    models, paths = [], {}
+    zeros = (np.zeros_like(parts[0].future), np.zeros_like(parts[1].future))
     for model in plan.models:
-        drawn, pair = finished.get(model.name, (model, (zeros[0], zeros[1])))
-        models.append(drawn)
-        paths[model.name] = pair
-    return tuple(models), paths
+        finished.setdefault(model.name, (model, zeros))
+    models = tuple(finished[model.name][0] for model in plan.models)
+    return models, {model.name: finished[model.name][1] for model in models}
+
+
+def _one_round(
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], models: Sequence[Model]
+) -> Iterator[tuple[Model, Pair, float]]:
+    """Paths of each model on (pool, test) and the share of pool windows on which it diverged; one rollout a structure."""
+    prediction = plan.study.prediction
+    by_structure: dict[str, list[Model]] = {}
+    for model in models:
+        assert model.vessel is not None
+        by_structure.setdefault(model.vessel.structure, []).append(model)
+    for group in by_structure.values():
+        vessel = group[0].vessel
+        assert vessel is not None
+        parameters = np.array([model.variant.parameters for model in group if model.variant is not None])
+        (pool, pool_bad), (test, test_bad) = (
+            physics_paths(
+                vessel,
+                windows.columns,
+                prediction.horizon,
+                prediction.step,
+                prediction.method,
+                parameters=parameters,
+                memory=window_memory(vessel, dataset, windows),
+            )
+            for windows in parts
+        )
+        for position, model in enumerate(group):
+            paths = (pool[:, position], test[:, position])
+            paths[1][:, test_bad[position]] = np.nan
+            yield model, paths, float(pool_bad[position].mean())
+
+
+def _redraw(plan: Plan, model: Model, family: Family, share: float) -> Model:
+    """The same member with the next counter; DocumentError where nothing can be drawn, or not any more."""
+    assert model.variant is not None
+    assert model.vessel is not None
+    counter = model.variant.counter + 1
+    if counter > MOST_REDRAWS or not any(isinstance(block.factor, tuple) for block in family.perturb):
+        tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
+        raise DocumentError(
+            f"{model.name} diverges on {share:.1%} of the training windows{tries}: "
+            "take a smaller [prediction] step, rk4, or narrower factors",
+            file=plan.file,
+            path=f"family.{model.family}",
+        )
+    return replace(model, variant=draw(family, model.member, model.vessel, counter, plan.file))
 
 
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
@@ -253,7 +271,8 @@ def constant_motion(windows: Windows) -> Array:
     half = r * time / 2
     chord = time * np.sinc(half / np.pi)  # integral of cos and sin over a turn of 2 half
     along, across = chord * np.cos(half), chord * np.sin(half)
-    return np.stack([u * along - v * across, u * across + v * along], axis=-1)
+    path: Array = np.stack([u * along - v * across, u * across + v * along], axis=-1)
+    return path
 
 
 def minutes(windows: Windows, runs: Sequence[str]) -> float:

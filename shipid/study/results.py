@@ -16,6 +16,7 @@ from shipid.metrics import over_horizon, over_time, position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.plan import NO_MODEL, Plan
+from shipid.study.prepare import constant_motion
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
@@ -44,6 +45,11 @@ class Results:
     provenance: Mapping[str, Any]
 
     @property
+    def rows(self) -> list[dict[str, Any]]:
+        """One plain dict per cell."""
+        return [{str(key): value for key, value in row.items()} for row in self.cells.to_dict("records")]
+
+    @property
     def complete(self) -> bool:
         """Whether every cell of the plan is there."""
         return len(self.cells) == self.plan.cells
@@ -55,11 +61,11 @@ def read_results(folder: Path) -> Results:
     cells = store.read_rows(folder)
     test, physics, naive = store.read_test(folder)
     paths = {}
-    for row in cells.itertuples():
-        if row.status == "ok":
-            compensator = Predictor.load(store.cell_file(folder, str(row.cell))).compensator
+    for row in cells.to_dict("records"):
+        if row["status"] == "ok":
+            compensator = Predictor.load(store.cell_file(folder, row["cell"])).compensator
             if compensator is not None:
-                paths[str(row.cell)] = physics[str(row.model)] + compensator.predict(test.columns)
+                paths[row["cell"]] = physics[row["model"]] + compensator.predict(test.columns)
     return Results(
         folder=folder,
         plan=plan,
@@ -90,10 +96,10 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
             parts.append(_horizon(position_error(path, results.test.future), ahead, model, 0, 0, "physics"))
-    for row in results.cells.itertuples():
-        if row.cell in results.paths:
-            error = position_error(results.paths[str(row.cell)], results.test.future)
-            parts.append(_horizon(error, ahead, str(row.model), int(row.N_D), int(row.seed), "cooperative"))
+    for row in results.rows:
+        if row["cell"] in results.paths:
+            error = position_error(results.paths[row["cell"]], results.test.future)
+            parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -121,9 +127,14 @@ def time_frame(results: Results) -> pd.DataFrame:
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
             add(position_error(path, results.test.future), model, 0, "physics")
-    for row in results.cells.itertuples():
-        if row.cell in results.paths and row.seed == seed:
-            add(position_error(results.paths[str(row.cell)], results.test.future), str(row.model), int(row.N_D), "cooperative")
+    for row in results.rows:
+        if row["cell"] in results.paths and row["seed"] == seed:
+            add(
+                position_error(results.paths[row["cell"]], results.test.future),
+                row["model"],
+                row["N_D"],
+                "cooperative",
+            )
     return pd.concat(parts, ignore_index=True)
 
 
@@ -147,10 +158,12 @@ def commands_frame(results: Results) -> pd.DataFrame:
 
 def snapshots(results: Results) -> list[dict[str, Any]]:
     """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
-    particulars = next((m.vessel.document.get("particulars", {}) for m in results.plan.models if m.vessel), {})
+    particulars: Mapping[str, float] = next(
+        (m.vessel.document.get("particulars", {}) for m in results.plan.models if m.vessel), {}
+    )
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
-    found = []
+    found, naive = [], constant_motion(test)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
@@ -159,9 +172,10 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 for model, path in results.physics.items()
                 if model != NO_MODEL and np.isfinite(path[:, index]).all()
             }
-            for row in results.cells.itertuples():
-                if row.cell in results.paths and row.seed == seed:
-                    paths[str(row.model), "cooperative", int(row.N_D)] = results.paths[str(row.cell)][:, index]
+            for row in results.rows:
+                if row["cell"] in results.paths and row["seed"] == seed:
+                    paths[row["model"], "cooperative", row["N_D"]] = results.paths[row["cell"]][:, index]
+            paths["", "naive", 0] = naive[:, index]
             origin = np.zeros((1, 2))
             found.append(
                 {

@@ -18,6 +18,7 @@ import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.errors import ShipidError
+from shipid.estimation.training import use_threads
 from shipid.estimation.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
@@ -95,11 +96,11 @@ def run_study(
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
 
 
-def run_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> list[tuple[dict[str, Any], Predictor | None]]:
+def run_batch(
+    plan: Plan, prepared: Prepared, batch: Batch, device: str
+) -> list[tuple[dict[str, Any], Predictor | None]]:
     """All cells of one batch: (row of results, predictor) for every model. Pure: the same on every worker."""
-    import torch
-
-    torch.set_num_threads(1)
+    use_threads(1)
     runs = prepared.runs(plan, batch)
     mask = np.isin(prepared.pool.run, runs)
     windows = prepared.pool.select(mask)
@@ -185,7 +186,9 @@ def _compute(
 
         shared = client.scatter([plan, prepared], broadcast=True)
         futures = {
-            client.submit(run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False): batch
+            client.submit(
+                run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
+            ): batch
             for batch in batches
         }
         for future in as_completed(futures):
@@ -205,7 +208,9 @@ def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[A
             try:
                 client = Client(scheduler, timeout="10s")
             except (OSError, ValueError) as error:
-                raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
+                raise ShipidError(
+                    f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}"
+                ) from None
             with client:
                 yield client
             return

@@ -133,7 +133,7 @@ def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], nai
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
     temporary = folder / f".{TEST}"
     with temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
     os.replace(temporary, folder / TEST)
 
 

@@ -1,0 +1,17 @@
+"""How a figure is taken: the best of several runs in turn, so that a slow moment of the machine hits all alike."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+
+def best_of(ways: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Least wall time [s] of each way over `rounds` rounds, every round calling all of them in turn."""
+    best = dict.fromkeys(ways, float("inf"))
+    for _ in range(rounds):
+        for name, run in ways.items():
+            start = time.perf_counter()
+            run()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
