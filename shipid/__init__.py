@@ -1,4 +1,4 @@
-"""shipid: how good must the physics be, and how much data is needed, to predict a ship's trajectory?
+"""Answer one question: how good must the physics be, and how much data is needed, to predict a ship's trajectory.
 
 It declares ships as symbols, degrades them on purpose, compensates them with data, and maps what error remains.
 It is not a simulator with a user interface, not a controller, and not a deep-learning framework.

@@ -47,6 +47,9 @@ def main() -> None:
         sys.exit(1)
     except BrokenPipeError:
         sys.exit(141)
+    except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
+        sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
+        sys.exit(1)
 
 
 @app.callback(invoke_without_command=True)
@@ -359,7 +362,7 @@ def _content(results: Results) -> ReportContent:
         repairs=frames.repairs_frame(results),
         provenance=frames.provenance_words(results),
         study_document=results.plan.text(),
-        command=f"shipid study run {results.plan.name}",
+        command=frames.reproducing_command(results),
     )
 
 

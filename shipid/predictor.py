@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -85,28 +86,44 @@ class Predictor:
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; ResultError for anything else."""
+        foreign = ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file)
         try:
-            with np.load(file, allow_pickle=False) as stored:
-                header = json.loads(str(stored["header"]))
-                arrays = {name: stored[name] for name in stored.files if name != "header"}
+            arrays = read_arrays(file)
+            header = json.loads(str(arrays.pop("header")))
         except OSError as error:
             raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
-        except (ValueError, KeyError, zipfile.BadZipFile, EOFError):
-            raise ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file) from None
+        except (ValueError, KeyError):
+            raise foreign from None
+        if not isinstance(header, dict):
+            raise foreign
         if header.get("format") != FORMAT:
             raise ResultError(
                 f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
             )
-        vessel, compensator = header["vessel"], header["compensator"]
-        return cls(
-            vessel=None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
-            compensator=None if compensator is None else Compensator.from_arrays(compensator, arrays),
-            horizon=header["horizon"],
-            step=header["step"],
-            method=header["method"],
-            limits={name: (low, high) for name, (low, high) in header["limits"].items()},
-            provenance=header["provenance"],
-        )
+        try:
+            vessel, compensator = header["vessel"], header["compensator"]
+            return cls(
+                vessel=None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
+                compensator=None if compensator is None else Compensator.from_arrays(compensator, arrays),
+                horizon=int(header["horizon"]),
+                step=float(header["step"]),
+                method=str(header["method"]),
+                limits={name: (low, high) for name, (low, high) in header["limits"].items()},
+                provenance=dict(header["provenance"]),
+            )
+        except ResultError as error:
+            raise ResultError(error.message, file=file, path=error.path) from None
+        except (KeyError, TypeError, ValueError, AttributeError):
+            raise ResultError("damaged: run the study again", file=file) from None
+
+
+def read_arrays(file: str | os.PathLike[str]) -> dict[str, Array]:
+    """Read all arrays of a `.npz`, never a pickle: OSError if it cannot be opened, ValueError for anything else."""
+    try:
+        with np.load(file, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
+        raise ValueError(f"{file} is not a whole .npz") from error
 
 
 def physics_paths(
@@ -127,8 +144,8 @@ def physics_paths(
     """
     model = dynamics(vessel)
     zero = np.zeros(len(columns["u"]))
-    start = {name: columns[name] if name in columns else zero for name in model.state}
-    environment = {name: columns[name] if name in columns else zero for name in model.environment}
+    start = {name: columns.get(name, zero) for name in model.state}
+    environment = {name: columns.get(name, zero) for name in model.environment}
     found = rollout(
         vessel,
         start,

@@ -200,9 +200,8 @@ def _memory(
     vessel: Vessel,
 ) -> Array:
     if memory is None:
-        reached: Array = commands[0, [model.commands.index(name) for name in model.memory]]
-        return reached
-    return _channels(tuple(model.memory), memory, num_samples, num_steps, "memory", vessel)[0]
+        return np.asarray(commands[0, [model.commands.index(name) for name in model.memory]])
+    return np.asarray(_channels(tuple(model.memory), memory, num_samples, num_steps, "memory", vessel)[0])
 
 
 def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:
@@ -286,6 +285,8 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
     first = orders[[model.commands.index(name) for name in model.memory], 0]
     count = len(t) - 1
+    if count == 0:
+        return dict(zip(model.memory, first[:, None], strict=True))
     scan = ca.Function(
         "advance",
         [

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.errors import DocumentError
 from shipid.simulation.rollout import rollout
@@ -17,6 +17,7 @@ from shipid.vessel.perturb import uniform
 Range = tuple[FiniteFloat, FiniteFloat]
 RPM = 1 / 60
 DEGREE = np.pi / 180
+ON_BOARD = ("V_w", "beta_w")  # what of the environment a ship logs: neither current nor waves
 
 
 class Truth(BaseModel):
@@ -43,6 +44,18 @@ class Truth(BaseModel):
         Literal["order", "rest"], Field(description="where lagged actuators stand when the manoeuvre starts")
     ] = "order"
 
+    @model_validator(mode="after")
+    def _fits(self) -> Truth:
+        if abs(self.interval / self.step - round(self.interval / self.step)) > 1e-9 * self.interval / self.step:
+            raise ValueError(f"interval {self.interval:g} s must be a multiple of step {self.step:g} s")
+        if self.duration < self.interval:
+            raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
+        for name in ("n_rpm", "alpha_deg", "wind_speed", "start_speed"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"{name} runs backwards: give [low, high], found [{low:g}, {high:g}]")
+        return self
+
 
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Run all manoeuvres in one batch and log them: a frame with the columns of a dataset, runs `M001`, `M002`, ...
@@ -51,8 +64,8 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """
     model = dynamics(vessel)
     start, commands, environment = _draw(truth, model.commands, model.environment)
-    steps_a_row = max(1, round(truth.interval / truth.step))
-    rows = round(truth.duration / truth.interval)
+    steps_a_row = round(truth.interval / truth.step)
+    rows = int(truth.duration / truth.interval + 1e-9)
     at_rest = {name: np.zeros(truth.manoeuvres) for name in model.memory} if truth.actuators_at == "rest" else None
     path = rollout(
         vessel,
@@ -79,8 +92,9 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
         {"run": np.repeat(names, rows + 1), "t": np.tile(np.arange(rows + 1) * truth.interval, len(names))}
     )
     for name in model.state:
-        frame[name] = path[name][:, 0].T.ravel()
-    for name, values in {**commands, **environment}.items():
+        frame["z" if name == "down" else name] = path[name][:, 0].T.ravel()
+    measured = {name: values for name, values in environment.items() if name in ON_BOARD}
+    for name, values in {**commands, **measured}.items():
         frame[name] = np.repeat(values, rows + 1)
     frame["flags"] = 0
     return frame
@@ -102,10 +116,10 @@ def _draw(
         return (low + (high - low) * np.array(draws)) * unit
 
     zero = np.zeros(truth.manoeuvres)
-    start = {name: zero for name in ("north", "east", "down", "phi", "theta", "v", "w", "p", "q", "r")}
+    start = dict.fromkeys(("north", "east", "down", "phi", "theta", "v", "w", "p", "q", "r"), zero)
     start |= {"psi": between("psi", (0.0, 360.0), DEGREE), "u": between("start_speed", truth.start_speed)}
     orders = {"n": between("n", truth.n_rpm, RPM), "alpha": between("alpha", truth.alpha_deg, DEGREE)}
     orders["delta"] = orders["alpha"]
     commands = {name: orders[name.rpartition(".")[2]] for name in command_names}
     weather = {"V_w": between("V_w", truth.wind_speed), "beta_w": between("beta_w", (0.0, 360.0), DEGREE)}
-    return start, commands, {name: weather[name] if name in weather else zero for name in environment_names}
+    return start, commands, {name: weather.get(name, zero) for name in environment_names}

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.metrics import over_horizon, position_error
-from shipid.study.plan import NO_MODEL
+from shipid.study.plan import NO_MODEL, Claims
 from shipid.study.results import Results, naive_summary
 
 CLAIMS = {
@@ -35,60 +35,78 @@ def by_model(results: Results) -> pd.DataFrame:
 
 
 def answer(results: Results) -> list[tuple[str, str]]:
-    """Three to five sentences built from the results, each with the anchor of the figure that carries it."""
+    """Three to six sentences built from the results, each with the anchor of the figure that carries it."""
     table = by_model(results)
-    ahead = results.test.horizon * results.test.step
-    sentences = []
-    if not results.complete:
-        missing = results.plan.cells - len(results.cells)
-        sentences.append(
-            (f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.", "cells")
-        )
+    sentences = [(text, "cells") for text in _caveats(results)]
     largest = int(table["N_D"].max()) if len(table) else 0
     top = table[table["N_D"] == largest]
     physics = top[top["kind"] != NO_MODEL]
     if physics.empty:
-        return [*sentences, ("No cell with physics has finished, so nothing can be said yet.", "cells")]
+        where = f" at {largest} runs" if largest else ""
+        return [*sentences, (f"No cell with physics has a result{where}, so nothing can be said yet.", "cells")]
     best = physics.iloc[int(physics["H"].argmin())]
+    ahead = results.test.horizon * results.test.step
     sentences.append(
         (
-            f"With {largest} runs, {best['model']} (mean error {_m(best['A'])} on its own) predicts {ahead:g} s ahead with "
-            f"{_m(best['H'])} mean error{_range(best)}; nine errors in ten are below {_m(best['H_90'])}.",
+            f"With {largest} runs, {best['model']} (mean error {_m(best['A'])} on its own) predicts {ahead:g} s ahead "
+            f"with {_m(best['H'])} mean error{_range(best)}; nine errors in ten are below {_m(best['H_90'])}.",
             "gain",
         )
     )
     pure = table[table["kind"] == NO_MODEL].set_index("N_D")
     if len(pure):
-        sentences.append((_worth(table, pure, best), "gain"))
-        harming = [row for _, row in physics.iterrows() if largest in pure.index and row["H"] > pure.loc[largest, "H"]]
-        harmed = ", ".join(str(row["model"]) for row in harming)
-        text = f"At {largest} runs {harmed} {'does' if len(harming) == 1 else 'do'} worse than no physics at all."
-        smallest = int(table["N_D"].min())
-        low = table[(table["N_D"] == smallest) & (table["kind"] != NO_MODEL)]
-        beaten = [
-            str(r["model"]) for _, r in low.iterrows() if smallest in pure.index and r["H"] > pure.loc[smallest, "H"]
-        ]
-        if not harming:
-            text = f"At {largest} runs every physics model does better than none."
-            if beaten and smallest != largest:
-                text = (
-                    f"At {smallest} runs {', '.join(beaten)} {'harms' if len(beaten) == 1 else 'harm'}: no physics at all "
-                    f"does better; at {largest} runs every physics model does better than none."
-                )
-        sentences.append((text, "gain"))
-    gains = physics["H"] / physics["A"]
-    sentences.append(
-        (
-            f"Compensation with {largest} runs leaves {gains.min():.0%} to {gains.max():.0%} of the error of physics alone "
-            f"(over {len(physics)} models).",
-            "horizon",
+        failed = results.cells[(results.cells["status"] != "ok") & (results.cells["kind"] != NO_MODEL)]
+        every = "every physics model" + (" with a result" if len(failed) else "")
+        sentences += [(_worth(table, pure, best), "gain"), (_harm(table, pure, every), "gain")]
+    known = physics[physics["A"] > 0]  # an exact model has no error that could be left
+    if len(known):
+        left = known["H"] / known["A"]
+        text = (
+            f"Compensation with {largest} runs leaves {left.min():.0%} to {left.max():.0%} of the error of physics "
+            f"alone (over {len(known)} models)."
         )
-    )
-    floor = naive_summary(results)["mean"]
-    worse = top[top["H"] >= floor]
-    beats = "every model beats it" if worse.empty else f"{', '.join(worse['model'])} do not beat it"
-    sentences.append((f"Keeping u, v and r constant gives {_m(floor)}: at {largest} runs {beats}.", "gain"))
-    return sentences
+        sentences.append((text, "horizon"))
+    return [*sentences, (_floor(top, largest, naive_summary(results)["mean"]), "gain")]
+
+
+def _caveats(results: Results) -> list[str]:
+    """What limits every sentence that follows: cells that are missing, and cells without a result."""
+    found, cells = [], results.cells
+    if not results.complete:
+        missing = results.plan.cells - len(cells)
+        found.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.")
+    failed = cells[cells["status"] != "ok"]
+    if len(failed):
+        why = "; ".join(f"{_words(row.model)}: {row.sentence}" for row in failed.drop_duplicates("model").itertuples())
+        found.append(f"{len(failed)} of {len(cells)} cells have no result ({why}).")
+    return found
+
+
+def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
+    """Which physics models do no better than none, at the largest and at the smallest amount of data."""
+    largest, smallest = int(table["N_D"].max()), int(table["N_D"].min())
+    if largest not in pure.index:
+        return f"There is no result without physics at {largest} runs, so whether physics harms there cannot be told."
+
+    def harming(amount: int) -> list[str]:
+        rows = table[(table["N_D"] == amount) & (table["kind"] != NO_MODEL)]
+        return [str(name) for name in rows[rows["H"] >= float(pure["H"].loc[amount])]["model"]]
+
+    if names := harming(largest):
+        verb = "does" if len(names) == 1 else "do"
+        return f"At {largest} runs {', '.join(names)} {verb} no better than no physics at all."
+    better = f"t {largest} runs {every} does better than none."
+    if smallest in pure.index and (names := harming(smallest)):
+        verb = "harms" if len(names) == 1 else "harm"
+        return f"At {smallest} runs {', '.join(names)} {verb}: no physics at all does as well or better; a{better}"
+    return f"A{better}"
+
+
+def _floor(top: pd.DataFrame, largest: int, floor: float) -> str:
+    """Which models do no better than constant motion, at the largest amount of data."""
+    names = [_words(str(name)) for name in top[top["H"] >= floor]["model"]]
+    beats = f"{', '.join(names)} {'does' if len(names) == 1 else 'do'} not beat it" if names else "every model beats it"
+    return f"Keeping u, v and r constant gives {_m(floor)}: at {largest} runs {beats}."
 
 
 def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
@@ -96,15 +114,14 @@ def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
     fewest = int(table["N_D"].min())
     first = table[(table["model"] == best["model"]) & (table["N_D"] == fewest)]
     if first.empty:
-        return "The best model has no result at the smallest amount of data, so its worth in runs cannot be told."
+        return f"{best['model']} has no result at {fewest} runs, so its worth in runs cannot be told."
     level = float(first["H"].iloc[0])
-    enough = pure[pure["H"] <= level]
     here = f"with {fewest} runs {best['model']} has {_m(level)}"
-    if len(pure) == 1:
-        return f"Without physics, {fewest} runs give {_m(float(pure['H'].iloc[0]))}, where {here}."
+    enough, last = pure[pure["H"] <= level], int(pure.index.max())
     if enough.empty:
-        last = int(pure.index.max())
-        return f"Without physics even {last} runs give {_m(float(pure['H'].loc[last]))}, where {here}."
+        return f"Without physics even {last} runs give {_m(float(pure['H'].loc[last]))}; {here}."
+    if int(enough.index.min()) == fewest:
+        return f"Without physics {fewest} runs do as well, {_m(float(pure['H'].loc[fewest]))}: {here}."
     return f"Without physics it takes {int(enough.index.min())} runs to do as well: {here}."
 
 
@@ -116,7 +133,8 @@ def findings(results: Results) -> list[dict[str, str]]:
     table = by_model(results)
     if table.empty:
         return []
-    top = table[table["N_D"] == table["N_D"].max()].set_index("kind")
+    largest = int(table["N_D"].max())
+    top = table[table["N_D"] == largest].set_index("kind")
     needed = (claims.accurate, claims.inaccurate, NO_MODEL)
     if any(name not in top.index for name in needed):
         return [_finding(key, "undecided", "a cell that it needs has failed or is missing") for key in CLAIMS]
@@ -124,7 +142,7 @@ def findings(results: Results) -> list[dict[str, str]]:
     physics = top[top.index != NO_MODEL]
     gap_before, gap_after = abs(bad["A"] - good["A"]), abs(bad["H"] - good["H"])
     pairs = "; ".join(f"{row['model']} {_m(row['A'])} -> {_m(row['H'])}{_range(row)}" for _, row in physics.iterrows())
-    worst, share = _worst_share(results, int(table["N_D"].max()))
+    worst, share = _worst_share(results, largest)
     return [
         _finding(
             "R1",
@@ -138,7 +156,7 @@ def findings(results: Results) -> list[dict[str, str]]:
         ),
         _finding(
             "R3",
-            _verdict(gap_after < gap_before, gap_after < gap_before),
+            _verdict(bool((_gaps(results, claims, largest) < gap_before).all()), gap_after < gap_before),
             f"gap {_m(gap_before)} before, {_m(gap_after)} after",
         ),
         _finding(
@@ -147,6 +165,13 @@ def findings(results: Results) -> list[dict[str, str]]:
             f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; most often worst: {worst}",
         ),
     ]
+
+
+def _gaps(results: Results, claims: Claims, N_D: int) -> pd.Series:
+    """Difference [m] of H between the accurate and the inaccurate model, of every seed that has both."""
+    cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == N_D)]
+    H = cells.pivot_table(index="seed", columns="kind", values="H")
+    return (H[claims.accurate] - H[claims.inaccurate]).dropna().abs()
 
 
 def _worst_share(results: Results, N_D: int) -> tuple[str, float]:
@@ -168,12 +193,17 @@ def _worst_share(results: Results, N_D: int) -> tuple[str, float]:
 
 
 def _verdict(always: bool, on_average: bool) -> str:
-    """Confirmed if it holds for every seed, undecided if only on average, else refuted."""
+    """Confirmed if it holds for every seed (R4: at every step), undecided if only on average, else refuted."""
     return "confirmed" if always else "undecided" if on_average else "refuted"
 
 
 def _finding(key: str, verdict: str, evidence: str) -> dict[str, str]:
     return {"id": key, "claim": CLAIMS[key], "verdict": verdict, "evidence": evidence}
+
+
+def _words(model: str) -> str:
+    """Name a model inside a sentence, where `none` would say something else."""
+    return "pure data-driven" if model == NO_MODEL else model
 
 
 def _m(value: float) -> str:

@@ -250,8 +250,8 @@ def _models(study: Study, file: Path) -> tuple[Model, ...]:
                 "this name is taken by the model without physics", file=file, path=f"family.{index}.name"
             )
         vessel = _vessel(family.base, file, f"family.{index}.base")
-        for variant in members(family, vessel, file):
-            found.append(Model(variant.name, family.name, variant.member, variant, vessel, family.description or ""))
+        words = family.description or ""
+        found += [Model(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
     names = [model.name for model in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

@@ -37,7 +37,6 @@ class Prepared:
     pool, test : windows for training and validation, and windows of the untouched test runs.
     models : foundations, after redraws.
     pool_paths, test_paths : model -> (T, S, 2) [m] in the frame (11); zeros for the model without physics.
-    failed : model -> share of test windows on which its physics diverged.
     notes : what was assumed, redrawn or left out, in sentences.
     """
 
@@ -197,15 +196,15 @@ def _roll_out(
 def _one_round(
     plan: Plan, dataset: Dataset, parts: Sequence[Windows], models: Sequence[Model]
 ) -> Iterator[tuple[Model, Pair, float]]:
-    """Paths of each model on (pool, test) and the share of pool windows on which it diverged; one rollout a structure."""
+    """Paths of each model on (pool, test), the share of pool windows on which it diverged; one rollout a structure."""
     prediction = plan.study.prediction
-    by_structure: dict[str, list[Model]] = {}
+    alike: dict[tuple[str, ...], list[Model]] = {}
     for model in models:
-        assert model.vessel is not None
-        by_structure.setdefault(model.vessel.structure, []).append(model)
-    for group in by_structure.values():
-        vessel = group[0].vessel
-        assert vessel is not None
+        vessel = own_vessel(model)
+        lags = (f"{path} {value}" for path, value in vessel.parameters.items() if ".actuator." in path)
+        alike.setdefault((vessel.structure, *lags), []).append(model)  # equal lags: equal hidden states at the start
+    for group in alike.values():
+        vessel = own_vessel(group[0])
         parameters = np.array([model.variant.parameters for model in group if model.variant is not None])
         (pool, pool_bad), (test, test_bad) = (
             physics_paths(
@@ -241,8 +240,15 @@ def _redraw(plan: Plan, model: Model, family: Family, share: float) -> Model:
     return replace(model, variant=draw(family, model.member, model.vessel, counter, plan.file))
 
 
+def own_vessel(model: Model) -> Vessel:
+    """Return the vessel of a model with the numbers of its variant."""
+    assert model.vessel is not None
+    assert model.variant is not None
+    return model.vessel.with_values(model.variant.values) if model.variant.values else model.vessel
+
+
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
-    """Hidden actuator states (S,) at the start of each window, modelled from that run's earlier orders; None if none."""
+    """Hidden actuator states (S,) at the start of each window, modelled from the earlier orders; None if none."""
     tracks: dict[str, list[tuple[Array, dict[str, Array]]]] = {}
     for run, rows in pieces(dataset):
         states = states_along(vessel, dataset.commands, rows)
@@ -295,11 +301,3 @@ def describe(model: Model) -> dict[str, Any]:
         row |= {"base": variant.base, "base_digest": variant.base_digest, "counter": variant.counter}
         row |= {"seed": variant.seed, "factors": dict(variant.factors), "values": dict(variant.values)}
     return row
-
-
-def with_paths(prepared: Prepared, model: str) -> Array:
-    """What the compensator of a model must learn on the pool: (T, S, 2) [m] = truth - physics."""
-    found = prepared.pool_paths[model]
-    if found.shape != prepared.pool.future.shape:
-        raise DataError(f"{model}: physics paths do not fit the windows")
-    return prepared.pool.future - found

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.metrics import over_horizon, over_time, position_error, summary
@@ -70,7 +71,7 @@ def read_results(folder: Path) -> Results:
         folder=folder,
         plan=plan,
         cells=cells,
-        models=_models(folder, physics, test),
+        models=_models(folder, physics),
         test=test,
         physics=physics,
         naive=naive,
@@ -80,7 +81,7 @@ def read_results(folder: Path) -> Results:
     )
 
 
-def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
+def _models(folder: Path, physics: Mapping[str, np.ndarray]) -> pd.DataFrame:
     frame = pd.DataFrame(store.read_json(folder / store.MODELS))
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)
@@ -259,6 +260,13 @@ def naive_summary(results: Results) -> dict[str, float]:
     return {"mean": found["mean"], "p90": found["p90"], "rms": found["rms"]}
 
 
+def reproducing_command(results: Results) -> str:
+    """Return the command that computes these results again: by name if bundled as it is, else of the stored study."""
+    original = documents.bundled("studies").get(results.plan.name)
+    unchanged = original is not None and documents.read(original) == results.plan.document
+    return f"shipid study run {results.plan.name if unchanged else f'{results.folder.name}/{store.STUDY}'}"
+
+
 def provenance_words(results: Results) -> dict[str, str]:
     """What the results stand on, as label -> text."""
     record, study = results.provenance, results.plan.study
@@ -270,7 +278,8 @@ def provenance_words(results: Results) -> dict[str, str]:
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
         "seeds": ", ".join(map(str, study.grid.seeds)),
         "recipe": f"{study.recipe.get('kind', 'fast')}: {results.plan.recipe.trials} trials",
-        "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, {machine.get('cores', '?')} cores",
+        "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
+        f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
         "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s",
     }

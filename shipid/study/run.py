@@ -18,13 +18,13 @@ import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.errors import ShipidError
-from shipid.estimation.training import use_threads
+from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.plan import Batch, Model, Plan
-from shipid.study.prepare import Prepared, describe, limits, minutes, obtain, prepare
+from shipid.study.prepare import Prepared, describe, limits, minutes, obtain, own_vessel, prepare
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
@@ -59,7 +59,7 @@ def run_study(
     ----------
     workers : processes of the local cluster, one thread each; default: one per core, no more than batches.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
-    device : PyTorch device of rollouts and training.
+    device : PyTorch device of training.
     """
     begun = time.perf_counter()
     store.open_folder(folder, plan)
@@ -101,6 +101,7 @@ def run_batch(
 ) -> list[tuple[dict[str, Any], Predictor | None]]:
     """All cells of one batch: (row of results, predictor) for every model. Pure: the same on every worker."""
     use_threads(1)
+    check_device(device)
     runs = prepared.runs(plan, batch)
     mask = np.isin(prepared.pool.run, runs)
     windows = prepared.pool.select(mask)
@@ -155,11 +156,8 @@ def _accuracy(prepared: Prepared, model: Model) -> dict[str, Any]:
 
 
 def _predictor(plan: Plan, prepared: Prepared, model: Model, batch: Batch, compensator: Any, windows: Any) -> Predictor:
-    vessel = model.vessel
-    if vessel is not None and model.variant is not None:
-        vessel = vessel.with_values(model.variant.values)
     return Predictor(
-        vessel=vessel,
+        vessel=None if model.vessel is None else own_vessel(model),
         compensator=compensator,
         horizon=windows.horizon,
         step=windows.step,

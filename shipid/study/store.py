@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid import document as documents
 from shipid.data.windows import Windows
-from shipid.errors import ResultError
+from shipid.errors import DocumentError, ResultError
+from shipid.predictor import read_arrays
 from shipid.study.plan import Batch, Plan, build_plan
 
 STUDY, PROVENANCE, DATASET, TEST, MODELS = "study.toml", "provenance.json", "dataset.parquet", "test.npz", "models.json"
@@ -58,10 +59,12 @@ def _plain(value: Any) -> Any:
 def open_folder(folder: Path, plan: Plan) -> None:
     """Make the folder of a run, or check that an existing one belongs to the same study."""
     if (folder / STUDY).exists():
-        if read_json(folder / PROVENANCE).get("digest") != plan.digest:
+        if _provenance(folder)["digest"] != plan.digest:
             raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
         return
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and not folder.is_dir():
+        raise ResultError("is a file: choose another --out", file=folder)
+    if folder.exists() and any(entry.name != PROVENANCE for entry in folder.iterdir()):
         raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -75,12 +78,23 @@ def stored_plan(folder: Path) -> Plan:
     """The plan of a run from its folder; vessel files named by path are looked for beside the original study."""
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
-    provenance = read_json(folder / PROVENANCE)
-    document = tomllib.loads((folder / STUDY).read_text(encoding="utf-8"))
+    provenance = _provenance(folder)
+    try:
+        document = documents.read(folder / STUDY)
+    except DocumentError as error:
+        raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
     plan = build_plan(document, Path(provenance["file"]))
     if plan.digest != provenance["digest"]:
         raise ResultError("a vessel of this study has changed since the run: run the study again", file=folder)
     return plan
+
+
+def _provenance(folder: Path) -> dict[str, Any]:
+    """Read what says to which study a folder belongs; ResultError where it does not say so."""
+    record = read_json(folder / PROVENANCE)
+    if not isinstance(record, dict) or not {"digest", "name", "file"} <= record.keys():
+        raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
+    return record
 
 
 def batch_file(folder: Path, batch: Batch) -> Path:
@@ -140,11 +154,10 @@ def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], nai
 def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:
     """Test windows, physics paths by model, and the naive floor's errors (T, S)."""
     try:
-        with np.load(folder / TEST, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError):
+        arrays = read_arrays(folder / TEST)
+        meta = json.loads(str(arrays["meta"]))
+    except (OSError, ValueError, KeyError):
         raise ResultError("missing or damaged: continue with `shipid study resume`", file=folder / TEST) from None
-    meta = json.loads(str(arrays["meta"]))
 
     def named(prefix: str) -> dict[str, np.ndarray]:
         return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}

@@ -10,13 +10,12 @@ from typing import Any
 
 def run() -> dict[str, Any]:
     """Least wall time [s] of `shipid --help`, of a bare interpreter, and of `shipid vessel show`."""
+    call = "import sys; from shipid.cli import main; sys.argv = ['shipid', {}]; main()"
     commands = {
         "python -c pass [s]": ["-c", "pass"],
-        "shipid --help [s]": ["-c", "import sys; sys.argv = ['shipid', '--help']; from shipid.cli import main; main()"],
-        "shipid vessel show [s]": [
-            "-c", "import sys; sys.argv = ['shipid', 'vessel', 'show', 'gunnerus-28.9']; from shipid.cli import main; main()"
-        ],
-    }  # fmt: skip
+        "shipid --help [s]": ["-c", call.format("'--help'")],
+        "shipid vessel show [s]": ["-c", call.format("'vessel', 'show', 'gunnerus-28.9'")],
+    }
     result = {}
     for name, arguments in commands.items():
         best = float("inf")

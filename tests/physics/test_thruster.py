@@ -99,8 +99,8 @@ def test_continuations_join_the_polynomial(entry: str, values: tuple[float, floa
 
 def test_a_stopped_unit_drags() -> None:
     """At n = 0 the over-running part remains: about k_over2 rho D_p^2 u^2."""
-    X = numbers(azimuth()(np.array([5.0, 0, 0, 0, 0, 0]), 0.0, 0.0))[0]
-    assert X == pytest.approx(-0.12 * 1025 * 1.9**2 * 25, rel=0.01)
+    drag = numbers(azimuth()(np.array([5.0, 0, 0, 0, 0, 0]), 0.0, 0.0))[0]
+    assert drag == pytest.approx(-0.12 * 1025 * 1.9**2 * 25, rel=0.01)
 
 
 def test_tunnel_at_200_rpm_is_the_published_polynomial() -> None:

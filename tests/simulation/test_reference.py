@@ -44,7 +44,7 @@ def calm_run(name: str, rpm: np.ndarray, deg: np.ndarray, u: np.ndarray, seconds
     """Both azimuths alike, no wind, RK4 at 0.5 s, straight ahead at u to begin with."""
     vessel = load_vessel(name).with_values({"wind.off": True})
     zero = np.zeros(len(rpm))
-    start = {state: zero for state in dynamics(vessel).state} | {"u": u}
+    start = dict.fromkeys(dynamics(vessel).state, zero) | {"u": u}
     commands = {
         command: rpm / 60 if command.endswith(".n") else np.radians(deg) for command in dynamics(vessel).commands
     }
@@ -53,7 +53,7 @@ def calm_run(name: str, rpm: np.ndarray, deg: np.ndarray, u: np.ndarray, seconds
 
 @pytest.mark.parametrize("name", list(SPEEDS))
 def test_steady_speeds(name: str) -> None:
-    """To the printed digits; below 100 rpm the printed run had not quite settled (it still gained 0.01 m/s in 100 s)."""
+    """To the printed digits; below 100 rpm the printed run had not settled (still 0.01 m/s in 100 s)."""
     rpm = np.array(list(SPEEDS[name]))
     found = calm_run(name, rpm, 0 * rpm, rpm / 33.0, 900)
     error = np.abs(found["u"][-1, 0] - list(SPEEDS[name].values()))

@@ -227,7 +227,7 @@ def test_wind_that_is_off_is_not_asked_for(draw_inputs: Draw) -> None:
 def test_wrong_shapes_are_refused(draw_inputs: Draw) -> None:
     vessel = load_vessel("gunnerus-28.9")
     given = draw_inputs(vessel, 3)
-    with pytest.raises(ShipidError, match="'port.n' must be"):
+    with pytest.raises(ShipidError, match=r"'port\.n' must be"):
         rollout(
             vessel,
             given["start"],

@@ -94,7 +94,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 
 def test_unknown_name_is_corrected() -> None:
-    with pytest.raises(DocumentError, match="did you mean 'gunnerus-28.9'"):
+    with pytest.raises(DocumentError, match=r"did you mean 'gunnerus-28\.9'"):
         load_vessel("gunnerus-28")
 
 

@@ -49,7 +49,7 @@ def test_mass_is_positive_definite(vessel: Vessel) -> None:
 def test_extra_force_at_rest_is_force_over_mass(vessel: Vessel) -> None:
     tau = np.array([1e4, -2e4, 3e5] if len(vessel.axes) == 3 else [1e4, -2e4, *[1e4] * (len(vessel.axes) - 3), 3e5])
     without, found = rates(vessel), rates(vessel, tau)
-    names = [name for name in dynamics(vessel).state[len(vessel.axes) :]]
+    names = dynamics(vessel).state[len(vessel.axes) :]
     difference = np.array([found[name] - without[name] for name in names])
     np.testing.assert_allclose(difference, np.linalg.solve(mass_matrix(vessel), tau), rtol=1e-9, atol=1e-12)
 

@@ -20,9 +20,8 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
     if term.components is not None:
         given |= set(term.components(**dict.fromkeys(counts(term), 3)))
     assert set(signals(term.function)) <= given
-    assert {"return", *signals(term.function), *(p.name for p in parameters(term.function))} == {
-        name for name in term.function.__annotations__
-    }
+    known = {"return", *signals(term.function), *(p.name for p in parameters(term.function))}
+    assert known == set(term.function.__annotations__)
 
 
 def test_parameters_are_read_off_the_signature() -> None:
