@@ -194,12 +194,9 @@ def study_variants(
         rows.append((model.name, "-" if score is None else f"{score:.2f}", str(len(factors)), shown))
     _print(_table(["model", "A [m]", "changed", "factors"], rows))
     if save is not None:
-        from shipid.study.store import write_text
+        from shipid.study.store import write_patches
 
-        patches = [model.variant for model in models if model.variant]
-        for variant in patches:
-            write_text(save / f"{variant.name}.toml", variant.document())
-        typer.echo(f"{len(patches)} patches -> {save}")
+        typer.echo(f"{write_patches(save, models)} patches -> {save}")
 
 
 @study_app.command("run")

@@ -90,3 +90,13 @@ def draw_inputs() -> Callable[[Vessel, int], Inputs]:
         }
 
     return draw
+
+
+@pytest.fixture(scope="session")
+def tiny_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a finished run of the smallest study there is; not to be written to."""
+    from tests.study.tiny import run_here, tiny_plan
+
+    folder = tmp_path_factory.mktemp("tiny")
+    run_here(tiny_plan(folder), folder / "run")
+    return folder / "run"

@@ -77,7 +77,9 @@ def _caveats(results: Results) -> list[str]:
         found.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.")
     failed = cells[cells["status"] != "ok"]
     if len(failed):
-        why = "; ".join(f"{_words(row.model)}: {row.sentence}" for row in failed.drop_duplicates("model").itertuples())
+        why = "; ".join(
+            f"{_words(str(row.model))}: {row.sentence}" for row in failed.drop_duplicates("model").itertuples()
+        )
         found.append(f"{len(failed)} of {len(cells)} cells have no result ({why}).")
     return found
 
@@ -138,7 +140,7 @@ def findings(results: Results) -> list[dict[str, str]]:
     needed = (claims.accurate, claims.inaccurate, NO_MODEL)
     if any(name not in top.index for name in needed):
         return [_finding(key, "undecided", "a cell that it needs has failed or is missing") for key in CLAIMS]
-    good, bad = top.loc[claims.accurate], top.loc[claims.inaccurate]
+    good, bad = top.loc[[claims.accurate]].iloc[0], top.loc[[claims.inaccurate]].iloc[0]
     physics = top[top.index != NO_MODEL]
     gap_before, gap_after = abs(bad["A"] - good["A"]), abs(bad["H"] - good["H"])
     pairs = "; ".join(f"{row['model']} {_m(row['A'])} -> {_m(row['H'])}{_range(row)}" for _, row in physics.iterrows())

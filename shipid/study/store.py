@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from shipid import document as documents
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
 from shipid.predictor import read_arrays
-from shipid.study.plan import Batch, Plan, build_plan
+from shipid.study.plan import Batch, Model, Plan, build_plan
 
 STUDY, PROVENANCE, DATASET, TEST, MODELS = "study.toml", "provenance.json", "dataset.parquet", "test.npz", "models.json"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
@@ -95,6 +96,18 @@ def _provenance(folder: Path) -> dict[str, Any]:
     if not isinstance(record, dict) or not {"digest", "name", "file"} <= record.keys():
         raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
     return record
+
+
+def write_patches(folder: Path, models: Iterable[Model]) -> int:
+    """Write a patch document for every variant and return how many; it loads from anywhere and rebuilds it exactly."""
+    count = 0
+    for model in models:
+        if model.vessel is not None and model.variant is not None:
+            named = documents.bundled("models").get(model.variant.base) == Path(model.vessel.file)
+            base = model.variant.base if named else str(Path(model.vessel.file).absolute())
+            write_text(folder / f"{model.name}.toml", replace(model.variant, base=base).document())
+            count += 1
+    return count
 
 
 def batch_file(folder: Path, batch: Batch) -> Path:

@@ -1,0 +1,49 @@
+"""The smallest study there is: 12 short manoeuvres, 3 models, networks that hardly train."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset
+from shipid.study import run
+from shipid.study.plan import Batch, Plan, read_plan
+from shipid.study.prepare import Prepared
+
+TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
+
+
+def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
+    """Plan of the tiny study, written into a folder as `tiny.toml`."""
+    file = folder / "tiny.toml"
+    file.write_text(TINY.read_text())
+    return read_plan(file, changes)
+
+
+def run_here(plan: Plan, folder: Path) -> list[run.Event]:
+    """Run a study in this process, without a cluster."""
+
+    def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *_: Any) -> Iterator[Any]:
+        for batch in batches:
+            yield batch, run.run_batch(plan, prepared, batch, "cpu")
+
+    with patch.object(run, "_compute", compute):
+        return list(run.run_study(plan, folder))
+
+
+def logged(runs: Mapping[str, Mapping[str, Any]], t: np.ndarray, **metadata: Any) -> Dataset:
+    """Dataset of runs with constant or given columns: name -> column -> value or array; commands default to rest."""
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    orders = {f"{side}.{signal}": 0.0 for side in ("port", "starboard") for signal in ("n", "alpha")}
+    frames = [
+        pd.DataFrame({"run": pd.Series([name] * len(t), dtype="str"), "t": t, **still, **orders, **columns, "flags": 0})
+        for name, columns in runs.items()
+    ]
+    frame = pd.concat(frames, ignore_index=True)
+    numbers = [name for name in frame.columns if name not in ("run", "flags")]
+    return Dataset(frame.astype(dict.fromkeys(numbers, "float64")), {"clock": "run", "flags": [], **metadata})
