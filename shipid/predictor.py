@@ -120,7 +120,7 @@ class Predictor:
 def read_arrays(file: str | os.PathLike[str]) -> dict[str, Array]:
     """Read all arrays of a `.npz`, never a pickle: OSError if it cannot be opened, ValueError for anything else."""
     try:
-        with np.load(file, allow_pickle=False) as stored:
+        with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{file} is not a whole .npz") from error

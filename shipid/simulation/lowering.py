@@ -188,17 +188,23 @@ def _stack(like: torch.Tensor, values: Sequence[Any]) -> torch.Tensor:
 
 @dataclass(frozen=True)
 class Program:
-    """A lowered step: `prologue(parameters)` once, then `step(x, m, commands, environment, tau, *hoisted)`."""
+    """A lowered step.
+
+    prologue : parameters (P, V, 1) -> hoisted tensors, once a rollout.
+    step : (state, memory, greatest, commands, environment, tau, *hoisted) -> the first three after the step, and the
+        record (C, V, S) of the kept channels. One kernel when compiled: nothing is written that is not kept.
+    """
 
     prologue: Callable[[torch.Tensor], list[torch.Tensor]]
-    step: Callable[..., tuple[torch.Tensor, torch.Tensor]]
+    step: Callable[..., tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]]
 
 
 @lru_cache(maxsize=32)
-def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Program:
+def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], compiled: bool) -> Program:
     """Lower the functions of a vessel's structure and put the integrator around them; one compilation each."""
     lowered_rates, lowered_advance = lower(model.rates), lower(model.advance)
     lowered_sums = [(lower(term.function), torch.tensor(term.arrays.T)) for term in model.sums]
+    speeds = slice(model.num_dof, 2 * model.num_dof)
 
     def prologue(parameters: torch.Tensor) -> list[torch.Tensor]:
         hoisted = [lowered_rates.prologue(parameters), lowered_advance.prologue(parameters)]
@@ -207,11 +213,12 @@ def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Pr
     def one_step(
         x: torch.Tensor,
         m: torch.Tensor,
+        greatest: torch.Tensor,
         commands: torch.Tensor,
         environment: torch.Tensor,
         tau: torch.Tensor,
         *hoisted: torch.Tensor,
-    ) -> tuple[torch.Tensor, torch.Tensor]:
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
         h_rates, h_advance, *h_sums = hoisted
 
         def rates(state: Any, memory: Any) -> Any:
@@ -227,7 +234,14 @@ def _program(model: Dynamics, method: Method, step: float, compiled: bool) -> Pr
             return lowered_advance.main(x, memory, commands, environment, h_advance, [dt])
 
         after, memory_after = integrate(rates, advance, _add, list(x), list(m), step, method)
-        return torch.stack(after), torch.stack(memory_after) if memory_after else m
+        both = [*after, *memory_after]
+        speed = greatest
+        for value in after[speeds]:
+            speed = torch.maximum(speed, torch.abs(value))  # both keep NaN
+        for value in both:
+            speed = speed + 0 * value
+        record = torch.stack([both[row] for row in rows])
+        return torch.stack(after), torch.stack(memory_after) if memory_after else m, speed, record
 
     return Program(prologue, torch.compile(one_step, dynamic=False, fullgraph=True) if compiled else one_step)
 
@@ -259,7 +273,7 @@ def run_torch(
     Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
     a family of any size needs one compilation and a block stays in the cache.
     """
-    program = _program(model, method, step, compiled)
+    program = _program(model, method, step, tuple(rows), compiled)
     num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
     width = min(COMPILED_BLOCK if compiled else EAGER_BLOCK, 1 << max(0, num_samples - 1).bit_length())
     padded = -(-num_samples // width) * width
@@ -282,33 +296,15 @@ def run_torch(
                 block = slice(left, left + width)
                 inputs = [channel[..., block] for channel in held]
                 shape = (-1, hoisted[0].shape[1], width)
-                state = [start[..., block].expand(shape).contiguous(), memory[..., block].expand(shape).contiguous()]
-                worst[group, block] = _run_block(
-                    program, state, inputs, hoisted, records[..., group, block], rows, every
-                )
+                x, m = (part[..., block].expand(shape).contiguous() for part in (start, memory))
+                both = torch.cat([x, m])
+                records[0, :, group, block] = both[rows]
+                greatest = both[model.num_dof : len(model.state)].abs().amax(0) + 0 * both.sum(0)
+                for k in range(num_steps):
+                    now = [series[min(k, len(series) - 1)] for series in inputs]
+                    x, m, greatest, record = program.step(x, m, greatest, *now, *hoisted)
+                    if (k + 1) % every == 0:
+                        records[(k + 1) // every, :, group, block] = record
+                worst[group, block] = greatest
     result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
     return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
-
-
-def _run_block(
-    program: Program,
-    state: list[torch.Tensor],
-    inputs: list[torch.Tensor],
-    hoisted: list[torch.Tensor],
-    records: torch.Tensor,
-    rows: list[int],
-    every: int,
-) -> torch.Tensor:
-    """All steps of one block; fills `records` (R, C, V, S) and returns the greatest speed (V, S)."""
-    x, m = state
-    num_dof = x.shape[0] // 2
-    greatest = torch.zeros_like(x[0])
-    for record in range(len(records)):
-        if record:
-            for k in range((record - 1) * every, record * every):
-                now = [series[min(k, len(series) - 1)] for series in inputs]
-                x, m = program.step(x, m, *now, *hoisted)
-        both = torch.cat([x, m]) if len(m) else x
-        records[record] = both[rows]
-        greatest = torch.maximum(greatest, both[num_dof : 2 * num_dof].abs().amax(0) + 0 * both.sum(0))
-    return greatest

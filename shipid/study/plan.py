@@ -280,7 +280,7 @@ def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
     for role, name in (("accurate", study.claims.accurate), ("inaccurate", study.claims.inaccurate)):
         if name not in families:
             raise DocumentError(
-                f"{name!r} is not a family: {choices(name, families)}", file=file, path=f"claims.{role}"
+                f"{name!r} is not a family: {choices(name, set(families))}", file=file, path=f"claims.{role}"
             )
         if families.count(name) > 1:
             message = f"{name!r} has {families.count(name)} members: the findings compare one model with one"

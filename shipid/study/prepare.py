@@ -181,8 +181,12 @@ def _roll_out(
         again = []
         for model, paths, share in _one_round(plan, dataset, parts, waiting):
             if share:
-                again.append(_redraw(plan, model, families[model.family], share))
-                notes.append(f"{model.name} diverged on {share:.1%} of the training windows: redrawn")
+                drawn = _redraw(plan, model, families[model.family], share)
+                counter = drawn.variant.counter if drawn.variant else 0
+                notes.append(
+                    f"{model.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}"
+                )
+                again.append(drawn)
             else:
                 finished[model.name] = (model, paths)
         waiting = again

@@ -188,6 +188,20 @@ def test_lag_follows_its_analytic_solution(draw_inputs: Draw) -> None:
     np.testing.assert_allclose(reached, np.tile(order, (4, 1)), rtol=1e-14)
 
 
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+def test_explicit_euler_uses_what_the_actuator_has_reached(engine: Any) -> None:
+    """From rest with the shafts at rest, the first step gives no thrust, the second that of the lagged shaft."""
+    lag = {f"thruster.{side}.actuator.n": LAG for side in ("port", "starboard")}
+    vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True, **lag})
+    model = dynamics(vessel)
+    commands = {name: np.full(1, 2.0 if name.endswith(".n") else 0.0) for name in model.commands}
+    still = {"port.n": np.zeros(1), "starboard.n": np.zeros(1)}
+    found = rollout(vessel, zeros(model.state), commands, step=1.0, num_steps=2, memory=still, engine=engine)
+    n = 2.0 * (1 - np.exp(-0.5))
+    gained = 2 * 0.8208 * 1025 * n**2 * 1.9**4 / (410931.81 + 79320.5895)
+    np.testing.assert_allclose(found["u"][:, 0, 0], [0.0, 0.0, gained], rtol=1e-6, atol=1e-6)
+
+
 def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
     """Uneven rows: first order reached, then an exponential from row to row, each order held until the next."""
     vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})

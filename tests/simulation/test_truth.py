@@ -1,0 +1,130 @@
+"""The simulated truth: draws, ranges, and a log that a ship could have written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from pydantic import ValidationError
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DocumentError
+from shipid.simulation.truth import Truth, simulate
+from shipid.vessel.load import load_vessel
+from tests.conftest import LAG, PATCHED
+
+SHIP = load_vessel("gunnerus-28.9")
+
+
+def truth(**changes: Any) -> Truth:
+    return Truth(**{"vessel": "gunnerus-28.9", "manoeuvres": 6, "duration": 4.0, "step": 0.1, "seed": 5, **changes})
+
+
+def first_rows(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame[frame["t"] == 0.0].reset_index(drop=True)
+
+
+def test_more_manoeuvres_change_none_that_exist() -> None:
+    few, many = simulate(truth(), SHIP), simulate(truth(manoeuvres=12), SHIP)
+    assert many["run"].nunique() == 12
+    pd.testing.assert_frame_equal(many.iloc[: len(few)], few)
+
+
+def test_another_seed_draws_anew() -> None:
+    assert not np.isin(first_rows(simulate(truth(), SHIP))["psi"], simulate(truth(seed=6), SHIP)["psi"]).any()
+
+
+def test_draws_fill_their_ranges() -> None:
+    """400 draws: inside, uniform (mean within 5 standard errors), and close to both ends."""
+    count = 400
+    rows = first_rows(simulate(truth(manoeuvres=count, duration=1.0, step=1.0, start_speed=(0.5, 2.5)), SHIP))
+    ranges = {
+        "port.n": (50 / 60, 200 / 60),
+        "port.alpha": (-50 * np.pi / 180, 50 * np.pi / 180),
+        "V_w": (0.0, 6.0),
+        "beta_w": (0.0, 2 * np.pi),
+        "psi": (0.0, 2 * np.pi),
+        "u": (0.5, 2.5),
+    }
+    for name, (low, high) in ranges.items():
+        values, width = rows[name].to_numpy(), high - low
+        assert low <= values.min() < low + 0.03 * width, name
+        assert high - 0.03 * width < values.max() <= high, name
+        assert abs(values.mean() - (low + high) / 2) < 5 * width / np.sqrt(12 * count), name
+    drawn = rows[list(ranges)].to_numpy()
+    off_diagonal = np.corrcoef(drawn.T) - np.eye(len(ranges))
+    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity on its own
+
+
+def test_orders_and_wind_hold_and_are_equal_on_both_sides() -> None:
+    frame = simulate(truth(), SHIP)
+    for signal in ("n", "alpha"):
+        np.testing.assert_array_equal(frame[f"port.{signal}"], frame[f"starboard.{signal}"])
+    for name in ("port.n", "port.alpha", "V_w", "beta_w"):
+        assert (frame.groupby("run")[name].nunique() == 1).all()
+        assert frame[name].nunique() == 6
+
+
+def test_log_obeys_kinematics() -> None:
+    """Positions are the integral of the logged velocities: trapezoid on a fine log."""
+    frame = simulate(truth(interval=0.1, duration=8.0, start_speed=(1.0, 3.0)), SHIP)
+    for _, run in frame.groupby("run"):
+        t, psi, u, v = (run[name].to_numpy() for name in ("t", "psi", "u", "v"))
+        for name, rate in (
+            ("north", u * np.cos(psi) - v * np.sin(psi)),
+            ("east", u * np.sin(psi) + v * np.cos(psi)),
+            ("psi", run["r"].to_numpy()),
+        ):
+            moved = np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
+            assert run[name].iloc[-1] - run[name].iloc[0] == pytest.approx(moved, abs=2e-3)
+
+
+def test_interval_only_thins_the_log() -> None:
+    fine, coarse = simulate(truth(interval=0.5), SHIP), simulate(truth(interval=2.0), SHIP)
+    thinned = fine[np.isclose(fine["t"] % 2.0, 0.0)].reset_index(drop=True)
+    pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-12)
+
+
+def test_actuators_start_at_order_or_at_rest() -> None:
+    """At constant orders that are reached, a lag is no lag; from rest, the ship starts later."""
+    lagged = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
+    direct, at_order = simulate(truth(), SHIP), simulate(truth(actuators_at="order"), lagged)
+    pd.testing.assert_frame_equal(direct, at_order, rtol=1e-9)
+    at_rest = simulate(truth(actuators_at="rest"), lagged)
+    ahead = np.abs(first_rows(direct)["port.alpha"]) < 0.6
+    last = direct["t"] == 4.0
+    assert (at_rest.loc[last, "u"].to_numpy()[ahead] < direct.loc[last, "u"].to_numpy()[ahead] - 0.05).all()
+
+
+@pytest.mark.parametrize("name", list(PATCHED))
+def test_every_structure_logs_a_dataset(name: str) -> None:
+    """What is not measured on board (current) is not logged; heave has the name that datasets give it."""
+    base, values = PATCHED[name]
+    frame = simulate(truth(manoeuvres=2, duration=2.0), load_vessel(base).with_values(values))
+    columns = Dataset(frame, {"clock": "run", "flags": []}).frame.columns
+    assert "V_c" not in columns
+    assert ("z" in columns) == (name == "six")
+
+
+def test_diverging_truth_is_told() -> None:
+    wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
+    with pytest.raises(DocumentError, match=r"diverges in manoeuvre \d+ of 6") as caught:
+        simulate(truth(start_speed=(2.0, 3.0)), wild)
+    assert caught.value.path == "truth"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"interval": 0.25}, "multiple of step"),
+        ({"duration": 0.5}, "holds no interval"),
+        ({"n_rpm": (200.0, 50.0)}, "n_rpm runs backwards"),
+        ({"manoeuvres": 1}, "greater than or equal to 2"),
+        ({"wind": 3.0}, "Extra inputs"),
+    ],
+)
+def test_impossible_truths_are_refused(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        truth(**changes)

@@ -1,0 +1,91 @@
+"""Broken study documents: one line each, with the file, the dotted path and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.study.plan import read_plan
+
+FOLDER = Path(__file__).parents[1] / "bad" / "studies"
+
+#: file -> dotted path that must be named, and a piece of the remedy
+BROKEN = {
+    "not-toml": ("", "not valid TOML"),
+    "key-twice": ("", "overwrite"),
+    "unknown-block": ("splits", "did you mean 'split'?"),
+    "no-question": ("question", "missing"),
+    "question-of-nothing": ("question", "at least 3 characters"),
+    "truth-and-data": ("", "either [truth] (simulation) or [data]"),
+    "neither-truth-nor-data": ("", "either [truth] (simulation) or [data]"),
+    "data-of-two-sources": ("data", "either `dataset`, or `mapping`"),
+    "dataset-with-repairs": ("data", "go with a `mapping`"),
+    "unknown-truth-vessel": ("truth.vessel", "did you mean 'gunnerus-"),
+    "truth-sets-unknown-block": ("truth.set.thruster.port.lag", "unknown key: valid: D_p"),
+    "truth-sets-inside-a-number": ("truth.set", "runs through a number"),
+    "truth-range-backwards": ("truth", "start_speed runs backwards"),
+    "interval-between-steps": ("truth", "a multiple of step 0.3 s"),
+    "horizon-longer-than-runs": ("truth.duration", "shorter than the horizon of 21 s"),
+    "step-of-zero": ("prediction.step", "greater than 0"),
+    "unknown-method": ("prediction.method", "'euler' or 'rk4'"),
+    "unknown-base": ("family.0.base", "did you mean 'gunnerus-28.9'?"),
+    "missing-base-file": ("family.0.base", "'./gone.toml': no such file"),
+    "family-without-base": ("family.0.base", "name a base vessel"),
+    "extends-nobody": ("family.0.extends", "did you mean 'wrong'?"),
+    "circular-extends": ("family.0.extends", "right -> wrong"),
+    "range-backwards": ("family.1.perturb.0", "give [low, high]"),
+    "range-of-three": ("family.1.perturb.0.factor", "valid"),
+    "selects-nothing": ("family 'wrong'.perturb.0.parameters", "did you mean 'hull.derivatives."),
+    "factor-without-parameters": ("family.1.perturb.0", "go together"),
+    "parameters-without-factor": ("family.1.perturb.0", "go together"),
+    "negative-mass": ("family 'wrong'", "inertia.m: -410931.81"),
+    "family-called-none": ("family.0.name", "taken by the model without physics"),
+    "family-called-like-a-member": ("family", "two models would be called 'wrong-1'"),
+    "two-families-of-one-name": ("family.1.name", "two families are called 'right'"),
+    "family-with-a-slash": ("family.0.name", "'a/b'"),
+    "no-families": ("family", "at least 1"),
+    "more-data-than-runs": ("grid.N_D", "12 manoeuvres less 4 test runs leave 8"),
+    "empty-grid": ("grid.N_D", "at least 1"),
+    "one-run-for-training": ("grid.N_D.0", "greater than or equal to 2"),
+    "negative-seed": ("grid.seeds.0", "greater than or equal to 0"),
+    "all-runs-test": ("split.test", "of 12 manoeuvres at most 10 can test"),
+    "no-test-run": ("split.test", "at least 1"),
+    "named-test-of-a-truth": ("split.test", "give the number of test runs"),
+    "unknown-recipe": ("recipe", "did you mean 'fast'?"),
+    "unknown-recipe-key": ("recipe.epoch", "did you mean 'epochs'?"),
+    "recipe-key-of-python": ("recipe.name", "unknown key"),
+    "recipe-of-no-trials": ("recipe.trials", "greater than 0"),
+    "claims-of-nobody": ("claims.accurate", "did you mean 'right'?"),
+    "claims-of-no-physics": ("claims.inaccurate", "valid: right, wrong"),
+    "claims-of-many-members": ("claims.inaccurate", "2 members"),
+    "claims-of-one-family": ("claims.inaccurate", "the same family"),
+}
+
+
+def test_every_document_of_the_folder_is_tested() -> None:
+    assert {file.stem for file in FOLDER.glob("*.toml")} == {"plain", *BROKEN}
+
+
+def test_the_plain_one_is_in_order() -> None:
+    """What the broken ones differ from is read, so that their flaw is the one that is meant."""
+    assert read_plan(FOLDER / "plain.toml").cells == 8
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken(name: str) -> None:
+    path, remedy = BROKEN[name]
+    with pytest.raises(DocumentError) as caught:
+        read_plan(FOLDER / f"{name}.toml")
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(str(FOLDER / f"{name}.toml") + ": ")
+    assert (caught.value.path or "") == path
+    assert remedy in line
+
+
+@pytest.mark.parametrize("name", ["nowhere.toml", "./nowhere.toml", "quik"])
+def test_no_such_study(name: str) -> None:
+    with pytest.raises(DocumentError, match=r"no such file|did you mean 'quick'\?"):
+        read_plan(name)

@@ -1,0 +1,125 @@
+"""Plans: bundled studies, changes from the command line, digests, batches."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from shipid.document import bundled, bundled_folder
+from shipid.errors import DocumentError
+from shipid.study.plan import NO_MODEL, build_plan, read_plan
+from shipid.vessel.load import load_vessel
+from tests.study.tiny import tiny_plan
+
+
+@pytest.mark.parametrize(("name", "models", "batches"), [("quick", 3 + 2 + 1, 3), ("full-scale", 3 + 1, 3 * 3)])
+def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
+    plan = read_plan(name)
+    assert (len(plan.models), len(plan.batches), plan.cells) == (models, batches, models * batches)
+    assert [model.name for model in plan.models if model.vessel is None] == [NO_MODEL]
+    assert plan.study.question.endswith("?")
+
+
+def test_every_bundled_study_is_tested() -> None:
+    assert set(bundled("studies")) == {"quick", "full-scale"}
+
+
+def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
+    """The architecture document pins it: higher-order damping removed, N_ur, Y_ur, N_uv times 0.6, nothing else."""
+    models = {model.name: model for model in read_plan("full-scale").models}
+    variant, base = models["inaccurate"].variant, load_vessel("gunnerus-28.9").parameters
+    assert variant is not None
+    wanted = dict(base)
+    for path in base:
+        _, _, factors = path.removeprefix("hull.derivatives.").partition("_")
+        if path.startswith("hull.derivatives.") and len(re.sub(r"\|", "", factors)) >= 3:
+            wanted[path] = 0.0
+    for name in ("N_ur", "Y_ur", "N_uv"):
+        wanted[f"hull.derivatives.{name}"] *= 0.6
+    found = dict(zip(base, variant.parameters, strict=True))
+    assert found == pytest.approx(wanted, rel=1e-15)
+    assert sum(value == 0.0 for path, value in found.items() if base[path] != 0.0) > 5
+    accurate = models["accurate"].variant
+    assert accurate is not None
+    assert accurate.parameters == list(base.values())
+
+
+def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"grid.N_D": [6, 4, 6], "grid.seeds": [2, 0, 2]})
+    assert sorted((batch.N_D, batch.seed) for batch in plan.batches) == [(4, 0), (4, 2), (6, 0), (6, 2)]
+    assert len({batch.key for batch in plan.batches}) == 4
+    assert plan.cells == 4 * 4
+
+
+def test_changes_reach_the_document(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "recipe.epochs": 7, "description": "new"})
+    assert [model.name for model in plan.models][1:6] == [f"wrong-{k}" for k in range(1, 6)]
+    assert (plan.batches[0].N_D, plan.recipe.epochs, plan.study.description) == (3, 7, "new")
+
+
+@pytest.mark.parametrize(
+    ("changes", "path"),
+    [
+        ({"grd.N_D": [3]}, "grd.N_D"),
+        ({"grid.N_D": [3], "question.x": 1}, "question.x"),
+        ({"grid.N_D": [3], "question.x.y": 1}, "question.x.y"),
+        ({"family.9.members": 3}, "family.9.members"),
+        ({"family.first.members": 3}, "family.first.members"),
+        ({"recipe.kind.name": "fast"}, "recipe.kind.name"),
+    ],
+)
+def test_changes_that_reach_nothing_are_told(tmp_path: Path, changes: dict[str, object], path: str) -> None:
+    with pytest.raises(DocumentError, match="--set") as caught:
+        tiny_plan(tmp_path, changes)
+    assert caught.value.path == path
+
+
+def test_digest_follows_the_document(tmp_path: Path) -> None:
+    plain = tiny_plan(tmp_path)
+    assert tiny_plan(tmp_path).digest == plain.digest
+    assert tiny_plan(tmp_path, {"truth.seed": 4}).digest != plain.digest
+    turned = dict(reversed(plain.document.items()))
+    assert build_plan(turned, Path(plain.file)).digest == plain.digest
+
+
+@pytest.mark.parametrize("role", ["truth", "base"])
+def test_digest_follows_every_vessel(tmp_path: Path, role: str) -> None:
+    """Not only models, the vessel behind the truth too changes what comes out."""
+    own = tmp_path / "own.toml"
+    original = (bundled_folder("models") / "gunnerus-28.9.toml").read_text()
+    own.write_text(original)
+    change = {"truth.vessel": "./own.toml"} if role == "truth" else {"family.0.base": "./own.toml"}
+    before = tiny_plan(tmp_path, change).digest
+    own.write_text(re.sub(r"(?m)^m( *)= [\d.]+", r"m\1= 400000.0", original, count=1))
+    assert load_vessel(str(own)).parameters["inertia.m"] == 400000.0
+    assert tiny_plan(tmp_path, change).digest != before
+
+
+def test_stored_text_is_the_same_study(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"grid.N_D": [3, 5], "description": 'a "quoted" word'})
+    again = tmp_path / "again.toml"
+    again.write_text(plan.text())
+    assert read_plan(again).digest == plan.digest
+
+
+def test_truth_takes_its_blocks(tmp_path: Path) -> None:
+    lag = {"kind": "first_order", "T": 2.0, "rate": 0.1}
+    plan = tiny_plan(tmp_path, {"truth.set": {"thruster.port.actuator.n": lag}})
+    assert plan.truth is not None
+    assert plan.truth.parameters["thruster.port.actuator.n.T"] == 2.0
+    assert all("actuator" not in path for model in plan.models if model.vessel for path in model.vessel.parameters)
+
+
+def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
+    """Draws hang on family and member; damping alone differs in `moderate`, mass and propellers too in `high`."""
+    models = {model.name: model.variant for model in read_plan("quick").models if model.variant}
+    for name, variant in models.items():
+        assert all(0.4 <= factor <= 1.6 for factor in variant.factors.values())
+        others = [path for path in variant.factors if not path.startswith("hull.derivatives.")]
+        assert bool(others) == name.startswith("high")
+    high = models["high-1"].factors
+    assert high["thruster.port.D_p"] == high["thruster.starboard.D_p"]
+    assert 0.6 <= high["inertia.m"] <= 1.4
+    assert models["moderate-1"].factors != models["moderate-2"].factors

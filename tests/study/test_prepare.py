@@ -1,0 +1,342 @@
+"""From plan to arrays: splits that share nothing, redraws that never look at the test, hidden states, floors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomlkit
+
+from shipid.data.dataset import Dataset, write_dataset
+from shipid.data.windows import Windows, cut_windows
+from shipid.errors import DataError, DocumentError
+from shipid.predictor import Predictor
+from shipid.simulation.rollout import rollout
+from shipid.study.plan import Plan
+from shipid.study.prepare import Prepared, constant_motion, limits, minutes, obtain, own_vessel, prepare, window_memory
+from shipid.study.run import run_batch
+from shipid.vessel.load import load_vessel
+from shipid.vessel.perturb import draw, resolve
+from tests.study.tiny import logged, tiny_plan
+
+SHIP = load_vessel("gunnerus-28.9")
+ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepared]:
+    plan = tiny_plan(tmp_path_factory.mktemp("plan"), {"grid.seeds": [0, 1], "grid.N_D": [2, 4, 6, 8]})
+    dataset = obtain(plan)
+    return plan, dataset, prepare(plan, dataset)
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Callable[..., tuple[Plan, Dataset]]:
+    """A plan on a recorded dataset of one's own."""
+
+    def make(dataset: Dataset, **changes: Any) -> tuple[Plan, Dataset]:
+        from shipid.study.plan import build_plan
+
+        file = write_dataset(dataset, tmp_path / "log.parquet")
+        document = tiny_plan(tmp_path).document
+        del document["truth"]
+        document |= {"data": {"dataset": str(file)}, "grid": {"N_D": [2]}, **changes}
+        return build_plan(document, tmp_path / "tiny.toml"), dataset
+
+    return make
+
+
+def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    plan, dataset, prepared = tiny
+    test = set(prepared.test.spans)
+    assert len(test) == 4
+    assert test | set(prepared.pool.spans) == set(dataset.runs)
+    for seed in (0, 1):
+        batches = sorted((batch for batch in plan.batches if batch.seed == seed), key=lambda batch: batch.N_D)
+        drawn = [set(prepared.runs(plan, batch)) for batch in batches]
+        assert [len(runs) for runs in drawn] == [2, 4, 6, 8]
+        assert all(small < large for small, large in zip(drawn, drawn[1:], strict=False))
+        assert not drawn[-1] & test
+    first, second = (prepared.runs(plan, next(b for b in plan.batches if b.N_D == 4 and b.seed == s)) for s in (0, 1))
+    assert set(first) != set(second)
+
+
+@pytest.mark.parametrize("folds", [1, 2, 3])
+def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
+    plan, _, prepared = tiny
+    plan = replace(plan, study=plan.study.model_copy(update={"split": plan.study.split.model_copy()}))
+    plan.study.split.folds = folds
+    for batch in plan.batches:
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+        pairs = prepared.folds(plan, batch, windows)
+        assert len(pairs) == min(folds, batch.N_D)
+        validated: list[str] = []
+        for train, validation in pairs:
+            assert not set(windows.run[train]) & set(windows.run[validation])
+            assert len(train) + len(validation) == len(windows)
+            validated += set(windows.run[validation])
+        if folds == 1:
+            assert len(validated) == max(1, round(0.2 * batch.N_D))
+        else:
+            assert sorted(validated) == sorted(prepared.runs(plan, batch))
+
+
+def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out, and told."""
+    t = np.arange(21.0)
+    runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
+    dataset = logged(runs, t, clock="shared")
+    plan, _ = recorded(dataset, split={"test": ["r3"], "folds": 2}, grid={"N_D": [7]}, family=[ONE_FAMILY])
+    prepared = prepare(plan, dataset)
+    batch = plan.batches[0]
+
+    def moments(windows: Windows) -> list[tuple[float, float]]:
+        return list(zip(windows.t, windows.t + windows.horizon, strict=True))
+
+    def shared(one: Windows, other: Windows) -> bool:
+        return any(a <= d and c <= b for (a, b), (c, d) in product(moments(one), moments(other)))
+
+    everything = cut_windows(dataset, horizon=5)
+    left_out = len(everything) - len(prepared.pool) - len(prepared.test)
+    assert left_out > 0
+    assert any(note.startswith(f"{left_out} windows that touch the test") for note in prepared.notes)
+    assert shared(everything.select(everything.run != "r3"), prepared.test)
+    assert not shared(prepared.pool, prepared.test)
+    for train, validation in prepared.folds(plan, batch, prepared.pool):
+        assert not shared(prepared.pool.select(train), prepared.pool.select(validation))
+
+
+def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    """Midpoint rule with 2,000 steps a second; r = 0 included."""
+    windows = tiny[2].test.select(slice(0, 12))
+    windows.columns["r"][0] = 0.0
+    u, v, r = (windows.columns[name] for name in ("u", "v", "r"))
+    steps = 2000
+    time = (np.arange(windows.horizon * steps) + 0.5)[:, None] / steps
+    rate = np.stack([u * np.cos(r * time) - v * np.sin(r * time), u * np.sin(r * time) + v * np.cos(r * time)], axis=-1)
+    path = np.cumsum(rate, axis=0)[steps - 1 :: steps] / steps
+    np.testing.assert_allclose(constant_motion(windows), path, atol=1e-6)
+
+
+def test_samples_are_the_first_of_each_run(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"prediction.samples": 3})
+    prepared = prepare(plan, obtain(plan))
+    for windows in (prepared.pool, prepared.test):
+        assert all((windows.t[windows.run == run] == [0.0, 1.0, 2.0]).all() for run in windows.spans)
+
+
+def test_right_model_of_its_own_truth_is_exact(tmp_path: Path) -> None:
+    """A truth of the same equations, step and rule leaves A = 0: windows, frames and held commands add no error."""
+    plan = tiny_plan(tmp_path, {"truth.step": 1.0, "truth.method": "euler"})
+    prepared = prepare(plan, obtain(plan))
+    assert prepared.accuracy("right")["rms"] < 1e-9
+    assert prepared.accuracy("wrong-1")["mean"] > 0.01
+    np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
+
+
+def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
+    """The next counter draws anew, the others keep theirs, and it is told; the same again gives the same."""
+    family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
+    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-14.0, 14.0]}]
+    plan = tiny_plan(tmp_path, {"family": [family]})
+    prepared = prepare(plan, obtain(plan))
+    rule = resolve(plan.study.family)[0]
+    redrawn = 0
+    for planned, model in zip(plan.models[:-1], prepared.models[:-1], strict=True):
+        assert model.variant is not None
+        counter = model.variant.counter
+        assert model.variant == draw(rule, model.member, SHIP, counter)
+        assert sum(model.name in note for note in prepared.notes) == counter
+        redrawn += counter > 0
+        if counter == 0:
+            assert model.variant == planned.variant
+        assert np.isfinite(prepared.pool_paths[model.name]).all()
+    assert 0 < redrawn < 6
+    again = prepare(plan, obtain(plan))
+    assert [m.variant for m in again.models] == [m.variant for m in prepared.models]
+
+
+def test_what_cannot_be_drawn_is_told(tmp_path: Path) -> None:
+    """A fixed factor draws nothing else; a hopeless range is given up."""
+    for factor, said in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 100 redraws")):
+        family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
+        family["perturb"][0]["factor"] = factor  # type: ignore[index]
+        plan = tiny_plan(tmp_path, {"family": [family]})
+        with pytest.raises(DocumentError, match=said) as caught:
+            prepare(plan, obtain(plan))
+        assert caught.value.path == "family.lost"
+
+
+def test_divergence_on_test_windows_only_is_shown_never_redrawn(
+    recorded: Callable[..., tuple[Plan, Dataset]],
+) -> None:
+    """u' = k u^2 / m blows up for a fast ship and not for a slow one; one of two test runs is fast."""
+    t, rng = np.arange(21.0), np.random.default_rng(0)
+    runs = {f"slow{k}": {"u": rng.uniform(0.0, 0.1, 21), "port.n": rng.uniform(0.0, 0.2, 21)} for k in range(4)}
+    runs["fast"] = {"u": np.full(21, 6.0)}
+    family = {"name": "brittle", "base": "gunnerus-28.9", "members": 2}
+    family["perturb"] = [
+        {"set": {"hull.derivatives.X_u|u|": 1.0e6}},
+        {"parameters": ["hull.derivatives.Y_uv"], "factor": [0.9, 1.1]},
+    ]
+    plan, dataset = recorded(logged(runs, t), split={"test": ["fast", "slow0"]}, family=[family])
+    prepared = prepare(plan, dataset)
+    for model in prepared.models[:-1]:
+        assert model.variant is not None
+        assert model.variant.counter == 0
+    found = prepared.accuracy("brittle-1")
+    assert (found["status"], found["failed_share"]) == ("diverged", 0.5)
+    assert np.isnan(found["mean"])
+    rows = {row["model"]: row for row, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    assert rows["brittle-1"]["status"] == "diverged"
+    assert "50.0%" in rows["brittle-1"]["sentence"]
+    assert np.isnan(rows["brittle-1"]["H"])
+    assert rows["none"]["status"] == "ok"
+
+
+def stepped(order: float, T: float, rate: float) -> tuple[Any, Dataset]:
+    """A ship with lagged shafts, and a log whose order steps from 1 rev/s at t = 10 s."""
+    lag = {"n": {"kind": "first_order", "T": T, "rate": rate}}
+    ship = SHIP.with_values({"thruster.port.actuator": lag, "thruster.starboard.actuator": lag})
+    t = np.arange(31.0)
+    n = np.where(t < 10, 1.0, order)
+    return ship, logged({name: {"u": 2.0, "port.n": n, "starboard.n": n} for name in "abc"}, t)
+
+
+def test_hidden_states_follow_the_earlier_orders() -> None:
+    """First order, exactly: 1 before the step, 2 - exp(-(t - 10) / T) after it; limited by the rate."""
+    ship, dataset = stepped(order=2.0, T=4.0, rate=100.0)
+    windows = cut_windows(dataset, horizon=5)
+    found = window_memory(ship, dataset, windows)
+    assert found is not None
+    late = np.maximum(windows.t - 10.0, 0.0)
+    for side in ("port", "starboard"):
+        np.testing.assert_allclose(found[f"{side}.n"], 2.0 - np.exp(-late / 4.0), rtol=1e-12)
+    slow, _ = stepped(order=2.0, T=4.0, rate=0.01)
+    limited = window_memory(slow, dataset, windows)
+    assert limited is not None
+    np.testing.assert_allclose(limited["port.n"], 1.0 + 0.01 * late, rtol=1e-12)
+    assert window_memory(SHIP, dataset, windows) is None
+
+
+def test_hidden_states_are_those_of_the_truth() -> None:
+    """The actuators of a simulated truth, once the first order is reached, are what the log's orders say."""
+    ship, dataset = stepped(order=1.6, T=1.5, rate=0.2)
+    n = dataset.frame["port.n"][dataset.frame["run"] == "a"].to_numpy()
+    start = {name: np.array([2.0 if name == "u" else 0.0]) for name in ("north", "east", "psi", "u", "v", "r")}
+    orders = {name: n[:-1, None] if name.endswith(".n") else np.zeros(1) for name in dataset.commands}
+    still = {name: np.zeros(1) for name in ("V_w", "beta_w")}
+    keep = ("actual.port.n",)
+    path = rollout(ship, start, orders, still, step=1.0, num_steps=30, method="rk4", keep=keep, engine="casadi")
+    windows = cut_windows(dataset, horizon=5)
+    found = window_memory(ship, dataset, windows)
+    assert found is not None
+    one = windows.run == "a"
+    np.testing.assert_allclose(found["port.n"][one], path["actual.port.n"][: one.sum(), 0, 0], rtol=1e-12)
+
+
+def test_a_stretch_of_one_row_has_its_order_reached() -> None:
+    ship, dataset = stepped(order=2.0, T=4.0, rate=1.0)
+    flags = dataset.frame["flags"].copy()
+    flags[[1, 2]] = 1
+    broken = Dataset(dataset.frame.assign(flags=flags), {**dataset.metadata, "flags": ["break"]})
+    windows = cut_windows(broken, horizon=5)
+    found = window_memory(ship, broken, windows)
+    assert found is not None
+    assert found["port.n"][0] == 1.0
+
+
+def test_perturbed_lags_have_hidden_states_of_their_own(
+    tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]
+) -> None:
+    """What a stored predictor predicts is what the study has seen: each variant models its own actuators."""
+    ship, dataset = stepped(order=2.0, T=4.0, rate=1.0)
+    (tmp_path / "lagged.toml").write_text(tomlkit.dumps(ship.document))
+    family = {"name": "lagged", "base": "./lagged.toml", "members": 3}
+    family["perturb"] = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.2, 3.0], "together": True}]
+    plan, _ = recorded(dataset, split={"test": 1}, family=[family])
+    prepared = prepare(plan, dataset)
+    assert not np.allclose(prepared.test_paths["lagged-1"], prepared.test_paths["lagged-2"])
+    for model in prepared.models[:-1]:
+        vessel = own_vessel(model)
+        predictor = Predictor(vessel, None, horizon=5, step=1.0)
+        paths = predictor.predict(prepared.test.columns, window_memory(vessel, dataset, prepared.test))
+        np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
+
+
+def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    t = np.arange(21.0)
+    plan, dataset = recorded(logged({name: {"u": 2.0 + 0.01 * t} for name in "abcd"}, t), split={"test": 1})
+    assert any("V_w, beta_w not measured, assumed 0" in note for note in prepare(plan, dataset).notes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "said"),
+    [
+        ({"split": {"test": ["z"]}}, "split.test", "'z' is no run with windows: valid: a, b, c, d"),
+        ({"split": {"test": 4}}, "split.test", "only 4 runs"),
+        ({"split": {"test": 2}, "grid": {"N_D": [3]}}, "grid.N_D", "only 2 runs are left"),
+        ({"split": {"test": 1}, "prediction": {"horizon": 40}}, "prediction.horizon", "as long as the horizon of 40 s"),
+    ],
+)
+def test_a_study_that_asks_too_much_of_its_log(
+    recorded: Callable[..., tuple[Plan, Dataset]], changes: dict[str, Any], path: str, said: str
+) -> None:
+    t = np.arange(21.0)
+    plan, dataset = recorded(logged({name: {"u": 2.0 + 0.01 * t} for name in "abcd"}, t), **changes)
+    with pytest.raises(DocumentError, match=said) as caught:
+        prepare(plan, dataset)
+    assert (caught.value.path, caught.value.file) == (path, plan.file)
+
+
+def test_a_log_without_the_ships_commands(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    t = np.arange(21.0)
+    dataset = logged({name: {"u": 2.0} for name in "abcd"}, t)
+    fewer = Dataset(dataset.frame.drop(columns=["starboard.n"]), dataset.metadata)
+    plan, _ = recorded(fewer, split={"test": 1})
+    with pytest.raises(DataError, match=r"takes this command; the data have port\.alpha, port\.n") as caught:
+        prepare(plan, fewer)
+    assert caught.value.path == "starboard.n"
+
+
+def test_files_are_looked_for_beside_the_study(
+    tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, dataset = recorded(logged({name: {"u": 2.0} for name in "abcd"}, np.arange(21.0)), split={"test": 1})
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert plan.study.data is not None
+    plan.study.data.dataset = "log.parquet"
+    assert obtain(plan).runs == dataset.runs
+
+
+def test_a_mapping_is_looked_for_beside_the_study(
+    tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bad = Path(__file__).parents[1] / "bad" / "logs"
+    for name in ("plain.toml", "good.csv"):
+        (tmp_path / name).write_bytes((bad / name).read_bytes())
+    plan, _ = recorded(
+        logged({"a": {}, "b": {}}, np.arange(21.0)),
+        split={"test": 1},
+        data={"mapping": "plain.toml", "log": "good.csv"},
+    )
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert obtain(plan).runs == ["good"]
+
+
+def test_limits_and_minutes(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    _, dataset, prepared = tiny
+    runs = list(prepared.pool.spans)[:3]
+    assert minutes(prepared.pool, runs) == pytest.approx(3 * 20 / 60)
+    found = limits(prepared.pool, prepared.commands)
+    assert set(found) == {"u", "v", "r", "V_w", *dataset.commands}
+    rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
+    for name, (low, high) in found.items():
+        assert (low, high) == pytest.approx((rows[name].min(), rows[name].max()))

@@ -1,0 +1,294 @@
+"""Runs: the same numbers whoever computes them and however often they are interrupted; a folder tells all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import read_dataset
+from shipid.errors import ResultError, ShipidError
+from shipid.metrics import position_error, summary
+from shipid.predictor import Predictor
+from shipid.study import store
+from shipid.study.plan import read_plan
+from shipid.study.prepare import obtain, prepare
+from shipid.study.results import read_results
+from shipid.study.run import run_batch, run_study
+from shipid.vessel.load import load_vessel
+from tests.study.tiny import run_here, tiny_plan
+
+
+def numbers(folder: Path) -> list[dict[str, Any]]:
+    """Rows of all cells without what a clock measured."""
+    rows = []
+    for row in store.read_rows(folder).drop(columns="seconds").to_dict("records"):
+        row["trials"] = [{key: value for key, value in trial.items() if key != "seconds"} for trial in row["trials"]]
+        rows.append({key: None if value != value else value for key, value in row.items()})
+    return sorted(rows, key=lambda row: row["cell"])
+
+
+def test_interrupted_on_a_cluster_and_resumed_here_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
+    """Two processes, stopped after the first batch; the other batch is done in this process."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    events = run_study(plan, folder, workers=2)
+    kinds = []
+    for event in events:
+        kinds.append(event.kind)
+        if event.kind == "cell":
+            break
+    events.close()  # type: ignore[attr-defined]
+    assert kinds[-2:] == ["start", "cell"]
+    stored = list((folder / "batches").glob("*.json"))
+    assert len(stored) == 1
+    before = stored[0].read_bytes()
+    partial = read_results(folder)
+    assert not partial.complete
+    resumed = run_here(store.stored_plan(folder), folder)
+    assert [event.done for event in resumed if event.kind in ("start", "cell", "end")] == [4, 5, 6, 7, 8, 8]
+    assert stored[0].read_bytes() == before
+    assert numbers(folder) == numbers(tiny_run)
+    assert read_results(folder).complete
+
+
+def test_a_finished_run_does_nothing_again(tmp_path: Path, tiny_run: Path) -> None:
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    run_here(plan, folder)
+    times = {file: file.stat().st_mtime_ns for file in (folder / "cells").iterdir()}
+    events = run_here(plan, folder)
+    assert not [event for event in events if event.kind == "cell"]
+    assert {file: file.stat().st_mtime_ns for file in (folder / "cells").iterdir()} == times
+    assert numbers(folder) == numbers(tiny_run)
+
+
+def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> None:
+    """A wider grid, another seed and another family leave the cells of the smaller study as they were."""
+    plan = tiny_plan(tmp_path, {"grid.seeds": [0, 1], "family.1.members": 3})
+    run_here(plan, tmp_path / "run")
+    wider = {row["cell"]: row for row in numbers(tmp_path / "run")}
+    for row in numbers(tiny_run):
+        twin = wider[row["cell"]]
+        assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round in their own way
+        assert twin["A"] == pytest.approx(row["A"], nan_ok=True) if row["A"] is not None else twin["A"] is None
+
+
+def test_seeds_change_the_numbers(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"grid.seeds": [0, 1], "grid.N_D": [4]})
+    run_here(plan, tmp_path / "run")
+    rows = store.read_rows(tmp_path / "run")
+    assert (rows.groupby("model")["H"].nunique() == 2).all()
+    assert (rows.dropna(subset="A").groupby("model")["A"].nunique() == 1).all()  # A is of the test set alone
+
+
+def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path, tiny_run: Path) -> None:
+    """From the stored dataset anew: windows cut, physics rolled out by the predictor itself, compensation added."""
+    rows = store.read_rows(tiny_run)
+    prepared = prepare(tiny_plan(tmp_path), read_dataset(tiny_run / store.DATASET))
+    assert len(rows) == 8
+    for row in rows.itertuples():
+        predictor = Predictor.load(store.cell_file(tiny_run, str(row.cell)))
+        paths = predictor.predict(prepared.test.columns)
+        error = summary(position_error(paths, prepared.test.future))
+        assert error["mean"] == pytest.approx(row.H, rel=1e-9)
+        assert error["p90"] == pytest.approx(row.H_90, rel=1e-9)
+        assert error["rms"] == pytest.approx(row.rms, rel=1e-9)
+        alone = summary(position_error(predictor.physics(prepared.test.columns), prepared.test.future))
+        assert np.isnan(row.A) if row.model == "none" else alone["mean"] == pytest.approx(row.A, rel=1e-9)
+        assert set(predictor.provenance["runs"]) == set(prepared.runs(tiny_plan(tmp_path), _batch(tmp_path, row.N_D)))
+        assert not set(predictor.provenance["runs"]) & set(prepared.test.spans)
+
+
+def _batch(tmp_path: Path, N_D: Any) -> Any:
+    return next(batch for batch in tiny_plan(tmp_path).batches if batch.N_D == N_D)
+
+
+def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
+    table = pd.read_parquet(tiny_run / "results.parquet")
+    assert len(table) == 8 * len(store.METRICS)
+    assert not table.duplicated(["cell", "metric"]).any()
+    rows = store.read_rows(tiny_run).set_index("cell")
+    for entry in table.itertuples():
+        assert entry.value == pytest.approx(rows.loc[entry.cell, entry.metric], nan_ok=True)
+        assert entry.unit == ("s" if entry.metric == "seconds" else "m")
+    trials = pd.read_parquet(tiny_run / "trials.parquet")
+    assert list(trials["cell"].value_counts().unique()) == [1]  # the recipe of the tiny study has one trial
+    assert {"value", "weight_decay", "state"} <= set(trials.columns)
+
+
+def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Path) -> None:
+    record = store.read_json(tiny_run / store.PROVENANCE)
+    assert record["digest"] == tiny_plan(tmp_path).digest
+    assert {"shipid", "torch", "casadi", "optuna"} <= record["machine"]["packages"].keys()
+    models = store.read_json(tiny_run / store.MODELS)
+    variant = next(m.variant for m in tiny_plan(tmp_path).models if m.name == "wrong-2")
+    assert variant is not None
+    entry = next(row for row in models if row["model"] == "wrong-2")
+    assert entry["factors"] == pytest.approx(dict(variant.factors), rel=1e-15)
+    assert entry["base_digest"] == load_vessel("gunnerus-28.9").digest
+    assert not [file for file in tiny_run.rglob(".*")]  # nothing temporary is left
+
+
+def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Path) -> None:
+    import shutil
+
+    shutil.copytree(tiny_run, tmp_path / "copy")
+    here, there = read_results(tmp_path / "copy"), read_results(tiny_run)
+    assert here.paths.keys() == there.paths.keys()
+    for cell, path in here.paths.items():
+        error = summary(position_error(path, here.test.future))
+        assert error["mean"] == pytest.approx(there.cells.set_index("cell").loc[cell, "H"], rel=1e-9)
+
+
+def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
+    from shipid.estimation.tuning import Tuned, tune
+    from shipid.study import run
+
+    def failing(*args: Any, **kwargs: Any) -> dict[str, Tuned]:
+        return tune(*args, **kwargs) | {"wrong-1": Tuned(None, [], 0.0)}
+
+    monkeypatch.setattr(run, "tune", failing)
+    run_here(tiny_plan(tmp_path), tmp_path / "run")
+    rows = store.read_rows(tmp_path / "run").set_index("model")
+    assert set(rows.loc["wrong-1", "status"]) == {"failed"}
+    assert rows.loc["wrong-1", "H"].isna().all()
+    assert set(rows.drop("wrong-1")["status"]) == {"ok"}
+    assert len(read_results(tmp_path / "run").paths) == 6
+
+
+def test_absent_device_is_one_line(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path)
+    with pytest.raises(ShipidError, match="no such device") as caught:
+        run_batch(plan, prepare(plan, obtain(plan)), plan.batches[0], "cuda:99")
+    assert caught.value.path == "--device cuda:99"
+
+
+def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import dask.distributed
+
+    def unreachable(*_: Any, **__: Any) -> None:
+        raise OSError("Timed out")
+
+    monkeypatch.setattr(dask.distributed, "Client", unreachable)
+    with pytest.raises(ShipidError, match="no Dask scheduler answers there"):
+        list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
+
+
+# Folders that are not what they are taken for.
+
+
+def test_folder_of_another_study_is_refused(tmp_path: Path, tiny_run: Path) -> None:
+    other = tiny_plan(tmp_path, {"truth.seed": 99})
+    with pytest.raises(ResultError, match="another study than .*tiny.toml: choose another --out"):
+        next(run_study(other, tiny_run))
+
+
+def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    (folder / "cat.jpg").write_bytes(b"")
+    with pytest.raises(ResultError, match="holds no run of shipid"):
+        next(run_study(tiny_plan(tmp_path), folder))
+    with pytest.raises(ResultError, match="is a file"):
+        next(run_study(tiny_plan(tmp_path), folder / "cat.jpg"))
+    with pytest.raises(ResultError, match="cannot be made"):
+        next(run_study(tiny_plan(tmp_path), folder / "cat.jpg" / "run"))
+    assert [file.name for file in folder.iterdir()] == ["cat.jpg"]
+
+
+def test_an_empty_folder_and_a_half_opened_one_are_taken(tmp_path: Path) -> None:
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    folder.mkdir()
+    next(run_study(plan, folder))
+    (folder / store.STUDY).unlink()  # as if the machine had stopped between the first two files
+    next(run_study(plan, folder))
+    assert store.stored_plan(folder).digest == plan.digest
+
+
+def _damage(change: Callable[[bytes], bytes], name: str) -> Callable[[Path], None]:
+    def damage(folder: Path) -> None:
+        file = next(folder.glob(name))
+        file.write_bytes(change(file.read_bytes()))
+
+    return damage
+
+
+def _half(content: bytes) -> bytes:
+    return content[: len(content) // 2]
+
+
+DAMAGES = {
+    "no study": (lambda folder: (folder / "study.toml").unlink(), "holds no study.toml"),
+    "study is no TOML": (_damage(lambda _: b"[[", "study.toml"), "damaged"),
+    "study is no text": (_damage(lambda _: b"\xff\xfe", "study.toml"), "damaged"),
+    "study was edited": (_damage(lambda text: text.replace(b"seed = 3", b"seed = 4"), "study.toml"), "has changed"),
+    "no provenance": (lambda folder: (folder / "provenance.json").unlink(), "is this the folder of a run"),
+    "half a provenance": (_damage(_half, "provenance.json"), "damaged"),
+    "foreign provenance": (_damage(lambda _: b"[1, 2]", "provenance.json"), "damaged"),
+    "no batches": (lambda folder: [file.unlink() for file in (folder / "batches").iterdir()], "no cell is finished"),
+    "half a batch": (_damage(_half, "batches/*.json"), "damaged"),
+    "no test windows": (lambda folder: (folder / "test.npz").unlink(), "missing or damaged"),
+    "half the test windows": (_damage(_half, "test.npz"), "missing or damaged"),
+    "foreign test windows": (_damage(lambda _: b"hello", "test.npz"), "missing or damaged"),
+    "no cell": (lambda folder: next((folder / "cells").glob("*.npz")).unlink(), "cannot be read"),
+    "half a cell": (_damage(_half, "cells/*.npz"), "not a predictor"),
+    "no models": (lambda folder: (folder / "models.json").unlink(), "cannot be read"),
+    "no dataset": (lambda folder: (folder / "dataset.parquet").unlink(), "dataset.parquet: cannot be read"),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGES)
+def test_damaged_folders_are_one_line(tmp_path: Path, tiny_run: Path, kind: str) -> None:
+    import shutil
+
+    folder = tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    damage, said = DAMAGES[kind]
+    damage(folder)
+    with pytest.raises(ShipidError, match=said) as caught:
+        read_results(folder)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert str(folder) in line
+
+
+def test_a_changed_vessel_is_told(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
+    plan = tiny_plan(tmp_path, {"truth.vessel": "./own.toml"})
+    next(run_study(plan, tmp_path / "run"))
+    assert store.stored_plan(tmp_path / "run").digest == plan.digest
+    own.write_text(own.read_text() + "\n# a word more changes nothing\n")
+    assert store.stored_plan(tmp_path / "run").digest == plan.digest
+    own.write_text(own.read_text().replace('name = "', 'name = "New '))
+    with pytest.raises(ResultError, match="has changed since the run"):
+        store.stored_plan(tmp_path / "run")
+
+
+def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
+    plan = tiny_plan(tmp_path, {"family.1.base": "./own.toml"})
+    assert store.write_patches(tmp_path / "far" / "away", plan.models) == 3
+    for model in plan.models[:-1]:
+        rebuilt = load_vessel(str(tmp_path / "far" / "away" / f"{model.name}.toml"))
+        assert model.variant is not None
+        assert list(rebuilt.parameters.values()) == model.variant.parameters
+    bundled = (tmp_path / "far" / "away" / "right.toml").read_text()
+    assert 'base = "gunnerus-28.9"' in bundled
+
+
+def test_json_holds_no_nan(tmp_path: Path) -> None:
+    store.write_json(tmp_path / "a.json", {"x": np.float64("nan"), "y": [np.int64(3), (1.5, np.inf)], "z": np.True_})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"x": None, "y": [3, [1.5, None]], "z": True}
+
+
+def test_the_plan_of_a_bundled_study_survives_the_folder(tmp_path: Path) -> None:
+    plan = read_plan("full-scale")
+    store.open_folder(tmp_path / "run", plan)
+    assert store.stored_plan(tmp_path / "run") == plan
