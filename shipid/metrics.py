@@ -31,7 +31,8 @@ def position_error(predicted: Array, true: Array) -> Array:
     """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15), in whatever frame both are."""
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
         raise ValueError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
-    return np.hypot(predicted[..., 0] - true[..., 0], predicted[..., 1] - true[..., 1])
+    # order C: a sum over errors must not depend on how the paths happen to lie in memory
+    return np.hypot(predicted[..., 0] - true[..., 0], predicted[..., 1] - true[..., 1], order="C")
 
 
 def summary(error: Array) -> Summary:

@@ -1,0 +1,255 @@
+"""Predictors: what is saved is what is loaded, nothing else is; and they predict along a log."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset, read_dataset, write_dataset
+from shipid.errors import DataError, ResultError, ShipidError
+from shipid.predictor import FORMAT, Predictor, assumed, check_columns
+from shipid.study.apply import predict_log
+from shipid.study.store import DATASET, cell_file, read_test
+from shipid.vessel.load import load_vessel
+
+CELL, PURE = "wrong-1-N0006-s0", "none-N0006-s0"
+
+
+@pytest.fixture(scope="module")
+def predictor(tiny_run: Path) -> Predictor:
+    return Predictor.load(cell_file(tiny_run, CELL))
+
+
+@pytest.mark.parametrize("cell", [CELL, PURE])
+def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
+    first = Predictor.load(cell_file(tiny_run, cell))
+    again = Predictor.load(first.save(tmp_path / "deep" / "again.npz"))
+    for name in ("horizon", "step", "method", "limits", "provenance"):
+        assert getattr(again, name) == getattr(first, name)
+    assert (again.vessel is None) == (cell == PURE)
+    assert again.vessel == first.vessel
+    columns = read_test(tiny_run)[0].columns
+    np.testing.assert_array_equal(again.predict(columns), first.predict(columns))
+    assert [file.name for file in (tmp_path / "deep").iterdir()] == ["again.npz"]
+
+
+def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:
+    assert predictor.vessel is not None
+    base = load_vessel("gunnerus-28.9").parameters
+    changed = {path for path, value in predictor.vessel.parameters.items() if value != base[path]}
+    assert changed == {path for path in base if path.startswith("hull.derivatives.") and base[path] != 0}
+
+
+def test_physics_alone_and_compensation_alone(tiny_run: Path, predictor: Predictor) -> None:
+    columns = read_test(tiny_run)[0].columns
+    assert predictor.compensator is not None
+    alone = Predictor(predictor.vessel, None, predictor.horizon, predictor.step, predictor.method)
+    pure = Predictor(None, predictor.compensator, predictor.horizon, predictor.step)
+    np.testing.assert_array_equal(alone.predict(columns), predictor.physics(columns))
+    np.testing.assert_array_equal(pure.predict(columns), predictor.compensator.predict(columns))
+    np.testing.assert_allclose(alone.predict(columns) + pure.predict(columns), predictor.predict(columns))
+
+
+def test_a_prediction_does_not_depend_on_where_north_is(tiny_run: Path, predictor: Predictor) -> None:
+    """Frame (11): ship and wind turned and moved together, the path aboard is the same."""
+    columns = read_test(tiny_run)[0].columns
+    turned = {**columns, "psi": columns["psi"] + 1.1, "beta_w": columns["beta_w"] + 1.1}
+    turned |= {"north": columns["north"] - 700.0, "east": columns["east"] + 30.0}
+    np.testing.assert_allclose(predictor.predict(turned), predictor.predict(columns), atol=1e-8)
+
+
+def test_outside_flags_each_column(predictor: Predictor) -> None:
+    middle = {name: np.full(2, (low + high) / 2) for name, (low, high) in predictor.limits.items()}
+    assert not predictor.outside(middle).any()
+    edges = {name: np.array(pair) for name, pair in predictor.limits.items()}
+    assert not predictor.outside(edges).any()
+    for name, (low, high) in predictor.limits.items():
+        width = high - low
+        beyond = {**middle, name: np.array([low - 0.01 * width, high + 0.01 * width])}
+        assert predictor.outside(beyond).all(), name
+        one = {**middle, name: np.array([low, high + 0.01 * width])}
+        assert predictor.outside(one).tolist() == [False, True]
+
+
+def test_what_was_trained_on_is_inside(tiny_run: Path, predictor: Predictor) -> None:
+    frame = read_dataset(tiny_run / DATASET).frame
+    trained = frame[frame["run"].isin(predictor.provenance["runs"]) & (frame["t"] <= 15.0)]
+    assert len(trained) == 6 * 16
+    assert not predictor.outside({str(name): trained[name].to_numpy() for name in trained if name != "run"}).any()
+
+
+# Files that are no predictors.
+
+
+def rewritten(source: Path, target: Path, **changes: Any) -> Path:
+    """A saved predictor with another header or other arrays; None removes."""
+    with np.load(source, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    header = json.loads(str(arrays["header"]))
+    for key, value in changes.items():
+        place = arrays if key in arrays else header
+        if value is None:
+            del place[key]
+        else:
+            place[key] = value
+    if "header" not in changes:
+        arrays["header"] = np.array(json.dumps(header))
+    np.savez(target, **arrays)
+    return target
+
+
+def test_saved_without_pickle(tiny_run: Path) -> None:
+    for file in (tiny_run / "cells").iterdir():
+        with np.load(file, allow_pickle=False) as stored:
+            assert all(stored[name].dtype != object for name in stored.files)
+
+
+class Trap:
+    """Its pickle would run code."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (pytest.fail, ("a pickle was opened",))
+
+
+def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
+    trap = np.empty(1, dtype=object)
+    trap[0] = Trap()
+    for changes in ({"header": trap}, {"0.mean": trap}):
+        file = rewritten(cell_file(tiny_run, CELL), tmp_path / "trap.npz", **changes)
+        with pytest.raises(ResultError, match="not a predictor of shipid"):
+            Predictor.load(file)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"format": FORMAT + 1}, f"written in format {FORMAT + 1}, this shipid reads {FORMAT}"),
+        ({"format": None}, "written in format None"),
+        ({"header": np.array("[1, 2]")}, "not a predictor"),
+        ({"header": np.array("{")}, "not a predictor"),
+        ({"header": None}, "not a predictor"),
+        ({"horizon": None}, "damaged"),
+        ({"limits": {"u": [1.0]}}, "damaged"),
+        ({"compensator": 3}, "damaged"),
+        ({"0.scale": None}, "missing in the saved compensator"),
+        ({"0.mean": np.zeros(3)}, "do not fit together"),
+        ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "dof: missing"),
+    ],
+)
+def test_foreign_contents_are_one_line(tmp_path: Path, tiny_run: Path, changes: dict[str, Any], said: str) -> None:
+    file = rewritten(cell_file(tiny_run, CELL), tmp_path / "foreign.npz", **changes)
+    with pytest.raises(ShipidError, match=said) as caught:
+        Predictor.load(file)
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, ResultError) == ("dof" not in said)
+    if isinstance(caught.value, ResultError):
+        assert str(caught.value).startswith(f"{file}: ")
+
+
+def test_files_of_other_kinds_are_one_line(tmp_path: Path, tiny_run: Path) -> None:
+    whole = cell_file(tiny_run, CELL).read_bytes()
+    flipped = bytearray(whole)
+    flipped[300:360] = bytes(60)
+    contents = {
+        "empty": b"",
+        "text": b"hello",
+        "half": whole[: len(whole) // 2],
+        "flipped": bytes(flipped),
+        "zip of nothing": b"PK\x05\x06" + bytes(18),
+    }
+    for name, content in contents.items():
+        file = tmp_path / f"{name}.npz"
+        file.write_bytes(content)
+        with pytest.raises(ResultError, match="not a predictor"):
+            Predictor.load(file)
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    for file, said in ((tmp_path / "array.npy", "not a predictor"), (tmp_path, "read"), (tmp_path / "x", "No such")):
+        with pytest.raises(ResultError, match=said):
+            Predictor.load(file)
+
+
+# Along a log.
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_predictions_for_every_instant_of_a_log(tmp_path: Path, tiny_run: Path, ending: str) -> None:
+    out = tmp_path / "new" / f"paths{ending}"
+    frame, outside = predict_log(tiny_run, CELL, tiny_run / DATASET, None, out)
+    log = read_dataset(tiny_run / DATASET).frame
+    assert len(frame) == 5 * len(log)
+    written = pd.read_csv(out) if ending == ".csv" else pd.read_parquet(out)
+    pd.testing.assert_frame_equal(written, frame, check_dtype=False)
+    assert sorted(frame["ahead"].unique()) == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert 0.0 <= outside < 1.0
+    merged = frame.merge(log[["run", "t", "north", "east", "psi", "u", "v"]], on=["run", "t"])
+    near = merged[merged["ahead"] == 1.0]
+    # The first second of an Euler path is exactly R(psi) (u, v) away from where the ship is.
+    north = near["north"] + near["u"] * np.cos(near["psi"]) - near["v"] * np.sin(near["psi"])
+    east = near["east"] + near["u"] * np.sin(near["psi"]) + near["v"] * np.cos(near["psi"])
+    np.testing.assert_allclose(near["physics_north"], north, atol=1e-9)
+    np.testing.assert_allclose(near["physics_east"], east, atol=1e-9)
+
+
+def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Path) -> None:
+    """North-east paths against the logged positions give A and H of the cell: the turn back is right."""
+    from shipid.study.store import read_rows
+
+    frame, _ = predict_log(tiny_run, CELL, tiny_run / DATASET, None, tmp_path / "paths.csv")
+    log = read_dataset(tiny_run / DATASET).frame
+    true = log[["run", "t", "north", "east"]].rename(columns={"t": "at"})
+    whole = frame["run"].isin(list(read_test(tiny_run)[0].spans)) & (frame["t"] <= 15.0)  # the future is all logged
+    joined = frame[whole].assign(at=frame["t"] + frame["ahead"]).merge(true, on=["run", "at"])
+    assert len(joined) == 4 * 16 * 5
+    row = read_rows(tiny_run).set_index("cell").loc[CELL]
+    for kind, metric in (("physics", "A"), ("cooperative", "H")):
+        error = np.hypot(joined[f"{kind}_north"] - joined["north"], joined[f"{kind}_east"] - joined["east"])
+        assert error.mean() == pytest.approx(row[metric], rel=1e-9)
+
+
+def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) -> None:
+    frame, _ = predict_log(tiny_run, PURE, tiny_run / DATASET, None, tmp_path / "paths.csv")
+    assert frame[["physics_north", "physics_east"]].isna().all(axis=None)
+    assert frame[["cooperative_north", "cooperative_east"]].notna().all(axis=None)
+
+
+def test_outside_share_of_a_faster_log(tmp_path: Path, tiny_run: Path) -> None:
+    dataset = read_dataset(tiny_run / DATASET)
+    faster = dataset.frame.assign(u=np.where(dataset.frame["run"] == "M001", 50.0, dataset.frame["u"]))
+    file = write_dataset(Dataset(faster, dataset.metadata), tmp_path / "fast.parquet")
+    frame, outside = predict_log(tiny_run, CELL, file, None, tmp_path / "paths.csv")
+    assert frame.loc[frame["run"] == "M001", "outside"].all()
+    assert outside == pytest.approx(frame["outside"].mean())
+    assert 1 / 12 <= outside < 0.7
+
+
+def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:
+    log, out = tiny_run / DATASET, tmp_path / "paths.csv"
+    with pytest.raises(ResultError, match="did you mean 'wrong-1-N0006-s0'"):
+        predict_log(tiny_run, "wrong-1-N06-s0", log, None, out)
+    with pytest.raises(ResultError, match="holds no finished cells"):
+        predict_log(tmp_path, CELL, log, None, out)
+    with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
+        predict_log(tiny_run, CELL, log, None, tmp_path / "paths.xlsx")
+    with pytest.raises(DataError, match="cannot be read"):
+        predict_log(tiny_run, CELL, tmp_path / "gone.parquet", None, out)
+    dataset = read_dataset(log)
+    for missing, said in (("port.n", "takes this command"), ("V_w", "measure wind")):
+        columns = ["V_w", "beta_w"] if missing == "V_w" else [missing]
+        fewer = Dataset(dataset.frame.drop(columns=columns), {**dataset.metadata, "units": {}})
+        file = write_dataset(fewer, tmp_path / "fewer.parquet")
+        with pytest.raises(DataError, match=said):
+            predict_log(tiny_run, CELL, file, None, out)
+    assert not out.exists()
+
+
+def test_what_is_assumed_is_named() -> None:
+    ship = load_vessel("gunnerus-28.9")
+    commands = {f"{side}.{signal}": np.zeros(1) for side in ("port", "starboard") for signal in ("n", "alpha")}
+    assert assumed(ship, commands) == ["V_w", "beta_w"]
+    assert assumed(ship, commands | {"V_w": np.zeros(1), "beta_w": np.zeros(1)}) == []
+    check_columns(ship, commands, "log.csv")
