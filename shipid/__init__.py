@@ -11,7 +11,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "load_vessel": "shipid.vessel.load",
     "Vessel": "shipid.vessel.load",
-    "Rollout": "shipid.simulation.rollout",
+    "rollout": "shipid.simulation.rollout",
     "read_dataset": "shipid.data.dataset",
     "import_log": "shipid.data.importing",
     "cut_windows": "shipid.data.windows",

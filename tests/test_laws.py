@@ -293,7 +293,7 @@ def test_lowered_equals_casadi(key: str) -> None:
         for name in found.signals
     ]
     parameter_tensor = torch.tensor(found.values)[:, None]
-    channels = lowered.main(*signal_tensors, lowered.prologue(parameter_tensor))
+    channels = lowered(*signal_tensors, parameter_tensor)
     wrench = torch.stack([torch.as_tensor(c, dtype=torch.float64).expand(len(batch)) for c in channels])
     expected = np.stack([found.wrench(drawn) for drawn in batch], axis=-1)
     scale = np.abs(expected).max()

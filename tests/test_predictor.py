@@ -217,14 +217,18 @@ def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) ->
     assert frame[["cooperative_north", "cooperative_east"]].notna().all(axis=None)
 
 
-def test_outside_share_of_a_faster_log(tmp_path: Path, tiny_run: Path) -> None:
+def test_outside_is_told_of_the_instant_that_it_is_of(tmp_path: Path, tiny_run: Path) -> None:
     dataset = read_dataset(tiny_run / DATASET)
-    faster = dataset.frame.assign(u=np.where(dataset.frame["run"] == "M001", 50.0, dataset.frame["u"]))
+    at = (dataset.frame["run"] == "M001") & (dataset.frame["t"] == 7.0)
+    faster = dataset.frame.assign(u=np.where(at, 50.0, dataset.frame["u"]))
     file = write_dataset(Dataset(faster, dataset.metadata), tmp_path / "fast.parquet")
-    frame, outside = predict_log(tiny_run, CELL, file, None, tmp_path / "paths.csv")
-    assert frame.loc[frame["run"] == "M001", "outside"].all()
-    assert outside == pytest.approx(frame["outside"].mean())
-    assert 1 / 12 <= outside < 0.7
+    before, _ = predict_log(tiny_run, CELL, tiny_run / DATASET, None, tmp_path / "before.csv")
+    after, outside = predict_log(tiny_run, CELL, file, None, tmp_path / "after.csv")
+    changed = after[after["outside"] != before["outside"]]
+    assert changed[["run", "t"]].drop_duplicates().to_numpy().tolist() == [["M001", 7.0]]
+    assert after.loc[(after["run"] == "M001") & (after["t"] == 7.0), "outside"].all()
+    assert len(changed) == 5
+    assert outside == pytest.approx(after["outside"].mean())
 
 
 def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:

@@ -19,8 +19,9 @@ def relative_wind(nu: SX, psi: SX, V_w: SX, beta_w: SX) -> tuple[SX, SX]:
     V_w [m/s], beta_w [rad, towards, clockwise from north]; gamma_rw = 0 is a head wind, > 0 comes from port.
     Finite, with finite derivatives, also when ship and wind are at rest.
     """
-    u_rw = nu[0] - V_w * ca.cos(beta_w - psi)
-    v_rw = nu[1] - V_w * ca.sin(beta_w - psi)
+    north, east = V_w * ca.cos(beta_w), V_w * ca.sin(beta_w)  # turned by psi: fewer sines than of beta_w - psi
+    u_rw = nu[0] - (north * ca.cos(psi) + east * ca.sin(psi))
+    v_rw = nu[1] - (east * ca.cos(psi) - north * ca.sin(psi))
     square = u_rw**2 + v_rw**2
     along = ca.if_else(square < CALM**2, CALM, u_rw)
     return square, -ca.atan2(v_rw, along)

@@ -1,7 +1,7 @@
 """A CasADi SX function as PyTorch: one tensor operation an instruction, so that whole batches go at once.
 
-The printer walks the instructions of the function. What depends on parameters alone is printed into a prologue that
-runs once a rollout; the rest broadcasts over (variant, sample). Nothing of the physics is written twice.
+The printer walks the instructions of the function. What depends on parameters alone, or on commands and weather, is
+printed into stages that run early; the rest broadcasts over (variant, sample). Nothing of the physics is written twice.
 """
 
 from __future__ import annotations
@@ -9,18 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import torch
-
-from shipid.simulation.rollout import Batch, Method, integrate
-from shipid.vessel.dynamics import Dynamics
-
-EAGER_BLOCK = 16384  # samples of one block: the intermediate results of a step stay in the cache
-COMPILED_BLOCK = 8192
 
 _UNARY = {
     ca.OP_NEG: "(-{0})",
@@ -108,203 +101,123 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Lowered:
-    """A lowered function.
+    """A lowered function, in stages: what depends on early inputs alone is computed early, and once.
 
-    prologue : parameters (num_parameters, ...) -> hoisted (num_hoisted, ...), once a rollout.
-    main : the function's inputs in order, parameters replaced by hoisted, channel first -> list of output channels.
+    early : one function a stage: (the stage's inputs, then what earlier stages saved) -> saved (num_saved, ...).
+    main : the other inputs in the function's order, then what all stages saved -> list of output channels.
+    names, stage_of : the function's inputs in order, and the stage that takes each (main takes the last).
+    num_instructions : of main.
     """
 
-    prologue: Callable[[torch.Tensor], torch.Tensor]
+    early: tuple[Callable[..., torch.Tensor], ...]
     main: Callable[..., list[Any]]
+    names: tuple[str, ...]
+    stage_of: tuple[int, ...]
     num_instructions: int
 
+    def __call__(self, *inputs: Any) -> list[Any]:
+        """Output channels for all inputs in the function's order: every stage, then main."""
+        saved: list[Any] = []
+        for number, stage in enumerate((*self.early, self.main)):
+            own = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
+            saved.append(stage(*own, *saved))
+        return list(saved[-1])
 
-def lower(function: ca.Function, parameters: str = "parameters") -> Lowered:
-    """Lower an SX function of dense vectors with one output; `parameters` names the input that the prologue takes.
+
+STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
+
+
+def lower(function: ca.Function, stages: Sequence[Sequence[str]] = STAGES) -> Lowered:
+    """Lower an SX function of dense vectors with one output; `stages` names the inputs that are known early.
 
     An instruction that has no PyTorch counterpart raises ValueError with its number.
     """
-    names = [function.name_in(i) for i in range(function.n_in())]
-    held = names.index(parameters)
-    lines: dict[bool, list[str]] = {True: [], False: []}  # True: prologue
-    slot: dict[int, tuple[str, bool | None]] = {}  # work slot -> expression, is it parameter-only (None: a number)
-    hoisted: dict[str, int] = {}
-    truths: set[str] = set()  # names of booleans
-    outputs: dict[int, tuple[str, bool | None]] = {}
-
-    def use(operand: tuple[str, bool | None], in_prologue: bool) -> str:
-        text, parameter_only = operand
-        if in_prologue or not parameter_only:
-            return text
-        return f"h[{hoisted.setdefault(text, len(hoisted))}]"
-
+    printer = _Printer(function, stages)
     for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_CONST:
-            slot[target[0]] = (repr(float(function.instruction_constant(k))), None)
-        elif operation == ca.OP_INPUT:
-            slot[target[0]] = (f"{names[source[0]]}[{source[1]}]", source[0] == held)
-        elif operation == ca.OP_OUTPUT:
-            outputs[target[1]] = slot[source[0]]
-        else:
-            operands = [slot[i] for i in source]
-            template = _UNARY.get(operation) or _BINARY.get(operation)
-            if template is None:
-                raise ValueError(f"CasADi operation {operation} of {function.name()} has no PyTorch counterpart")
-            kinds = {kind for _, kind in operands}
-            if kinds == {None}:
-                value = float(ca.evalf(_on_numbers(operation, [float(text) for text, _ in operands])))
-                slot[target[0]] = (repr(value), None)
-                continue
-            in_prologue = kinds <= {True, None}
-            texts = [use(operand, in_prologue) for operand in operands]
-            bare = _TAKES_TRUTH.get(operation, 0)
-            texts[bare:] = [f"_number({text})" if text in truths else text for text in texts[bare:]]
-            expression = template.format(*texts)
-            name = f"{'p' if in_prologue else 'a'}{k}"
-            truths |= {name} if operation in _TRUTH else set()
-            lines[in_prologue].append(f"    {name} = {expression}")
-            slot[target[0]] = (name, in_prologue)
+        printer.instruction(k)
+    return printer.finish()
 
-    arguments = ["h" if name == parameters else name for name in names]
-    result = ", ".join(use(outputs[i], False) for i in sorted(outputs))
-    main = [f"def main({', '.join(arguments)}):", *lines[False], f"    return [{result}]"]
-    saved = ", ".join(hoisted) or f"{parameters}[0]"
-    prologue = [f"def prologue({parameters}):", *lines[True], f"    return _stack({parameters}, [{saved}])"]
-    space: dict[str, Any] = {**_NAMES, "_stack": _stack}
-    exec(compile("\n".join([*prologue, "", *main]), f"<lowered {function.name()}>", "exec"), space)
-    return Lowered(space["prologue"], space["main"], len(lines[False]))
+
+@dataclass(frozen=True)
+class _Value:
+    """What a work slot holds: its text, the stage that computes it (-1: a plain number), and if it is a boolean."""
+
+    text: str
+    stage: int
+    truth: bool = False
+
+
+class _Printer:
+    """Prints instructions as Python lines, each in the earliest stage that knows its operands."""
+
+    def __init__(self, function: ca.Function, stages: Sequence[Sequence[str]]) -> None:
+        self.function = function
+        self.names = [function.name_in(i) for i in range(function.n_in())]
+        self.stages = [[name for name in self.names if name in stage] for stage in stages]
+        early = {name: number for number, stage in enumerate(self.stages) for name in stage}
+        self.last = len(self.stages)
+        self.stage_of = [early.get(name, self.last) for name in self.names]
+        self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
+        self.saved: list[dict[str, int]] = [{} for _ in self.stages]
+        self.slot: dict[int, _Value] = {}
+        self.outputs: dict[int, _Value] = {}
+
+    def instruction(self, k: int) -> None:
+        """Print one instruction, or note a number, an input or an output."""
+        operation = self.function.instruction_id(k)
+        source, target = self.function.instruction_input(k), self.function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            self.slot[target[0]] = _Value(repr(float(self.function.instruction_constant(k))), -1)
+        elif operation == ca.OP_INPUT:
+            self.slot[target[0]] = _Value(f"{self.names[source[0]]}[{source[1]}]", self.stage_of[source[0]])
+        elif operation == ca.OP_OUTPUT:
+            self.outputs[target[1]] = self.slot[source[0]]
+        else:
+            self.slot[target[0]] = self.operation(k, operation, [self.slot[i] for i in source])
+
+    def operation(self, k: int, operation: int, operands: list[_Value]) -> _Value:
+        """Print an operation; one on numbers alone is done here and now."""
+        template = _UNARY.get(operation) or _BINARY.get(operation)
+        if template is None:
+            raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no PyTorch counterpart")
+        stage = max(operand.stage for operand in operands)
+        if stage < 0:
+            return _Value(repr(float(ca.evalf(_on_numbers(operation, [float(o.text) for o in operands])))), -1)
+        bare = _TAKES_TRUTH.get(operation, 0)
+        texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
+        self.lines[stage].append(f"    a{k} = {template.format(*texts)}")
+        return _Value(f"a{k}", stage, operation in _TRUTH)
+
+    def use(self, value: _Value, stage: int, truth_is_fine: bool = False) -> str:
+        """Text of a value inside a stage; one of an earlier stage is saved there, as a number."""
+        if value.stage in (-1, stage):
+            return f"_number({value.text})" if value.truth and not truth_is_fine else value.text
+        saved = self.saved[value.stage]
+        return f"s{value.stage}[{saved.setdefault(value.text, len(saved))}]"
+
+    def finish(self) -> Lowered:
+        """Compile what was printed."""
+        result = ", ".join(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
+        space: dict[str, Any] = {**_NAMES, "_stack": _stack}
+        late = [name for name, stage in zip(self.names, self.stage_of, strict=True) if stage == self.last]
+        for number, inputs in enumerate([*self.stages, late]):
+            arguments = ", ".join([*inputs, *(f"s{earlier}" for earlier in range(number))])
+            end = f"[{result}]" if number == self.last else f"_stack([{arguments}], [{', '.join(self.saved[number])}])"
+            source = [f"def stage{number}({arguments}):", *self.lines[number], f"    return {end}"]
+            exec(compile("\n".join(source), f"<lowered {self.function.name()}>", "exec"), space)
+        early = tuple(space[f"stage{number}"] for number in range(self.last))
+        main = space[f"stage{self.last}"]
+        return Lowered(early, main, tuple(self.names), tuple(self.stage_of), len(self.lines[self.last]))
 
 
 def _on_numbers(operation: int, values: Sequence[float]) -> ca.SX:
     return ca.SX.unary(operation, values[0]) if len(values) == 1 else ca.SX.binary(operation, *values)
 
 
-def _stack(like: torch.Tensor, values: Sequence[Any]) -> torch.Tensor:
-    shape = like.shape[1:]
+def _stack(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
+    """What a stage saves (num_saved, ...), as numbers; the shape is that of its inputs broadcast together."""
+    shape = np.broadcast_shapes(*(channels.shape[1:] for channels in inputs))
+    like = inputs[0]
+    if not values:
+        return like.new_empty((0, *shape))
     return torch.stack([torch.as_tensor(value, dtype=like.dtype).expand(shape) for value in values])
-
-
-@dataclass(frozen=True)
-class Program:
-    """A lowered step.
-
-    prologue : parameters (P, V, 1) -> hoisted tensors, once a rollout.
-    step : (state, memory, greatest, commands, environment, tau, *hoisted) -> the first three after the step, and the
-        record (C, V, S) of the kept channels. One kernel when compiled: nothing is written that is not kept.
-    """
-
-    prologue: Callable[[torch.Tensor], list[torch.Tensor]]
-    step: Callable[..., tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]]
-
-
-@lru_cache(maxsize=32)
-def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], compiled: bool) -> Program:
-    """Lower the functions of a vessel's structure and put the integrator around them; one compilation each."""
-    lowered_rates, lowered_advance = lower(model.rates), lower(model.advance)
-    lowered_sums = [(lower(term.function), torch.tensor(term.arrays.T)) for term in model.sums]
-    speeds = slice(model.num_dof, 2 * model.num_dof)
-
-    def prologue(parameters: torch.Tensor) -> list[torch.Tensor]:
-        hoisted = [lowered_rates.prologue(parameters), lowered_advance.prologue(parameters)]
-        return hoisted + [function.prologue(parameters).unsqueeze(-1) for function, _ in lowered_sums]
-
-    def one_step(
-        x: torch.Tensor,
-        m: torch.Tensor,
-        greatest: torch.Tensor,
-        commands: torch.Tensor,
-        environment: torch.Tensor,
-        tau: torch.Tensor,
-        *hoisted: torch.Tensor,
-    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-        h_rates, h_advance, *h_sums = hoisted
-
-        def rates(state: Any, memory: Any) -> Any:
-            total = list(tau)
-            for (function, arrays), h in zip(lowered_sums, h_sums, strict=True):
-                groups = (state, memory, commands, environment)
-                wide = [[channel.unsqueeze(-1) for channel in group] for group in groups]
-                wrench = function.main(*wide, h, arrays.to(tau))
-                total = [a + _sum(b, arrays.shape[1]) for a, b in zip(total, wrench, strict=True)]
-            return lowered_rates.main(state, memory, commands, environment, h_rates, total)
-
-        def advance(memory: Any, dt: float) -> Any:
-            return lowered_advance.main(x, memory, commands, environment, h_advance, [dt])
-
-        after, memory_after = integrate(rates, advance, _add, list(x), list(m), step, method)
-        both = [*after, *memory_after]
-        speed = greatest
-        for value in after[speeds]:
-            speed = torch.maximum(speed, torch.abs(value))  # both keep NaN
-        for value in both:
-            speed = speed + 0 * value
-        record = torch.stack([both[row] for row in rows])
-        return torch.stack(after), torch.stack(memory_after) if memory_after else m, speed, record
-
-    return Program(prologue, torch.compile(one_step, dynamic=False, fullgraph=True) if compiled else one_step)
-
-
-def _sum(value: Any, count: int) -> Any:
-    """Sum over components (last axis); what is the same for all of them counts as often as there are components."""
-    if not isinstance(value, torch.Tensor):
-        return count * value
-    return value.expand(*value.shape[:-1], count).sum(-1)
-
-
-def _add(x: Sequence[Any], a: float, k: Sequence[Any]) -> list[Any]:
-    return [xi + a * ki for xi, ki in zip(x, k, strict=True)]
-
-
-def run_torch(
-    model: Dynamics,
-    batch: Batch,
-    step: float,
-    num_steps: int,
-    method: Method,
-    every: int,
-    rows: list[int],
-    compiled: bool,
-    device: str,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
-
-    Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
-    a family of any size needs one compilation and a block stays in the cache.
-    """
-    program = _program(model, method, step, tuple(rows), compiled)
-    num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
-    width = min(COMPILED_BLOCK if compiled else EAGER_BLOCK, 1 << max(0, num_samples - 1).bit_length())
-    padded = -(-num_samples // width) * width
-    place = torch.device(device)
-
-    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, padded S)
-        filled = np.concatenate([array, np.repeat(array[..., -1:], padded - num_samples, axis=-1)], axis=-1)
-        return torch.tensor(filled, dtype=torch.float64, device=place).unsqueeze(-2)
-
-    start, memory = tensor(batch.state), tensor(batch.memory)
-    held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
-    values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
-    groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
-    records = torch.empty((num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place)
-    worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
-    with torch.no_grad():
-        for group in groups:
-            hoisted = program.prologue(values[:, group])
-            for left in range(0, padded, width):
-                block = slice(left, left + width)
-                inputs = [channel[..., block] for channel in held]
-                shape = (-1, hoisted[0].shape[1], width)
-                x, m = (part[..., block].expand(shape).contiguous() for part in (start, memory))
-                both = torch.cat([x, m])
-                records[0, :, group, block] = both[rows]
-                greatest = both[model.num_dof : len(model.state)].abs().amax(0) + 0 * both.sum(0)
-                for k in range(num_steps):
-                    now = [series[min(k, len(series) - 1)] for series in inputs]
-                    x, m, greatest, record = program.step(x, m, greatest, *now, *hoisted)
-                    if (k + 1) % every == 0:
-                        records[(k + 1) // every, :, group, block] = record
-                worst[group, block] = greatest
-    result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
-    return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()

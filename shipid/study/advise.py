@@ -63,7 +63,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
         left = known["H"] / known["A"]
         text = (
             f"Compensation with {largest} runs leaves {left.min():.0%} to {left.max():.0%} of the error of physics "
-            f"alone (over {len(known)} models)."
+            f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
         )
         sentences.append((text, "horizon"))
     return [*sentences, (_floor(top, largest, naive_summary(results)["mean"]), "gain")]

@@ -19,7 +19,7 @@ from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, s
 from shipid.errors import DataError, DocumentError, choices
 from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
-from shipid.simulation.rollout import memory_along
+from shipid.simulation.scan import memory_along
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Model, Plan
 from shipid.vessel.load import Vessel

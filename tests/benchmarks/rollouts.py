@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.simulation.rollout import casadi_scan, rollout
+from shipid.simulation.rollout import rollout
+from shipid.simulation.scan import casadi_scan
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.timing import best_of

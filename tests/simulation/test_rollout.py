@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError, ShipidError
-from shipid.simulation.rollout import Method, memory_along, rollout
+from shipid.simulation.integrate import Method
+from shipid.simulation.rollout import rollout
+from shipid.simulation.scan import memory_along
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members

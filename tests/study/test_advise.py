@@ -49,7 +49,14 @@ def made(tmp_path: Path) -> Any:
         rows, paths = [], {}
         for (model, N_D, seed), H in cells.items():
             A = alone.get(model, np.nan)
-            row = {"cell": f"{model}-{N_D}-{seed}", "model": model, "kind": model, "member": 0, "N_D": N_D, "seed": seed}
+            row = {
+                "cell": f"{model}-{N_D}-{seed}",
+                "model": model,
+                "kind": model,
+                "member": 0,
+                "N_D": N_D,
+                "seed": seed,
+            }
             row |= {"runs": N_D, "minutes": 1.0, "A": A, "A_90": A, "A_rms": A, "H": np.nan, "H_90": np.nan}
             row |= {"rms": np.nan, "status": "failed", "sentence": "no training converged"}
             if H is not None:
@@ -84,7 +91,7 @@ def text(results: Results) -> str:
     sentences = answer(results)
     assert all(anchor in ANCHORS for _, anchor in sentences)
     for sentence, _ in sentences:
-        assert re.fullmatch(r"[A-Z].*\.", sentence), sentence
+        assert re.fullmatch(r"[A-Z0-9].*\.", sentence), sentence
         assert "nan" not in sentence.split()
         assert "inf" not in sentence.split()
     return "\n".join(sentence for sentence, _ in sentences)
@@ -107,6 +114,12 @@ def test_no_amount_of_data_replaces_physics(made: Any) -> None:
     assert "Without physics even 30 runs give 4.00 m" in said
     assert "with 10 runs good has 1.50 m" in said
     assert "every physics model does better than none" in said
+
+
+def test_physics_worth_no_run_at_all(made: Any) -> None:
+    """Where the least data does without physics what the best physics does, nobody needs more runs."""
+    said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (1.25, 1.1)})))
+    assert "Without physics 10 runs do as well, 1.25 m: with 10 runs good has 1.50 m." in said
 
 
 def test_harm_is_told_with_names(made: Any) -> None:
@@ -152,7 +165,7 @@ def test_failed_cells_are_told_and_not_counted(made: Any) -> None:
     said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
     assert "1 of 6 cells have no result (bad: no training converged)" in said
     assert "every physics model with a result does better than none" in said
-    assert "(over 1 models)" in said
+    assert "(over 1 model)" in said
 
 
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:
@@ -171,7 +184,7 @@ def test_nothing_can_be_said(made: Any) -> None:
 def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     H = {"good": (0.1, 0.1), "bad": (3.0, 1.5), "none": (9.0, 4.0)}
     said = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
-    assert "leaves 25% to 25% of the error of physics alone (over 1 models)" in said
+    assert "leaves 25% to 25% of the error of physics alone (over 1 model)" in said
 
 
 # R1 to R4

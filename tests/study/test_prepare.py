@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DocumentError
 from shipid.predictor import Predictor
 from shipid.simulation.rollout import rollout
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, build_plan, read_plan
 from shipid.study.prepare import Prepared, constant_motion, limits, minutes, obtain, own_vessel, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
@@ -40,8 +40,6 @@ def recorded(tmp_path: Path) -> Callable[..., tuple[Plan, Dataset]]:
     """A plan on a recorded dataset of one's own."""
 
     def make(dataset: Dataset, **changes: Any) -> tuple[Plan, Dataset]:
-        from shipid.study.plan import build_plan
-
         file = write_dataset(dataset, tmp_path / "log.parquet")
         document = tiny_plan(tmp_path).document
         del document["truth"]
@@ -60,7 +58,7 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
         batches = sorted((batch for batch in plan.batches if batch.seed == seed), key=lambda batch: batch.N_D)
         drawn = [set(prepared.runs(plan, batch)) for batch in batches]
         assert [len(runs) for runs in drawn] == [2, 4, 6, 8]
-        assert all(small < large for small, large in zip(drawn, drawn[1:], strict=False))
+        assert all(small < large for small, large in pairwise(drawn))
         assert not drawn[-1] & test
     first, second = (prepared.runs(plan, next(b for b in plan.batches if b.N_D == 4 and b.seed == s)) for s in (0, 1))
     assert set(first) != set(second)
@@ -340,3 +338,23 @@ def test_limits_and_minutes(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
     for name, (low, high) in found.items():
         assert (low, high) == pytest.approx((rows[name].min(), rows[name].max()))
+
+
+def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Method, section 5: the 20/20 zigzag at 4150-4350 s; no other window, nor the other part of its fold, sees it."""
+    monkeypatch.setenv("SHIPID_DATA", str(shared_data))
+    plan = read_plan("full-scale")
+    prepared = prepare(plan, obtain(plan))
+    assert list(prepared.test.spans) == ["ZZ 20/20"]
+    first, last = prepared.test.spans["ZZ 20/20"]
+    assert 4150 <= first < last <= 4350
+    assert not ((prepared.pool.t <= last) & (prepared.pool.t + 15.0 >= first)).any()
+    assert len(prepared.pool.spans) >= 22
+    assert any("V_w, beta_w not measured, assumed 0" in note for note in prepared.notes)
+    assert "V_w" not in prepared.pool.columns
+    for batch in plan.batches:
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+        for train, validation in prepared.folds(plan, batch, windows):
+            gaps = np.abs(windows.t[train][:, None] - windows.t[validation])
+            assert gaps.min() > 15.0
+    assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]

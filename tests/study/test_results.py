@@ -90,8 +90,8 @@ def test_snapshots_start_at_the_ship_and_end_at_its_heading(read: Results, tiny_
 
 def test_outline_is_to_scale(read: Results) -> None:
     outline = frames.snapshots(read)[0]["outline"]
-    assert np.ptp(outline[:, 0]) == pytest.approx(28.9, abs=0.1)
-    assert np.ptp(outline[:, 1]) == pytest.approx(9.6, abs=0.1)
+    assert np.ptp(outline[:, 0]) == pytest.approx(31.25)  # over all
+    assert np.ptp(outline[:, 1]) == pytest.approx(9.6)
 
 
 def test_provenance_says_what_it_stands_on(read: Results) -> None:

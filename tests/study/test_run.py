@@ -130,7 +130,7 @@ def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Pa
     entry = next(row for row in models if row["model"] == "wrong-2")
     assert entry["factors"] == pytest.approx(dict(variant.factors), rel=1e-15)
     assert entry["base_digest"] == load_vessel("gunnerus-28.9").digest
-    assert not [file for file in tiny_run.rglob(".*")]  # nothing temporary is left
+    assert not list(tiny_run.rglob(".*"))  # nothing temporary is left
 
 
 def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Path) -> None:
@@ -184,7 +184,7 @@ def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_folder_of_another_study_is_refused(tmp_path: Path, tiny_run: Path) -> None:
     other = tiny_plan(tmp_path, {"truth.seed": 99})
-    with pytest.raises(ResultError, match="another study than .*tiny.toml: choose another --out"):
+    with pytest.raises(ResultError, match=r"another study than .*tiny\.toml: choose another --out"):
         next(run_study(other, tiny_run))
 
 

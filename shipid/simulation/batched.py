@@ -1,0 +1,185 @@
+"""The PyTorch engine: all samples and variants of a step at once, eager or as one compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+import torch._inductor
+from torch.fx.experimental.proxy_tensor import make_fx
+
+from shipid.simulation.integrate import Batch, Method, integrate
+from shipid.simulation.lowering import lower
+from shipid.vessel.dynamics import Dynamics
+
+EAGER_BLOCK = 16384  # samples x variants of one block
+COMPILED_BLOCK = 8192  # samples of one block, one variant
+DEVICE_BLOCK = 262144  # samples of one block on a GPU
+GRAIN = 256  # compiled blocks are a multiple of it: similar batches share a kernel
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A lowered step.
+
+    parameters_stage : parameters (P, V, 1) -> saved tensors of all functions, once a rollout.
+    held_stage : (commands, environment, saved) -> what else is known before the state is, once while they are held.
+    step : (state, memory, greatest, tau, *known) -> the first three after the step, and the record (C, V, S) of the
+        kept channels. One kernel when compiled: nothing is written that is not kept. `known` is what the two stages
+        saved or, with commands that vary, (commands, environment, *saved of the first stage).
+    """
+
+    parameters_stage: Callable[[torch.Tensor], list[torch.Tensor]]
+    held_stage: Callable[[torch.Tensor, torch.Tensor, list[torch.Tensor]], list[torch.Tensor]]
+    step: Callable[..., tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]]
+
+
+@lru_cache(maxsize=32)
+def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], varying: bool) -> Program:
+    """Lower the functions of a vessel's structure and put the integrator around them."""
+    functions = [lower(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
+    arrays = [torch.tensor(term.arrays.T) for term in model.sums]
+    speeds = slice(model.num_dof, 2 * model.num_dof)
+
+    def parameters_stage(parameters: torch.Tensor) -> list[torch.Tensor]:
+        return [function.early[0](parameters) for function in functions]
+
+    def held_stage(
+        commands: torch.Tensor, environment: torch.Tensor, first: Sequence[torch.Tensor]
+    ) -> list[torch.Tensor]:
+        second = [f.early[1](commands, environment, saved) for f, saved in zip(functions, first, strict=True)]
+        return [*first, *second]
+
+    def one_step(
+        x: torch.Tensor, m: torch.Tensor, greatest: torch.Tensor, tau: torch.Tensor, *known: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+        saved = held_stage(known[0], known[1], known[2:]) if varying else known
+        saved_rates, saved_advance, *saved_sums = zip(saved[: len(functions)], saved[len(functions) :], strict=True)
+
+        def rates(state: Any, memory: Any) -> Any:
+            total = list(tau)
+            for function, entries, early in zip(functions[2:], arrays, saved_sums, strict=True):
+                wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory)]
+                wrench = function.main(*wide, entries.to(tau), *(part.unsqueeze(-1) for part in early))
+                total = [a + _sum(b, entries.shape[1]) for a, b in zip(total, wrench, strict=True)]
+            return functions[0].main(state, memory, total, *saved_rates)
+
+        def advance(memory: Any, dt: float) -> Any:
+            return functions[1].main(x, memory, [dt], *saved_advance)
+
+        after, memory_after = integrate(rates, advance, _add, list(x), list(m), step, method)
+        both = [*after, *memory_after]
+        speed = greatest
+        for value in after[speeds]:
+            speed = torch.maximum(speed, torch.abs(value))
+        for value in both:
+            speed = speed + 0 * value  # what is not finite stays so
+        record = torch.stack([both[row] for row in rows])
+        return torch.stack(after), torch.stack(memory_after) if memory_after else m, speed, record
+
+    return Program(parameters_stage, held_stage, one_step)
+
+
+Key = tuple[Program, tuple[tuple[int, ...], ...], torch.device]
+kernels: dict[Key, Callable[..., Any]] = {}
+
+
+def _compiled(program: Program, inputs: Sequence[torch.Tensor]) -> Callable[..., Any]:
+    """The step as one kernel for the shapes at hand, from a cache; it is as much slower to make as it is faster to run.
+
+    The step is traced and handed to TorchInductor directly: a compilation takes less than half the time of
+    `torch.compile`, and a call has no guards to check. Shapes are the key, so they need none.
+    """
+    key = (program, tuple(tuple(tensor.shape) for tensor in inputs), inputs[0].device)
+    if key not in kernels:
+        kernels[key] = torch._inductor.compile(make_fx(program.step)(*inputs), list(inputs))
+    return kernels[key]
+
+
+def _sum(value: Any, count: int) -> Any:
+    """Sum over components (last axis); what is the same for all of them counts as often as there are components."""
+    if not isinstance(value, torch.Tensor):
+        return count * value
+    return value.expand(*value.shape[:-1], count).sum(-1)
+
+
+def _add(x: Sequence[Any], a: float, k: Sequence[Any]) -> list[Any]:
+    return [xi + a * ki for xi, ki in zip(x, k, strict=True)]
+
+
+def run_torch(
+    model: Dynamics,
+    batch: Batch,
+    step: float,
+    num_steps: int,
+    method: Method,
+    every: int,
+    rows: list[int],
+    compiled: bool,
+    device: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
+
+    Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
+    a family of any size needs one compilation and a block stays in the cache.
+    """
+    varying = len(batch.commands) > 1 or len(batch.environment) > 1
+    program = _program(model, method, step, tuple(rows), varying)
+    num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
+    width = _width(num_samples, num_variants, compiled, device)
+    padded = -(-num_samples // width) * width
+    place = torch.device(device)
+
+    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, padded S)
+        filled = np.concatenate([array, np.repeat(array[..., -1:], padded - num_samples, axis=-1)], axis=-1)
+        return torch.tensor(filled, dtype=torch.float64, device=place).unsqueeze(-2)
+
+    start, memory = tensor(batch.state), tensor(batch.memory)
+    held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
+    values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
+    groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
+    records = torch.empty((num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place)
+    worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
+    with torch.no_grad():
+        first = program.parameters_stage(values)
+        for group in groups:
+            saved = [entries[:, group] for entries in first]
+            for left in range(0, padded, width):
+                block = slice(left, left + width)
+                commands, environment, tau = (series[..., block] for series in held)
+                shape = (-1, saved[0].shape[1], width)
+                x, m = (part[..., block].expand(shape).contiguous() for part in (start, memory))
+                both = torch.cat([x, m])
+                target = records[:, :, group, block]
+                target[0] = both[rows]
+                greatest = both[model.num_dof : len(model.state)].abs().amax(0) + 0 * both.sum(0)
+                known = saved if varying else program.held_stage(commands[0], environment[0], saved)
+                advance: Callable[..., Any] = program.step
+                for k in range(num_steps):
+                    if varying:
+                        known = [_at(commands, k), _at(environment, k), *saved]
+                    inputs = [x, m, greatest, _at(tau, k), *known]
+                    if compiled and k == 0:
+                        advance = _compiled(program, inputs)
+                    x, m, greatest, record = advance(*inputs)
+                    if (k + 1) % every == 0:
+                        target[(k + 1) // every] = record
+                worst[group, block] = greatest
+    result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
+    return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
+
+
+def _at(series: torch.Tensor, k: int) -> torch.Tensor:
+    """Entry k of a series in time, or the one that is held."""
+    return series[min(k, len(series) - 1)]
+
+
+def _width(num_samples: int, num_variants: int, compiled: bool, device: str) -> int:
+    """Samples of a block: equal blocks that leave little to pad and whose intermediate results stay in the cache."""
+    most = DEVICE_BLOCK if device != "cpu" else COMPILED_BLOCK if compiled else max(256, EAGER_BLOCK // num_variants)
+    blocks = -(-num_samples // most)
+    return -(-num_samples // (blocks * GRAIN)) * GRAIN if compiled else -(-num_samples // blocks)

@@ -1,0 +1,53 @@
+"""The integrator, written once for every engine, and the batch that all engines take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+Array = np.ndarray
+Method = Literal["euler", "rk4"]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Inputs of a rollout as plain arrays, channel first: the layout that both engines share.
+
+    state (nx, S), memory (nm, S), commands (T, nc, S), environment (T, ne, S), tau_extra (T, n_dof, S) with T = 1 when
+    held over the horizon, parameters (V, P).
+    """
+
+    state: Array
+    memory: Array
+    commands: Array
+    environment: Array
+    tau_extra: Array
+    parameters: Array
+
+
+def integrate(
+    rates: Callable[[Any, Any], Any],
+    advance: Callable[[Any, float], Any],
+    add: Callable[[Any, float, Any], Any],
+    state: Any,
+    memory: Any,
+    step: float,
+    method: Method,
+) -> tuple[Any, Any]:
+    """One step of explicit Euler or classical RK4; `add(x, a, k)` is x + a k in the arithmetic at hand.
+
+    Memories advance exactly: the stages of RK4 see them at their own time, so it keeps its order with held commands.
+    """
+    if method == "euler":
+        return add(state, step, rates(state, memory)), advance(memory, step)
+    half, full = advance(memory, step / 2), advance(memory, step)
+    k1 = rates(state, memory)
+    k2 = rates(add(state, step / 2, k1), half)
+    k3 = rates(add(state, step / 2, k2), half)
+    k4 = rates(add(state, step, k3), full)
+    for weight, slope in ((1, k1), (2, k2), (2, k3), (1, k4)):
+        state = add(state, step * weight / 6, slope)
+    return state, full

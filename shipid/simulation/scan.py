@@ -1,0 +1,110 @@
+"""The CasADi engine: one sample's steps as a scan, samples on threads. Best for long simulations of few samples."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from shipid.simulation.integrate import Array, Batch, Method, integrate
+from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.load import Vessel
+
+
+@lru_cache(maxsize=32)
+def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, every: int) -> ca.Function:
+    """One sample: (state, memory, commands, environment, tau_extra, parameters) -> records, steps inside."""
+    state, memory = ca.MX.sym("state", len(model.state)), ca.MX.sym("memory", len(model.memory))
+    commands, environment = ca.MX.sym("commands", len(model.commands)), ca.MX.sym("environment", len(model.environment))
+    tau, parameters = ca.MX.sym("tau", model.num_dof), ca.MX.sym("parameters", len(model.parameters))
+
+    def rates(x: Any, m: Any) -> Any:
+        total = tau
+        for term in model.sums:
+            mapped = term.function.map(len(term.arrays))
+            columns = [ca.repmat(a, 1, len(term.arrays)) for a in (x, m, commands, environment, parameters)]
+            total = total + ca.sum2(mapped(*columns, ca.DM(term.arrays.T)))
+        return model.rates(x, m, commands, environment, parameters, total)
+
+    def advance(m: Any, dt: float) -> Any:
+        return model.advance(state, m, commands, environment, parameters, dt)
+
+    after, memory_after = integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
+    one = ca.Function(
+        "step",
+        [ca.vertcat(state, memory), commands, environment, tau, parameters],
+        [ca.vertcat(after, memory_after)],
+    )
+    if every > 1:
+        x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), every)
+        e, t = ca.MX.sym("e", len(model.environment), every), ca.MX.sym("t", model.num_dof, every)
+        inner = one.mapaccum(every)(x, c, e, t, ca.repmat(parameters, 1, every))
+        one = ca.Function("steps", [x, c, e, t, parameters], [inner[:, -1]])
+    count = num_steps // every
+    x = ca.MX.sym("x", len(model.state) + len(model.memory))
+    c, e = ca.MX.sym("c", len(model.commands), num_steps), ca.MX.sym("e", len(model.environment), num_steps)
+    t = ca.MX.sym("t", model.num_dof, num_steps)
+    path = one.mapaccum(count)(x, c, e, t, ca.repmat(parameters, 1, count))
+    return ca.Function("rollout", [x, c, e, t, parameters], [path])
+
+
+def run_casadi(
+    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
+) -> tuple[Array, Array]:
+    """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
+    scan = casadi_scan(model, step, num_steps, method, every)
+    num_samples, num_records = batch.state.shape[1], num_steps // every
+    start = np.concatenate([batch.state, batch.memory])
+    speed_rows = slice(model.num_dof, len(model.state))
+
+    def over_time(held: Array) -> Array:  # (T, C, S) -> (C, S * num_steps), a sample's steps side by side
+        full = np.broadcast_to(held, (num_steps, *held.shape[1:]))
+        return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
+
+    inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
+    mapped = scan.map(num_samples, "thread", min(os.cpu_count() or 1, num_samples))
+    records, worst = [], []
+    for values in batch.parameters:
+        found = np.array(mapped(*inputs, np.tile(values[:, None], (1, num_samples))))
+        path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
+        path = np.concatenate([start.T[None], path])
+        records.append(path[:, :, rows])
+        worst.append(np.abs(path[:, :, speed_rows]).max(axis=(0, 2)) + 0 * path.sum(axis=(0, 2)))
+    return np.stack(records, axis=1), np.stack(worst)
+
+
+def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
+    """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
+
+    The first order is taken as reached; each order is held until the next row. They are modelled, not measured.
+    """
+    model = dynamics(vessel)
+    if not model.memory:
+        return None
+    orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
+    first = orders[[model.commands.index(name) for name in model.memory], 0]
+    count = len(t) - 1
+    if count == 0:
+        return dict(zip(model.memory, first[:, None], strict=True))
+    scan = ca.Function(
+        "advance",
+        [
+            memory := ca.MX.sym("memory", len(model.memory)),
+            order := ca.MX.sym("order", len(model.commands)),
+            dt := ca.MX.sym("dt"),
+            parameters := ca.MX.sym("parameters", len(model.parameters)),
+        ],
+        [
+            model.advance(
+                ca.MX.zeros(len(model.state)), memory, order, ca.MX.zeros(len(model.environment)), parameters, dt
+            )
+        ],
+    ).mapaccum(count)
+    values = np.array(list(vessel.parameters.values()))[:, None]
+    after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
+    states = np.concatenate([first[:, None], after], axis=1)
+    return dict(zip(model.memory, states, strict=True))

@@ -1,0 +1,286 @@
+"""The command line: every command once, and a user's mistake is one line on stderr."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+import shipid
+from shipid.cli import app
+from shipid.data.dataset import read_dataset, write_dataset
+from shipid.document import bundled, bundled_folder
+from shipid.errors import ShipidError
+from shipid.study.store import DATASET, read_rows
+from shipid.vessel.load import load_vessel
+from tests.study.tiny import TINY
+
+BAD = Path(__file__).parent / "bad"
+
+
+def said(*arguments: object) -> str:
+    """Output of a command that must succeed."""
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def shell(*arguments: object, code: str = "from shipid.cli import main; main()") -> subprocess.CompletedProcess[str]:
+    """Run the command as a user would, in a process of its own."""
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The tiny study in a folder of its own, which is the working folder."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "tiny.toml"
+    file.write_text(TINY.read_text())
+    return file
+
+
+def test_help_and_version_are_light() -> None:
+    """Nobody waits for PyTorch to read a help page."""
+    heavy = {"torch", "casadi", "pandas", "optuna", "numpy", "dask", "plotly", "pyarrow"}
+    code = (
+        "import sys\nfrom shipid.cli import main\ntry:\n    main()\nexcept SystemExit as end:\n"
+        f"    print(end.code, sorted({heavy!r} & set(sys.modules)))"
+    )
+    for arguments in (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"]):
+        result = shell(*arguments, code=code)
+        assert re.search(r"(0|2|None) \[\]$", result.stdout.strip()), (arguments, result)
+    assert shipid.__version__ in shell("--version").stdout
+
+
+def test_help_names_every_command() -> None:
+    for group, commands in (
+        ([], ("vessel", "data", "study", "predict")),
+        (["vessel"], ("list", "show")),
+        (["data"], ("import", "check", "fetch")),
+        (["study"], ("list", "variants", "run", "resume", "report")),
+    ):
+        text = said(*group, "--help")
+        assert all(re.search(rf"\b{name}\b", text) for name in commands), group
+
+
+def test_vessels() -> None:
+    text = said("vessel", "list")
+    for name in bundled("models"):
+        assert f" {name} " in text
+    ship = load_vessel("gunnerus-28.9")
+    text = said("vessel", "show", "gunnerus-28.9")
+    assert ship.digest in text
+    for path, value in ship.parameters.items():
+        shown = re.search(rf"^\s*{re.escape(path)} +(\S+)", text, re.MULTILINE)
+        assert shown, path
+        assert float(shown[1]) == pytest.approx(value, rel=1e-9)
+    schema = json.loads(said("vessel", "show", "--schema"))
+    assert "hull" in schema["properties"]
+
+
+def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv")
+    assert "41 rows in 1 runs -> plain.parquet" in text
+    assert read_dataset("plain.parquet").runs == ["good"]
+    said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
+    assert "good" in said("data", "check", "deep/other.parquet")
+
+
+def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
+    dataset = read_dataset(tiny_run / DATASET)
+    wrong = dataset.frame.assign(r=dataset.frame["r"] + 0.5)
+    file = write_dataset(type(dataset)(wrong, dataset.metadata), tmp_path / "wrong.parquet")
+    result = CliRunner().invoke(app, ["data", "check", str(file)])
+    assert result.exit_code == 1
+    assert "NO" in result.output
+    assert "d(psi)/dt" in result.output or "psi" in result.output
+
+
+def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHIPID_DATA", str(shared_data))
+    file = Path(said("data", "fetch", "gunnerus-2022").strip())
+    assert file.is_file()
+    assert shared_data in file.parents
+
+
+def test_studies_and_variants(study: Path) -> None:
+    text = said("study", "list")
+    assert all(f" {name} " in text for name in bundled("studies"))
+    text = said("study", "variants", study, "--save", "patches")
+    accuracy = re.findall(r"^ *(right|wrong-1|wrong-2|none) +(\S+)", text, re.MULTILINE)
+    assert [name for name, _ in accuracy] == ["right", "wrong-1", "wrong-2", "none"]
+    assert [value == "-" for _, value in accuracy] == [False, False, False, True]
+    assert "3 patches -> patches" in text
+    assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
+    text = said("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
+    assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
+
+
+def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:
+    text = said("study", "variants", study)
+    rows = read_rows(tiny_run).drop_duplicates("model").set_index("model")
+    for name in ("right", "wrong-1", "wrong-2"):
+        shown = re.search(rf"^ *{name} +(\S+)", text, re.MULTILINE)
+        assert shown
+        assert float(shown[1]) == pytest.approx(rows.loc[name, "A"], abs=0.005)
+
+
+def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
+    """The whole way on one worker, as a user goes it."""
+    text = said("study", "run", study, "--workers", "1")
+    folder = next(Path("results").iterdir())
+    assert re.fullmatch(r"tiny-[0-9a-f]{8}", folder.name)
+    assert "8 of 8 cells to do" in text
+    assert re.search(r"^\[8/8\] \S+: H \d+\.\d{3} m, H_90 \d+\.\d{3} m, ", text, re.MULTILINE)
+    assert text.rstrip().endswith(f"report: {folder / 'report.html'}")
+    answer = (folder / "answer.txt").read_text().splitlines()
+    assert all(f"  {line}" in text for line in answer)
+    assert len(answer) >= 4
+    assert read_rows(folder)["H"].tolist() == read_rows(tiny_run)["H"].tolist()
+
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Does the whole chain hold together?" in page
+    assert f"shipid study run {folder.name}/study.toml" in page
+    assert "Does the whole chain hold together?" in (folder / "summary.md").read_text()
+
+    (folder / "report.html").unlink()
+    assert said("study", "report", folder).strip() == str(folder / "report.html")
+    assert (folder / "report.html").is_file()
+    next((folder / "batches").iterdir()).unlink()
+    assert "4 of 8 cells to do" in said("study", "resume", folder, "--workers", "1")
+
+    text = said("predict", folder, folder / DATASET, "--cell", "none-N0004-s0")
+    assert f"{12 * 21} instants, {12 * 21 * 5} points -> none-N0004-s0.parquet" in text
+    assert len(pd.read_parquet("none-N0004-s0.parquet")) == 12 * 21 * 5
+    assert "outside what the compensator was trained on" in text
+
+
+def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A log with other commands than the ship's is one line."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ShipidError, match=r"takes this command; the data have propeller\.n"):
+        said(
+            *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", "right-N0004-s0"),
+            *("--mapping", BAD / "logs" / "plain.toml"),
+        )
+
+
+def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    (folder / "batches" / "N0004-s0.json").unlink()
+    said("study", "report", folder)
+    assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
+    assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
+
+
+MISTAKES = {
+    "unknown vessel": (["vessel", "show", "gunerus-28.9"], "did you mean 'gunnerus-28.9'?"),
+    "no vessel": (["vessel", "show"], "name a vessel"),
+    "unknown study": (["study", "run", "quik"], "did you mean 'quick'?"),
+    "broken study": (["study", "run", BAD / "studies" / "no-question.toml"], "no-question.toml: question: missing"),
+    "no --set path": (["study", "run", "quick", "--set", "grid.N_D"], "write --set path=value"),
+    "bad --set value": (["study", "run", "quick", "--set", "grid.N_D=[1000]"], "less 20 test runs leave 100"),
+    "no folder": (["study", "resume", "nowhere"], "nowhere: is not the folder of a run"),
+    "foreign folder": (["study", "report", BAD], "holds no study.toml"),
+    "broken mapping": (["data", "import", BAD / "mappings" / "unknown_unit.toml", "x.csv"], "valid here: rad/s"),
+    "no dataset": (["data", "check", "gone.parquet"], "gone.parquet: cannot be read"),
+    "no public log": (["data", "fetch", "gunnerus-2021"], "did you mean 'gunnerus-2022'?"),
+    "no cells": (["predict", BAD, "x.parquet", "--cell", "a"], "holds no finished cells"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line(
+    mistake: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shipid.cli import main
+
+    arguments, remedy = MISTAKES[mistake]
+    monkeypatch.setattr(sys, "argv", ["shipid", *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    out, err = capfd.readouterr()
+    assert (end.value.code, out) == (1, "")
+    assert re.fullmatch(r"error: [^\n]*\n", err)
+    assert remedy in err
+
+
+def test_mistakes_in_a_process_of_their_own(tmp_path: Path, tiny_run: Path) -> None:
+    """No traceback, no warning, exit 1: another study's folder, a damaged one, a file where a folder should be."""
+    damaged = tmp_path / "damaged"
+    damaged.mkdir()
+    (damaged / "study.toml").write_text("[[")
+    (damaged / "provenance.json").write_text((tiny_run / "provenance.json").read_text())
+    for arguments, remedy in (
+        (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
+        (["study", "resume", damaged], "damaged"),
+        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
+    ):
+        result = shell(*arguments)
+        assert result.returncode == 1
+        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
+        assert remedy in result.stderr
+
+
+def test_wrong_usage_is_not_a_traceback() -> None:
+    for arguments in (["study", "run"], ["nonsense"], ["study", "run", "quick", "--workers", "0"]):
+        result = CliRunner().invoke(app, arguments)
+        assert result.exit_code == 2
+        assert isinstance(result.exception, SystemExit)
+
+
+def test_interruption_says_how_to_go_on(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from shipid.study import run
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "run_study", interrupted)
+    result = CliRunner().invoke(app, ["study", "run", str(study), "--out", "mine"])
+    assert result.exit_code == 130
+    assert "Continue with: shipid study resume mine" in result.stderr
+
+
+# What an installed shipid takes along.
+
+
+def test_the_wheel_takes_models_and_studies_along() -> None:
+    """pyproject maps both folders to where `bundled_folder` looks first."""
+    build = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    assert build["targets"]["wheel"]["force-include"] == {
+        "models": "shipid/_bundled/models",
+        "studies": "shipid/_bundled/studies",
+    }
+
+
+def test_what_is_installed_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from shipid import document
+
+    (tmp_path / "site" / "shipid" / "_bundled" / "models").mkdir(parents=True)
+    (tmp_path / "site" / "models").mkdir()
+    monkeypatch.setattr(document, "__file__", str(tmp_path / "site" / "shipid" / "document.py"))
+    assert bundled_folder("models") == tmp_path / "site" / "shipid" / "_bundled" / "models"
+    assert bundled_folder("studies") == tmp_path / "site" / "studies"
+
+
+def test_public_names_load() -> None:
+    for name in shipid.__all__:
+        assert getattr(shipid, name) is not None
+    with pytest.raises(AttributeError, match="public names: "):
+        _ = shipid.nothing
+    assert np.isfinite(len(shipid.__all__))
