@@ -147,10 +147,10 @@ def run_torch(
     with torch.no_grad():
         first = program.parameters_stage(values)
         for group in groups:
-            saved = [entries[:, group] for entries in first]
+            saved = [entries[:, group].contiguous() for entries in first]  # a kernel knows one layout
             for left in range(0, padded, width):
                 block = slice(left, left + width)
-                commands, environment, tau = (series[..., block] for series in held)
+                commands, environment, tau = (series[..., block].contiguous() for series in held)
                 shape = (-1, saved[0].shape[1], width)
                 x, m = (part[..., block].expand(shape).contiguous() for part in (start, memory))
                 both = torch.cat([x, m])

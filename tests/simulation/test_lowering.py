@@ -267,11 +267,13 @@ def test_a_sum_counts_every_component(what: str, draw_inputs: Draw) -> None:
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # PyTorch's compiler uses what PyTorch deprecates
 @pytest.mark.skipif(not _has_compiler(), reason="no C++ compiler on this machine")
-def test_a_family_compiles_once(draw_inputs: Draw) -> None:
-    """Eight variants and two batch lengths of one block, one compilation; the same numbers as CasADi's."""
+def test_a_family_compiles_once(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight variants, batches of one block or of several, one compilation; the same numbers as CasADi's."""
     vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True})
     parameters = family(vessel, 8)
     before = len(kernels)
+    monkeypatch.setattr(batched, "COMPILED_BLOCK", 8)
+    monkeypatch.setattr(batched, "GRAIN", 8)
     options: dict[str, Any] = {"step": 1.0, "num_steps": 3, "parameters": parameters}
 
     def both(num_samples: int) -> tuple[Trajectories, Trajectories]:
@@ -280,7 +282,7 @@ def test_a_family_compiles_once(draw_inputs: Draw) -> None:
             vessel, **given, **options, engine="casadi"
         )
 
-    for num_samples in (7, 5):
+    for num_samples in (21, 7, 5):
         compiled, exact = both(num_samples)
         np.testing.assert_allclose(compiled.states, exact.states, rtol=1e-10, atol=1e-10)
     assert len(kernels) - before == 1
