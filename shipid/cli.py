@@ -91,22 +91,19 @@ def vessel_show(
 
     found = load_vessel(vessel)
     document = found.document
-    typer.echo(f"{found.name}\n{document.get('description', '')}\nfile {found.file}, digest {found.digest}")
+    typer.echo("\n".join(filter(None, [found.name, document.get("description"), f"digest {found.digest}"])))
     particulars = document.get("particulars", {})
     typer.echo(
         "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
     )
+    fallback = document.get("source", "")
     rows = [
-        (path, key, block.get("source") or document.get("source", "")) for path, key, block in term_blocks(document)
+        (path, key.split(".")[1] + (", off" if off else ""), block.get("source") or fallback)
+        for off in (False, True)
+        for path, key, block in term_blocks(document, off)
     ]
-    rows += [(path, f"{key}, off", block.get("source", "")) for path, key, block in term_blocks(document, off=True)]
     _print(_table(["term", "kind", "source"], rows))
-    values = found.parameters
-    _print(
-        _table(
-            ["parameter", "value", "unit"], ((path, f"{values[path]:.10g}", unit) for path, unit in found.units.items())
-        )
-    )
+    _print(_table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
 
 
 @data_app.command("fetch")
@@ -182,14 +179,15 @@ def study_variants(
 
     plan = read_plan(study, _parsed(changes))
     models, scores = plan.models, {}
-    if accuracy:
+    if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
         prepared = prepare(plan, obtain(plan))
         models = prepared.models
         scores = {model.name: prepared.accuracy(model.name)["mean"] for model in models if model.vessel}
     rows = []
     for model in models:
         factors = model.variant.factors if model.variant else {}
-        shown = ", ".join(f"{path.rsplit('.', 1)[-1]} x{factor:.2f}" for path, factor in factors.items())
+        changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in factors.items())
+        shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)
         score = scores.get(model.name)
         rows.append((model.name, "-" if score is None else f"{score:.2f}", str(len(factors)), shown))
     _print(_table(["model", "A [m]", "changed", "factors"], rows))
@@ -377,6 +375,19 @@ def _parsed(changes: list[str] | None) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             result[path] = text
     return result
+
+
+def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Dotted path, value, unit; the entries of one table column share a row, addressed `path.0`, `path.1`, ..."""
+    import re
+    from itertools import groupby
+
+    for stem, group in groupby(values, key=lambda path: re.sub(r"\.\d+$", "", path)):
+        paths = list(group)
+        if len(paths) == 1:
+            yield paths[0], f"{values[paths[0]]:.10g}", units[paths[0]]
+        else:
+            yield f"{stem}.0 ... .{len(paths) - 1}", " ".join(f"{values[p]:g}" for p in paths), units[paths[0]]
 
 
 def _table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:

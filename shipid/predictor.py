@@ -160,7 +160,8 @@ def physics_paths(
         device=device,
     )
     north, east = found["north"], found["east"]
-    x, y = to_frame(north[1:], east[1:], north[0], east[0], columns["psi"])
+    with np.errstate(invalid="ignore"):  # a diverged path is flagged, and no news to the caller
+        x, y = to_frame(north[1:], east[1:], north[0], east[0], columns["psi"])
     return np.stack([x, y], axis=-1), found.diverged
 
 

@@ -44,7 +44,11 @@ def fetch(name: str) -> Path:
             raise DataError(message, file=file, path="source.sha256")
         return file
     if source.url is None or source.sha256 is None:
-        raise DataError(f"nothing to download: set {FOLDER_VARIABLE}", file=name, path="source.url")
+        raise DataError(
+            f"nothing to download: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it",
+            file=name,
+            path="source.url",
+        )
     return _download(name, source.url, source.sha256)
 
 

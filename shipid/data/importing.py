@@ -206,6 +206,9 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
     kept = t[~removed]
     if len(kept) < 2:
         raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
+    if max_gap is not None and max_gap < np.median(np.diff(t)):
+        message = f"{max_gap:g} s is shorter than the log's own step of {np.median(np.diff(t)):g} s"
+        raise DataError(message, file=file, path="clock.max_gap")
     broken = np.diff(kept, prepend=kept[0]) > (np.inf if max_gap is None else max_gap)
     if broken.any():
         note = f"gaps longer than {max_gap:g} s"

@@ -92,11 +92,18 @@ def rollout(
     )
     names = (*model.state, *(f"actual.{name}" for name in model.memory))
     kept = tuple(names if keep is None else keep)
+    unknown = next((name for name in kept if name not in names), None)
+    if unknown is not None:
+        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
     rows = [names.index(name) for name in kept]
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, found {num_steps} and {every}")
     work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1)
     chosen = _by_size(work, num_samples * len(values)) if engine == "auto" else engine
+    if chosen == "compiled" and device == "cpu" and not _has_compiler():
+        raise ShipidError("engine 'compiled' needs a C++ compiler, and there is none: install g++, or use 'torch'")
+    if num_samples == 0:
+        raise ShipidError("a rollout needs at least one sample")
     with np.errstate(all="ignore"):
         if chosen == "casadi":
             records, worst = run_casadi(model, batch, step, num_steps, method, every, rows)

@@ -35,7 +35,7 @@ def by_model(results: Results) -> pd.DataFrame:
 
 
 def answer(results: Results) -> list[tuple[str, str]]:
-    """Three to six sentences built from the results, each with the anchor of the figure that carries it."""
+    """Three to seven sentences built from the results, each with the anchor of the figure that carries it."""
     table = by_model(results)
     sentences = [(text, "cells") for text in _caveats(results)]
     largest = int(table["N_D"].max()) if len(table) else 0
@@ -66,6 +66,8 @@ def answer(results: Results) -> list[tuple[str, str]]:
             f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
         )
         sentences.append((text, "horizon"))
+    if trend := _trend(table):
+        sentences.append((trend, "gain"))
     return [*sentences, (_floor(top, largest, naive_summary(results)["mean"]), "gain")]
 
 
@@ -102,6 +104,14 @@ def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
         verb = "harms" if len(names) == 1 else "harm"
         return f"At {smallest} runs {', '.join(names)} {verb}: no physics at all does as well or better; a{better}"
     return f"A{better}"
+
+
+def _trend(table: pd.DataFrame) -> str:
+    """Which models are no better at the largest amount of data than at the smallest; empty where all are."""
+    H = table.pivot(index="model", columns="N_D", values="H")
+    least, most = H.columns.min(), H.columns.max()
+    names = [_words(str(name)) for name in H.index[H[most] >= H[least]]] if least != most else []
+    return f"{', '.join(names)}: no better at {most} runs than at {least}." if names else ""
 
 
 def _floor(top: pd.DataFrame, largest: int, floor: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -136,6 +136,7 @@ class Plan:
     """A study ready to run: checked document, models before any redraw, recipe and batches.
 
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
+    vessels : every vessel that the document names, by that name.
     """
 
     name: str
@@ -146,6 +147,7 @@ class Plan:
     recipe: Recipe
     batches: tuple[Batch, ...]
     truth: Vessel | None = None
+    vessels: Mapping[str, Vessel] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -185,10 +187,11 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     return build_plan(document, file)
 
 
-def build_plan(document: Document, file: Path) -> Plan:
-    """Check a study document and expand it into models and batches."""
+def build_plan(document: Document, file: Path, vessels: Mapping[str, Vessel] | None = None) -> Plan:
+    """Check a study document and expand it into models and batches; `vessels` known already need no file."""
     study: Study = documents.parse(Study, document, file)
-    models = _models(study, file)
+    known = dict(vessels or {})
+    models = _models(study, file, known)
     _check_claims(study, models, file)
     recipe = _recipe(study, file)
     batches = tuple(
@@ -199,8 +202,8 @@ def build_plan(document: Document, file: Path) -> Plan:
     truth = None
     if study.truth is not None:
         _check_amounts(study, study.truth, file)
-        truth = _truth_vessel(study.truth, file)
-    return Plan(file.stem, str(file), document, study, models, recipe, batches, truth)
+        truth = _truth_vessel(study.truth, file, known)
+    return Plan(file.stem, str(file), document, study, models, recipe, batches, truth, known)
 
 
 def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
@@ -220,9 +223,9 @@ def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
         raise DocumentError(message, file=file, path="truth.duration")
 
 
-def _truth_vessel(truth: Truth, file: Path) -> Vessel:
+def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
     """The vessel that makes the truth, with the blocks that the study adds: what is wrong there is told there."""
-    vessel = _vessel(truth.vessel, file, "truth.vessel")
+    vessel = _vessel(truth.vessel, file, "truth.vessel", known)
     try:
         return vessel.with_values(truth.set) if truth.set else vessel
     except DocumentError as error:
@@ -232,16 +235,18 @@ def _truth_vessel(truth: Truth, file: Path) -> Vessel:
         raise DocumentError(message, file=file, path="truth.set") from None
 
 
-def _vessel(name: str, file: Path, path: str) -> Vessel:
-    """A vessel that the study names at a path."""
-    try:
-        found = documents.find(name, "models", file.parent)
-    except DocumentError as error:
-        raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-    return load_vessel(str(found))
+def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vessel:
+    """A vessel that the study names at a path: one that is known, or read now and known from now on."""
+    if name not in known:
+        try:
+            found = documents.find(name, "models", file.parent)
+        except DocumentError as error:
+            raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+        known[name] = load_vessel(str(found))
+    return known[name]
 
 
-def _models(study: Study, file: Path) -> tuple[Model, ...]:
+def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, ...]:
     found: list[Model] = []
     for index, family in enumerate(resolve(study.family, file)):
         assert family.base is not None  # written out by resolve
@@ -249,7 +254,7 @@ def _models(study: Study, file: Path) -> tuple[Model, ...]:
             raise DocumentError(
                 "this name is taken by the model without physics", file=file, path=f"family.{index}.name"
             )
-        vessel = _vessel(family.base, file, f"family.{index}.base")
+        vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
         found += [Model(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
     names = [model.name for model in found]

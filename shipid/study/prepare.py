@@ -93,7 +93,7 @@ def _beside(folder: Path, name: str) -> Path:
     return folder / name if (folder / name).exists() else Path(name)
 
 
-def prepare(plan: Plan, dataset: Dataset) -> Prepared:
+def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     """Cut windows, set the test runs aside, and roll every model out on all of them.
 
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
@@ -132,7 +132,7 @@ def prepare(plan: Plan, dataset: Dataset) -> Prepared:
             missing = assumed(model.vessel, test.columns)
             if missing:
                 notes.append(f"{model.vessel.name}: {', '.join(missing)} not measured, assumed 0")
-    models, paths = _roll_out(plan, dataset, both, notes)
+    models, paths = _roll_out(plan, dataset, both, notes, device)
     return Prepared(
         pool=rest,
         test=test,
@@ -171,7 +171,7 @@ Pair = tuple[Array, Array]
 
 
 def _roll_out(
-    plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str]
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str], device: str
 ) -> tuple[tuple[Model, ...], dict[str, Pair]]:
     """Paths of every model on (pool, test), members that diverge on the pool redrawn."""
     families = {family.name: family for family in resolve(plan.study.family, plan.file)}
@@ -179,7 +179,7 @@ def _roll_out(
     waiting = [model for model in plan.models if model.vessel is not None]
     while waiting:
         again = []
-        for model, paths, share in _one_round(plan, dataset, parts, waiting):
+        for model, paths, share in _one_round(plan, dataset, parts, waiting, device):
             if share:
                 drawn = _redraw(plan, model, families[model.family], share)
                 counter = drawn.variant.counter if drawn.variant else 0
@@ -198,7 +198,7 @@ def _roll_out(
 
 
 def _one_round(
-    plan: Plan, dataset: Dataset, parts: Sequence[Windows], models: Sequence[Model]
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], models: Sequence[Model], device: str
 ) -> Iterator[tuple[Model, Pair, float]]:
     """Paths of each model on (pool, test), the share of pool windows on which it diverged; one rollout a structure."""
     prediction = plan.study.prediction
@@ -219,6 +219,7 @@ def _one_round(
                 prediction.method,
                 parameters=parameters,
                 memory=window_memory(vessel, dataset, windows),
+                device=device,
             )
             for windows in parts
         )

@@ -267,6 +267,13 @@ def reproducing_command(results: Results) -> str:
     return f"shipid study run {results.plan.name if unchanged else f'{results.folder.name}/{store.STUDY}'}"
 
 
+def _source_words(source: Any) -> str:
+    """Where the runs come from, in one line."""
+    if isinstance(source, Mapping):
+        return "; ".join(f"{key} {value}" for key, value in source.items())
+    return str(source)
+
+
 def provenance_words(results: Results) -> dict[str, str]:
     """What the results stand on, as label -> text."""
     record, study = results.provenance, results.plan.study
@@ -274,7 +281,7 @@ def provenance_words(results: Results) -> dict[str, str]:
     words = {
         "study": f"{results.plan.name}, digest {record['digest']}",
         "vessels": "; ".join(sorted({f"{m.vessel.key} {m.vessel.digest}" for m in results.plan.models if m.vessel})),
-        "data": str(results.dataset.metadata.get("source", "")),
+        "data": _source_words(results.dataset.metadata.get("source", "")),
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
         "seeds": ", ".join(map(str, study.grid.seeds)),
         "recipe": f"{study.recipe.get('kind', 'fast')}: {results.plan.recipe.trials} trials",

@@ -64,11 +64,13 @@ def run_study(
     begun = time.perf_counter()
     store.open_folder(folder, plan)
     if not (folder / store.DATASET).exists():
-        yield Event("note", "simulating the truth" if plan.study.truth else "importing the log")
+        made = plan.study.data is not None and plan.study.data.dataset is not None
+        doing = "reading the dataset" if made else "importing the log"
+        yield Event("note", "simulating the truth" if plan.study.truth else doing)
         write_dataset(obtain(plan), folder / store.DATASET)
     dataset = read_dataset(folder / store.DATASET)
     yield Event("note", "rolling out the models")
-    prepared = prepare(plan, dataset)
+    prepared = prepare(plan, dataset, device)
     store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
     store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(prepared, m)} for m in prepared.models])
     for note in prepared.notes:

@@ -17,8 +17,10 @@ from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
 from shipid.predictor import read_arrays
 from shipid.study.plan import Batch, Model, Plan, build_plan
+from shipid.vessel.load import check_vessel
 
-STUDY, PROVENANCE, DATASET, TEST, MODELS = "study.toml", "provenance.json", "dataset.parquet", "test.npz", "models.json"
+STUDY, VESSELS, PROVENANCE, MODELS = "study.toml", "vessels.json", "provenance.json", "models.json"
+DATASET, TEST = "dataset.parquet", "test.npz"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
 
@@ -65,18 +67,20 @@ def open_folder(folder: Path, plan: Plan) -> None:
         return
     if folder.exists() and not folder.is_dir():
         raise ResultError("is a file: choose another --out", file=folder)
-    if folder.exists() and any(entry.name != PROVENANCE for entry in folder.iterdir()):
+    if folder.exists() and any(entry.name not in (PROVENANCE, VESSELS) for entry in folder.iterdir()):
         raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     write_json(folder / PROVENANCE, {"digest": plan.digest, "name": plan.name, "file": str(Path(plan.file).absolute())})
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
     write_text(folder / STUDY, plan.text())
 
 
 def stored_plan(folder: Path) -> Plan:
-    """The plan of a run from its folder; vessel files named by path are looked for beside the original study."""
+    """The plan of a run from its folder alone: the study and the vessels as they were when the run began."""
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     provenance = _provenance(folder)
@@ -84,9 +88,11 @@ def stored_plan(folder: Path) -> Plan:
         document = documents.read(folder / STUDY)
     except DocumentError as error:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
-    plan = build_plan(document, Path(provenance["file"]))
+    stored = read_json(folder / VESSELS)
+    vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
+    plan = build_plan(document, Path(provenance["file"]), vessels)
     if plan.digest != provenance["digest"]:
-        raise ResultError("a vessel of this study has changed since the run: run the study again", file=folder)
+        raise ResultError("its study or a vessel was changed by hand: run the study again", file=folder)
     return plan
 
 

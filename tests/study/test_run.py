@@ -257,16 +257,18 @@ def test_damaged_folders_are_one_line(tmp_path: Path, tiny_run: Path, kind: str)
     assert str(folder) in line
 
 
-def test_a_changed_vessel_is_told(tmp_path: Path) -> None:
+def test_a_run_needs_no_vessel_file_any_more(tmp_path: Path) -> None:
+    """A folder of results opens anywhere, with the vessels as they were when the run began."""
     own = tmp_path / "own.toml"
     own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
     plan = tiny_plan(tmp_path, {"truth.vessel": "./own.toml"})
     next(run_study(plan, tmp_path / "run"))
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
-    own.write_text(own.read_text() + "\n# a word more changes nothing\n")
+    own.unlink()
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
-    own.write_text(own.read_text().replace('name = "', 'name = "New '))
-    with pytest.raises(ResultError, match="has changed since the run"):
+    stored = tmp_path / "run" / store.VESSELS
+    stored.write_text(stored.read_text().replace("410931.81", "410931.82"))
+    with pytest.raises(ResultError, match="changed by hand"):
         store.stored_plan(tmp_path / "run")
 
 
