@@ -49,10 +49,10 @@ def fetch(name: str) -> Path:
             file=name,
             path="source.url",
         )
-    return _download(name, source.url, source.sha256)
+    return _download(name, source.url, source.sha256, source.file)
 
 
-def _download(name: str, url: str, sha256: str) -> Path:
+def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
     cache = Path(pooch.os_cache("shipid"))
     pooch.get_logger().setLevel("WARNING")
     try:
@@ -61,5 +61,5 @@ def _download(name: str, url: str, sha256: str) -> Path:
         message = f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}"
         raise DataError(message, file=url, path="source.sha256") from None
     except OSError as error:  # requests' errors are OSErrors too
-        message = f"cannot be downloaded ({type(error).__name__}): go online, or put the log into a folder "
-        raise DataError(f"{message}and set {FOLDER_VARIABLE} to it", file=url) from None
+        message = f"cannot be downloaded ({type(error).__name__}): go online, or set {FOLDER_VARIABLE} to a folder "
+        raise DataError(f"{message}that holds {file or 'the log'}", file=url) from None

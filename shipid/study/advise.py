@@ -111,7 +111,8 @@ def _trend(table: pd.DataFrame) -> str:
     H = table.pivot(index="model", columns="N_D", values="H")
     least, most = H.columns.min(), H.columns.max()
     names = [_words(str(name)) for name in H.index[H[most] >= H[least]]] if least != most else []
-    return f"{', '.join(names)}: no better at {most} runs than at {least}." if names else ""
+    verb = "is" if len(names) == 1 else "are"
+    return f"With {most} runs {', '.join(names)} {verb} no better than with {least}." if names else ""
 
 
 def _floor(top: pd.DataFrame, largest: int, floor: float) -> str:

@@ -137,6 +137,12 @@ def test_a_tie_is_no_help(made: Any) -> None:
     assert "every physics model does better" not in said
 
 
+def test_data_that_did_not_help_is_told(made: Any) -> None:
+    said = text(made(grid({"good": (1.5, 1.6), "bad": (3.0, 2.0), "none": (4.0, 5.0)})))
+    assert "With 30 runs good, pure data-driven are no better than with 10." in said
+    assert "no better than with" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)})))
+
+
 def test_constant_motion_that_is_not_beaten(made: Any) -> None:
     said = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
     assert "gives 2.50 m: at 30 runs pure data-driven does not beat it." in said

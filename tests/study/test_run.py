@@ -226,7 +226,7 @@ DAMAGES = {
     "no study": (lambda folder: (folder / "study.toml").unlink(), "holds no study.toml"),
     "study is no TOML": (_damage(lambda _: b"[[", "study.toml"), "damaged"),
     "study is no text": (_damage(lambda _: b"\xff\xfe", "study.toml"), "damaged"),
-    "study was edited": (_damage(lambda text: text.replace(b"seed = 3", b"seed = 4"), "study.toml"), "has changed"),
+    "study was edited": (_damage(lambda text: text.replace(b"seed = 3", b"seed = 4"), "study.toml"), "changed by hand"),
     "no provenance": (lambda folder: (folder / "provenance.json").unlink(), "is this the folder of a run"),
     "half a provenance": (_damage(_half, "provenance.json"), "damaged"),
     "foreign provenance": (_damage(lambda _: b"[1, 2]", "provenance.json"), "damaged"),
