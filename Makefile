@@ -1,4 +1,4 @@
-# Set-up is a stamp: it runs again when pyproject.toml changes. torch comes first, as the CPU build that installs fast.
+# Set-up is a stamp: it runs again when pyproject.toml changes. torch comes first and pinned: a build that installs fast.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin

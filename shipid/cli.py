@@ -91,7 +91,9 @@ def vessel_show(
 
     found = load_vessel(vessel)
     document = found.document
-    typer.echo("\n".join(filter(None, [found.name, document.get("description"), f"digest {found.digest}"])))
+    typer.echo(
+        "\n".join(filter(None, [found.name, document.get("description"), f"file {found.file}, digest {found.digest}"]))
+    )
     particulars = document.get("particulars", {})
     typer.echo(
         "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
@@ -129,13 +131,15 @@ def data_import(
     from shipid.data.importing import import_log
     from shipid.data.mapping import read_mapping
 
+    if out is not None and out.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
     declared = read_mapping(mapping)
     dataset = import_log(declared, log or fetch(mapping), without=without or ())
     file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
     repairs = dataset.metadata.get("repairs", [])
     if repairs:
         rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
-        _print(_table(["repair", "column", "rows", "why"], rows))
+        _print(_table(["repair", "column", "count", "what was done"], rows))
     typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
 
 
@@ -146,13 +150,16 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
     from shipid.data.dataset import read_dataset
 
     checks = check_dataset(read_dataset(dataset))
-    columns = ["run", "check", "ok", "sentence"]
-    _print(
-        _table(
-            columns, ((str(r.run), str(r.check), "yes" if r.ok else "NO", str(r.sentence)) for r in checks.itertuples())
-        )
+    ok = checks["ok"].astype(bool)
+    counts = (
+        (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
+        for name, group in checks.groupby("check", sort=False)
     )
-    failed = int((~checks["ok"].astype(bool)).sum())
+    _print(_table(["check", "runs", "failed"], counts))
+    failed = int((~ok).sum())
+    if failed:
+        rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
+        _print(_table(["run", "failed", "what to look at"], rows))
     typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
     if failed:
         raise typer.Exit(1)

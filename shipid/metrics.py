@@ -60,16 +60,3 @@ def over_time(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     mean: Array = error.mean(axis=0)
     return mean
-
-
-def roughness(path: Array) -> float:
-    """Return the mean |p_i+1 - 2 p_i + p_i-1| [m] over the horizon of paths (T, S, 2) [m], T >= 3."""
-    if len(path) < 3:
-        raise ValueError(f"a second difference needs 3 steps, got {len(path)}")
-    second = np.diff(path, n=2, axis=0)
-    return float(np.hypot(second[..., 0], second[..., 1]).mean())
-
-
-def skill(error: Array, reference: Array) -> float:
-    """Return how much of a reference's error is gone, 1 - mean(error) / mean(reference); negative where worse."""
-    return float(1.0 - error.mean() / reference.mean())

@@ -144,6 +144,7 @@ def physics_paths(
     """
     model = dynamics(vessel)
     zero = np.zeros(len(columns["u"]))
+    columns = {"down": columns.get("z", zero), **columns}
     start = {name: columns.get(name, zero) for name in model.state}
     environment = {name: columns.get(name, zero) for name in model.environment}
     found = rollout(
@@ -166,8 +167,9 @@ def physics_paths(
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
-    """Channels that a vessel feels and the columns do not hold: they are taken as zero and must be said."""
-    return [name for name in dynamics(vessel).environment if name not in columns]
+    """States and weather that a vessel has and the columns do not hold: they are taken as zero and must be said."""
+    model = dynamics(vessel)
+    return [name for name in (*model.state, *model.environment) if name not in columns]
 
 
 def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> None:

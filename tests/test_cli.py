@@ -104,7 +104,11 @@ def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "41 rows in 1 runs -> plain.parquet" in text
     assert read_dataset("plain.parquet").runs == ["good"]
     said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
-    assert "good" in said("data", "check", "deep/other.parquet")
+    assert "10 of 10 checks passed" in said("data", "check", "deep/other.parquet")
+    refused = CliRunner().invoke(
+        app, ["data", "import", str(BAD / "logs" / "plain.toml"), str(BAD / "logs" / "good.csv"), "--out", "a.csv"]
+    )
+    assert "end in .parquet" in str(refused.exception)
 
 
 def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
@@ -113,8 +117,7 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
     file = write_dataset(type(dataset)(wrong, dataset.metadata), tmp_path / "wrong.parquet")
     result = CliRunner().invoke(app, ["data", "check", str(file)])
     assert result.exit_code == 1
-    assert "NO" in result.output
-    assert "d(psi)/dt" in result.output or "psi" in result.output
+    assert re.search(r"M001 +heading", result.output), "failures are listed by run"
 
 
 def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,7 +164,7 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
 
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Does the whole chain hold together?" in page
-    assert f"shipid study run {folder.name}/study.toml" in page
+    assert re.search(r"shipid study run \S+tiny\.toml", page)
     assert "Does the whole chain hold together?" in (folder / "summary.md").read_text()
 
     (folder / "report.html").unlink()

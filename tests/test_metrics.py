@@ -56,25 +56,8 @@ def test_horizon_and_time_are_the_two_margins(paths):
     assert horizon["p90"][4] == pytest.approx(np.sort(error[4])[35] * 0.9 + np.sort(error[4])[36] * 0.1)
 
 
-def test_roughness_is_zero_for_straight_lines_and_known_for_a_parabola():
-    i = np.arange(30.0)[:, None]
-    line = np.stack([2.0 * i + 1.0, -3.0 * i], axis=-1)
-    parabola = np.stack([1.5 * i**2, 2.0 * i**2], axis=-1)  # second difference (3, 4)
-    assert metrics.roughness(line) == pytest.approx(0.0, abs=1e-12)
-    assert metrics.roughness(parabola) == pytest.approx(5.0)
-
-
-def test_skill_of_the_perfect_the_same_and_the_worse():
-    reference = np.full((3, 4), 2.0)
-    assert metrics.skill(np.zeros((3, 4)), reference) == 1.0
-    assert metrics.skill(reference, reference) == 0.0
-    assert metrics.skill(3.0 * reference, reference) == -2.0
-
-
 def test_shapes_that_cannot_be_meant_are_refused(paths):
     with pytest.raises(ValueError, match="T, S, 2"):
         metrics.position_error(paths[0][..., 0], paths[1][..., 0])
-    with pytest.raises(ValueError, match="3 steps"):
-        metrics.roughness(paths[0][:2])
     with pytest.raises(ValueError, match="no window"):
         metrics.summary(np.empty((30, 0)))

@@ -254,6 +254,7 @@ def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path
 def test_what_is_assumed_is_named() -> None:
     ship = load_vessel("gunnerus-28.9")
     commands = {f"{side}.{signal}": np.zeros(1) for side in ("port", "starboard") for signal in ("n", "alpha")}
-    assert assumed(ship, commands) == ["V_w", "beta_w"]
-    assert assumed(ship, commands | {"V_w": np.zeros(1), "beta_w": np.zeros(1)}) == []
+    measured = commands | dict.fromkeys(("north", "east", "psi", "u", "v"), np.zeros(1))
+    assert assumed(ship, measured) == ["r", "V_w", "beta_w"]
+    assert assumed(ship, measured | dict.fromkeys(("r", "V_w", "beta_w"), np.zeros(1))) == []
     check_columns(ship, commands, "log.csv")

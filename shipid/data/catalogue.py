@@ -53,10 +53,11 @@ def fetch(name: str) -> Path:
 
 
 def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
+    stem = Path(name).stem  # of one's own mapping the name is a path: the cache folder must hold the file anyway
     cache = Path(pooch.os_cache("shipid"))
     pooch.get_logger().setLevel("WARNING")
     try:
-        return Path(pooch.retrieve(url, f"sha256:{sha256}", fname=f"{name}-{url.rpartition('/')[2]}", path=cache))
+        return Path(pooch.retrieve(url, f"sha256:{sha256}", fname=f"{stem}-{url.rpartition('/')[2]}", path=cache))
     except ValueError:  # pooch's word for a wrong checksum; it has already removed the download
         message = f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}"
         raise DataError(message, file=url, path="source.sha256") from None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Array, Dataset, pieces, unit_of
+from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, unit_of
 
 RANGES = {"u": 25.0, "v": 10.0, "r": 0.6, "phi": 1.0, "theta": 0.5, "V_w": 60.0, "n": 40.0, "alpha": 12.6, "delta": 1.6}
 """Largest plausible magnitude in SI units, by column or by signal of a command: past it a unit is wrong."""
@@ -94,10 +94,11 @@ def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         part = np.floor((t - t[0]) / STRETCH + 1e-9).astype(int)
         start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
         drift = [
-            rows[name].to_numpy() - _integral(t, rate) for name, rate in zip(("north", "east"), rates, strict=True)
+            rows[name].to_numpy() - cumulative_integral(t, rate)
+            for name, rate in zip(("north", "east"), rates, strict=True)
         ]
         squares.append(sum((error - error[start]) ** 2 for error in drift))
-        lengths.append(_integral(t, np.hypot(u, v))[-1])
+        lengths.append(cumulative_integral(t, np.hypot(u, v))[-1])
     error = float(np.sqrt(np.mean(np.concatenate(squares))))
     duration = sum(float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for rows in stretches)
     distance = sum(lengths) / duration * min(STRETCH, duration) if duration > 0 else 0.0
@@ -113,10 +114,6 @@ def _repetition(stretches: list[pd.DataFrame], others: pd.Series[Any]) -> Iterat
     t = np.concatenate([rows["t"].to_numpy() for rows in stretches])
     double = float(np.isin(t, others.to_numpy()).mean())
     yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.2g} % of the rows belong to another run, too")
-
-
-def _integral(t: Array, rate: Array) -> Array:
-    return np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
 
 
 def _rms(values: Array) -> float:

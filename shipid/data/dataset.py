@@ -98,6 +98,20 @@ def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
             yield str(name), rows.iloc[first:last]
 
 
+def clock_slack(t: Array) -> float:
+    """Difference [s] under which two instants on a clock t (N,) [s] are the same: a thousandth of its least step.
+
+    A part of the step, not of t: 1e-9 of Unix time is longer than most steps. Never less than four roundings of t.
+    """
+    rounding = 4.0 * float(np.spacing(np.abs(t).max()))
+    return max(rounding, 1e-3 * float(np.diff(t).min())) if len(t) > 1 else rounding
+
+
+def cumulative_integral(t: Array, rate: Array) -> Array:
+    """Integral of a rate (N,) from t[0] to each t (N,) [s] by the trapezoid rule, (N,)."""
+    return np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
+
+
 def sample(rows: pd.DataFrame, instants: Array) -> dict[str, NDArray[Any]]:
     """Every column of one unbroken stretch at given instants [s] (any shape): name -> array of that shape.
 
@@ -105,8 +119,8 @@ def sample(rows: pd.DataFrame, instants: Array) -> dict[str, NDArray[Any]]:
     row at or before the instant, because an order holds until the next one.
     """
     t = rows["t"].to_numpy()
-    slack = 1e-9 * max(1.0, float(np.abs(t).max()))  # t0 + 3 * 0.1 must find the row written as 0.3
-    last = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(t) - 1)
+    # t0 + 3 * 0.1 must find the row written as 0.3, but no row of the future
+    last = np.clip(np.searchsorted(t, instants + clock_slack(t), side="right") - 1, 0, len(t) - 1)
     result: dict[str, NDArray[Any]] = {}
     for name in map(str, rows.columns):
         if name in ("run", "t"):

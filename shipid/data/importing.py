@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import BREAK, Dataset, is_command, pieces, sample, units_of
+from shipid.data.dataset import BREAK, Dataset, clock_slack, is_command, pieces, sample, units_of
 from shipid.data.mapping import Column, Format, Mapping, Segment, read_mapping, to_si
 from shipid.data.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.errors import DataError, choices
@@ -225,12 +225,12 @@ def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
 def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
     """Put the runs one after another; rows that belong to two runs stand twice."""
     t = rows["t"].to_numpy()
-    slack = 1e-9 * max(1.0, float(np.abs(t).max())) + float(np.median(np.diff(t)))
+    slack, step = clock_slack(t), float(np.median(np.diff(t)))
     runs = []
     for index, segment in enumerate(segments):
         start, end = segment.start * unit, segment.end * unit
-        inside = (t >= start - 1e-9 * slack) & (t <= end + 1e-9 * slack)
-        if start < t[0] - slack or end > t[-1] + slack or inside.sum() < 2:
+        inside = (t >= start - slack) & (t <= end + slack)
+        if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
             message = f"run {segment.run!r}, {start:g} to {end:g} s, is not in the log, {t[0]:g} to {t[-1]:g} s"
             raise DataError(message, file=file, path=f"segment.{index}")
         run = rows.loc[inside].reset_index(drop=True)
@@ -245,7 +245,7 @@ def _resampled(dataset: Dataset, step: float) -> Dataset:
     def resample() -> Iterator[pd.DataFrame]:
         for run, rows in pieces(dataset):
             t = rows["t"].to_numpy()
-            instants = t[0] + step * np.arange(int(np.floor((t[-1] - t[0]) / step + 1e-9)) + 1)
+            instants = t[0] + step * np.arange(int(np.floor((t[-1] - t[0] + clock_slack(t)) / step)) + 1)
             frame = pd.DataFrame({"t": instants, **sample(rows, instants)})
             frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
             # a break that stays flagged while its row is held over several instants would break each of them

@@ -11,7 +11,7 @@ from pydantic import Field, SerializeAsAny, field_validator
 
 from shipid import document
 from shipid.data.dataset import OPTIONAL, REQUIRED, SIGNALS, unit_of
-from shipid.data.repairs import REPAIRS, Break, Despike, HeadingOffset, Repair, Strict, WrapInterpolation
+from shipid.data.repairs import REPAIRS, Break, ColumnRepair, Despike, HeadingOffset, Repair, Strict, WrapInterpolation
 from shipid.errors import DocumentError, choices
 
 UNITS: dict[str, dict[str, float]] = {
@@ -46,13 +46,22 @@ class Format(Strict):
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
     missing: tuple[str, ...] = ("", "nan", "NaN")
 
+    @field_validator("separator")
+    @classmethod
+    def _single(cls, separator: str) -> str:
+        # pandas would take a longer one for a regular expression
+        if separator != "whitespace" and (len(separator) > 1 or not separator.isascii() or separator in '"\r\n\0'):
+            raise ValueError("must be one ASCII character but a quote or a line's end, or the word 'whitespace'")
+        return separator
+
     @field_validator("encoding")
     @classmethod
     def _known(cls, encoding: str) -> str:
         try:
+            "a".encode(encoding)  # base64 and the like are codecs, too, but not of text
             return codecs.lookup(encoding).name
-        except LookupError:
-            raise ValueError("no such encoding; for example utf-8, cp1252, latin-1, utf-16") from None
+        except (LookupError, UnicodeError):
+            raise ValueError("no such encoding of text; for example utf-8, cp1252, latin-1, utf-16") from None
 
 
 class Clock(Strict):
@@ -120,7 +129,7 @@ def read_mapping(name: str | Path) -> Mapping:
     _check_segments(mapping, file)
     clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
     for index, repair in enumerate(mapping.repair):
-        for column in repair.columns:
+        for column in repair.columns if isinstance(repair, ColumnRepair) else ():
             if column not in mapping.columns:
                 raise DocumentError(
                     f"no column {column!r} to repair: {choices(column, mapping.columns)}",

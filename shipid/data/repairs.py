@@ -18,7 +18,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from shipid.data.dataset import BREAK
 
 Mask = NDArray[np.bool_]
-Columns = Annotated[tuple[str, ...], Field(min_length=1)]
 Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 
 
@@ -34,30 +33,32 @@ class Repair(Strict):
     kind: str
     reason: str = Field(min_length=1)
     enabled: bool = True
-    columns: tuple[str, ...] = ()
 
 
-class WrapInterpolation(Repair):
+class ColumnRepair(Repair):
+    """A repair of columns that it names; the others act on columns that their formula names."""
+
+    columns: Annotated[tuple[str, ...], Field(min_length=1)]
+
+
+class WrapInterpolation(ColumnRepair):
     """A channel in 0..360 deg was interpolated linearly across 360/0; steps above `threshold` [`unit`] betray it."""
 
-    columns: Columns
     threshold: float = Field(gt=0)
     unit: str = "rad"
 
 
-class Despike(Repair):
+class Despike(ColumnRepair):
     """Values further than `threshold` [`unit`] from the median of a centred `window` [s] are replaced."""
 
-    columns: Columns
     window: float = Field(gt=0)
     threshold: float = Field(gt=0)
     unit: str | None = None
 
 
-class Scale(Repair):
+class Scale(ColumnRepair):
     """Columns carry a known wrong factor: multiply them by `factor`."""
 
-    columns: Columns
     factor: float
 
 
@@ -203,5 +204,6 @@ def apply_repairs(
             bit = 1 << FLAGS.index(repair.kind)
             flags = outcome.rows["flags"].to_numpy() | np.where(outcome.touched, bit, 0)
             rows, count, note = outcome.rows.assign(flags=flags), outcome.count, outcome.note
-        records.append({"kind": repair.kind, "column": ", ".join(repair.columns), "count": count, "note": note})
+        column = ", ".join(repair.columns) if isinstance(repair, ColumnRepair) else ""
+        records.append({"kind": repair.kind, "column": column, "count": count, "note": note})
     return rows, records

@@ -10,10 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Array, Dataset, pieces, sample
+from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample
 from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
+NESTED, HELD_OUT, FOLDS = 1, 2, 3
+"""Purposes of a draw of runs: one seed gives each an order of its own."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def cut_windows(
     parts = []
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()
-        last = np.floor((t[-1] - t[0] - horizon * step) / interval + 1e-9)
+        last = np.floor((t[-1] - t[0] - horizon * step + clock_slack(t)) / interval)
         if last >= 0:
             instants = t[0] + interval * np.arange(int(last) + 1)
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
@@ -151,8 +153,9 @@ def _integral(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
     row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
 
     def travelled(rate: Array) -> Array:
-        whole = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
-        return np.asarray(whole[row] + (instants - t[row]) * (rate[row] + np.interp(instants, t, rate)) / 2)
+        return np.asarray(
+            cumulative_integral(t, rate)[row] + (instants - t[row]) * (rate[row] + np.interp(instants, t, rate)) / 2
+        )
 
     return travelled(u * np.cos(psi) - v * np.sin(psi)), travelled(u * np.sin(psi) + v * np.cos(psi))
 
@@ -177,6 +180,17 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
     )
 
 
+def covered(windows: Windows) -> float:
+    """Recorded time [s] that windows see, futures included: the length of the union of all [t, t + T step].
+
+    Runs with clocks of their own are added up; on a shared clock a moment that two runs hold counts once.
+    """
+    length = windows.horizon * windows.step
+    runs = [windows.t] if windows.shared_clock else [windows.t[windows.run == run] for run in windows.spans]
+    # intervals of one length: each adds what lies after the start of the one before, at most all of itself
+    return sum((length + float(np.minimum(np.diff(np.sort(t)), length).sum()) for t in runs if len(t)), 0.0)
+
+
 def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, Mask]:
     """Split windows into (training, validation), (S,) each, so that no moment is seen by both, futures included.
 
@@ -197,15 +211,18 @@ def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, 
     return training, validation
 
 
-def _drawn(runs: Iterable[str], seed: int) -> list[str]:
-    """Draw the runs in random order, the same for any order in which they are given."""
+def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:
+    """Draw the runs in random order, the same for any order in which they are given, another for each purpose.
+
+    Else the first runs held out of the largest amount would be just the runs of a smaller one.
+    """
     names = sorted(set(runs))
-    return [names[index] for index in np.random.default_rng(seed).permutation(len(names))]
+    return [names[index] for index in np.random.default_rng([seed, purpose]).permutation(len(names))]
 
 
 def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[str, ...]]:
     """Deal the runs into folds of (nearly) equal number: the validation runs of every fold."""
-    drawn = _drawn(runs, seed)
+    drawn = _drawn(runs, seed, FOLDS)
     if not 2 <= num_folds <= len(drawn):
         raise DataError(f"{len(drawn)} runs cannot be dealt into {num_folds} folds: choose 2 to {len(drawn)}")
     return [tuple(drawn[fold::num_folds]) for fold in range(num_folds)]
@@ -213,7 +230,7 @@ def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[st
 
 def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Split the runs into (rest, held out), `share` of them held out, at least one on each side."""
-    drawn = _drawn(runs, seed)
+    drawn = _drawn(runs, seed, HELD_OUT)
     if len(drawn) < 2 or not 0 < share < 1:
         raise DataError(f"a share of {share:g} of {len(drawn)} runs cannot be held out: two runs, 0 < share < 1")
     count = min(max(round(share * len(drawn)), 1), len(drawn) - 1)
@@ -222,7 +239,7 @@ def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str,
 
 def nested_runs(runs: Iterable[str], amounts: Iterable[int], seed: int) -> dict[int, tuple[str, ...]]:
     """Nested draws D_a c D_b c ... for amounts a < b < ...: the first ones of one random order."""
-    drawn, wanted = _drawn(runs, seed), sorted(set(amounts))
+    drawn, wanted = _drawn(runs, seed, NESTED), sorted(set(amounts))
     if wanted and not 1 <= wanted[0] <= wanted[-1] <= len(drawn):
         raise DataError(f"amounts {wanted} cannot be drawn from {len(drawn)} runs: choose 1 to {len(drawn)}")
     return {amount: tuple(drawn[:amount]) for amount in wanted}

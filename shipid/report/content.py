@@ -95,7 +95,7 @@ class ReportContent:
     Parameters
     ----------
     title, name : the study's question in words and its short name.
-    answer : three to five sentences, in order.
+    answer : a few sentences, in order.
     cells : one row per cell: model, kind, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
     naive : mean, p90, rms [m] of the floor of constant u, v, r.

@@ -15,11 +15,11 @@ from shipid.report.wording import metres
 def summary(content: ReportContent) -> str:
     """Answer, findings, naive floor, models, cells and provenance as Markdown."""
     naive = content.naive
+    findings = [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
     parts = [
         f"# {_plain(content.title)}",
         "\n".join(f"- {_plain(sentence.text)}" for sentence in content.answer),
-        "## Findings",
-        _grid(["", "claim", "verdict", "evidence"], [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]),
+        *(["## Findings", _grid(["", "claim", "verdict", "evidence"], findings)] if findings else []),
         "## Naive floor",
         f"Constant surge, sway and yaw rate: mean {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
         f"root mean square {metres(naive['rms'])}.",

@@ -107,7 +107,7 @@ def repairs(content: ReportContent) -> Table | None:
     if frame.empty:
         return None
     kinds = [str(kind) for kind in pd.unique(frame.kind)]
-    takeaway = f"{counted(int(frame['count'].sum()), 'sample')} repaired or flagged: {listed(kinds)}."
+    takeaway = f"{counted(len(frame), 'repair')}: {listed(kinds)}."
     return _table("repairs", "What the importer repaired", takeaway, frame, REPAIRS)
 
 

@@ -77,6 +77,8 @@ def rollout(
     engine : `casadi`, `torch` (eager), `compiled` (torch.compile), or by size.
     """
     model = dynamics(vessel)
+    if not start:
+        raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
     num_samples = len(next(iter(start.values())))
     values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
     if values.shape[1] != len(model.parameters):

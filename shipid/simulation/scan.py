@@ -17,7 +17,7 @@ from shipid.vessel.load import Vessel
 
 @lru_cache(maxsize=32)
 def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, every: int) -> ca.Function:
-    """One sample: (state, memory, commands, environment, tau_extra, parameters) -> records, steps inside."""
+    """One sample: ([state, memory, greatest speed], commands, environment, tau, parameters) -> records of the first."""
     state, memory = ca.MX.sym("state", len(model.state)), ca.MX.sym("memory", len(model.memory))
     commands, environment = ca.MX.sym("commands", len(model.commands)), ca.MX.sym("environment", len(model.environment))
     tau, parameters = ca.MX.sym("tau", model.num_dof), ca.MX.sym("parameters", len(model.parameters))
@@ -33,11 +33,12 @@ def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, ev
     def advance(m: Any, dt: float) -> Any:
         return model.advance(state, m, commands, environment, parameters, dt)
 
+    greatest = ca.MX.sym("greatest")
     after, memory_after = integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
     one = ca.Function(
         "step",
-        [ca.vertcat(state, memory), commands, environment, tau, parameters],
-        [ca.vertcat(after, memory_after)],
+        [ca.vertcat(state, memory, greatest), commands, environment, tau, parameters],
+        [ca.vertcat(after, memory_after, ca.fmax(greatest, ca.mmax(ca.fabs(after[model.num_dof :]))))],
     )
     if every > 1:
         x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), every)
@@ -45,7 +46,7 @@ def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, ev
         inner = one.mapaccum(every)(x, c, e, t, ca.repmat(parameters, 1, every))
         one = ca.Function("steps", [x, c, e, t, parameters], [inner[:, -1]])
     count = num_steps // every
-    x = ca.MX.sym("x", len(model.state) + len(model.memory))
+    x = ca.MX.sym("x", one.size1_in(0))
     c, e = ca.MX.sym("c", len(model.commands), num_steps), ca.MX.sym("e", len(model.environment), num_steps)
     t = ca.MX.sym("t", model.num_dof, num_steps)
     path = one.mapaccum(count)(x, c, e, t, ca.repmat(parameters, 1, count))
@@ -58,8 +59,8 @@ def run_casadi(
     """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
     scan = casadi_scan(model, step, num_steps, method, every)
     num_samples, num_records = batch.state.shape[1], num_steps // every
-    start = np.concatenate([batch.state, batch.memory])
-    speed_rows = slice(model.num_dof, len(model.state))
+    greatest = np.abs(batch.state[model.num_dof :]).max(axis=0, keepdims=True)
+    start = np.concatenate([batch.state, batch.memory, greatest])
 
     def over_time(held: Array) -> Array:  # (T, C, S) -> (C, S * num_steps), a sample's steps side by side
         full = np.broadcast_to(held, (num_steps, *held.shape[1:]))
@@ -73,7 +74,7 @@ def run_casadi(
         path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, rows])
-        worst.append(np.abs(path[:, :, speed_rows]).max(axis=(0, 2)) + 0 * path.sum(axis=(0, 2)))
+        worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so
     return np.stack(records, axis=1), np.stack(worst)
 
 

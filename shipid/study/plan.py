@@ -11,6 +11,8 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
+from shipid.data.importing import sha256_of
+from shipid.data.mapping import read_mapping
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.estimation.tuning import Recipe
@@ -79,6 +81,7 @@ class Claims(Strict):
 
     accurate: str
     inaccurate: str
+    aside: list[str] = Field(default=[], description="families that saw the test runs: shown, but in no claim")
 
 
 class Study(Strict):
@@ -137,6 +140,8 @@ class Plan:
 
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
     vessels : every vessel that the document names, by that name.
+    sources : digests of the mapping, log or dataset that recorded runs come from.
+    changes : what `--set` changed, already in the document.
     """
 
     name: str
@@ -148,13 +153,16 @@ class Plan:
     batches: tuple[Batch, ...]
     truth: Vessel | None = None
     vessels: Mapping[str, Vessel] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
-        """Digest of the document and of every vessel it stands on: what the results depend on."""
+        """Digest of the document, every vessel, the data's sources and the recipe in full: what results depend on."""
         standing = [self.truth, *(model.vessel for model in self.models)]
         vessels = sorted({vessel.digest for vessel in standing if vessel is not None})
-        return documents.digest({"study": self.document, "vessels": vessels})
+        depends = {"vessels": vessels, "sources": dict(self.sources), "recipe": self.recipe.model_dump()}
+        return documents.digest({"study": self.document, **depends})
 
     @property
     def cells(self) -> int:
@@ -184,11 +192,17 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
         except (ValueError, IndexError, TypeError, AttributeError):
             message = f"--set cannot reach this path: {choices(path, known)}"
             raise DocumentError(message, file=file, path=path) from None
-    return build_plan(document, file)
+    return build_plan(document, file, changes=changes)
 
 
-def build_plan(document: Document, file: Path, vessels: Mapping[str, Vessel] | None = None) -> Plan:
-    """Check a study document and expand it into models and batches; `vessels` known already need no file."""
+def build_plan(
+    document: Document,
+    file: Path,
+    vessels: Mapping[str, Vessel] | None = None,
+    sources: Mapping[str, str] | None = None,
+    changes: Mapping[str, Any] | None = None,
+) -> Plan:
+    """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
     study: Study = documents.parse(Study, document, file)
     known = dict(vessels or {})
     models = _models(study, file, known)
@@ -203,7 +217,31 @@ def build_plan(document: Document, file: Path, vessels: Mapping[str, Vessel] | N
     if study.truth is not None:
         _check_amounts(study, study.truth, file)
         truth = _truth_vessel(study.truth, file, known)
-    return Plan(file.stem, str(file), document, study, models, recipe, batches, truth, known)
+    found = _sources(study.data, file) if sources is None and study.data is not None else sources
+    return Plan(
+        file.stem, str(file), document, study, models, recipe, batches, truth, known, found or {}, changes or {}
+    )
+
+
+def beside(folder: Path, name: str) -> Path:
+    """A file that a study names: from the study's folder, else from the working folder."""
+    return folder / name if (folder / name).exists() else Path(name)
+
+
+def mapping_of(data: Data, file: Path) -> str | None:
+    """The mapping that a study names: a bundled name as it is, a path from the study's folder on."""
+    named = data.mapping
+    return str(beside(file.parent, named)) if named is not None and named.endswith(".toml") else named
+
+
+def _sources(data: Data, file: Path) -> dict[str, str]:
+    """Digests of what the runs come from; a file that is not there is told when it is read."""
+    mapping = mapping_of(data, file)
+    found = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
+    for key, name in (("log", data.log), ("dataset", data.dataset)):
+        if name is not None and beside(file.parent, name).is_file():
+            found[key] = sha256_of(beside(file.parent, name))
+    return found
 
 
 def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
@@ -290,5 +328,9 @@ def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
         if families.count(name) > 1:
             message = f"{name!r} has {families.count(name)} members: the findings compare one model with one"
             raise DocumentError(message, file=file, path=f"claims.{role}")
+    for name in study.claims.aside:
+        if name not in families:
+            message = f"{name!r} is not a family: {choices(name, set(families))}"
+            raise DocumentError(message, file=file, path="claims.aside")
     if study.claims.accurate == study.claims.inaccurate:
         raise DocumentError("the same family as claims.accurate", file=file, path="claims.inaccurate")

@@ -17,11 +17,12 @@ from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
 from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, split_folds, split_runs
 from shipid.errors import DataError, DocumentError, choices
+from shipid.estimation.compensator import choose_features, feature_table
 from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
 from shipid.simulation.scan import memory_along
 from shipid.simulation.truth import simulate
-from shipid.study.plan import Batch, Model, Plan
+from shipid.study.plan import Batch, Model, Plan, beside, mapping_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw, resolve
 
@@ -80,17 +81,11 @@ def obtain(plan: Plan) -> Dataset:
         return Dataset(frame, {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []})
     assert study.data is not None
     if study.data.dataset is not None:
-        return read_dataset(_beside(folder, study.data.dataset))
-    assert study.data.mapping is not None
-    named = study.data.mapping
-    source = str(_beside(folder, named)) if named.endswith(".toml") else named
-    log = fetch(source) if study.data.log is None else _beside(folder, study.data.log)
+        return read_dataset(beside(folder, study.data.dataset))
+    source = mapping_of(study.data, Path(plan.file))
+    assert source is not None
+    log = fetch(source) if study.data.log is None else beside(folder, study.data.log)
     return import_log(read_mapping(source), log, without=study.data.without)
-
-
-def _beside(folder: Path, name: str) -> Path:
-    """A file that a study names: from the study's folder, else from the working folder."""
-    return folder / name if (folder / name).exists() else Path(name)
 
 
 def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
@@ -286,9 +281,20 @@ def constant_motion(windows: Windows) -> Array:
     return path
 
 
-def minutes(windows: Windows, runs: Sequence[str]) -> float:
-    """Recorded time [min] that the windows of these runs see, futures included."""
-    return sum(windows.spans[run][1] - windows.spans[run][0] for run in runs) / 60
+def envelope(plan: Plan, prepared: Prepared) -> list[dict[str, Any]]:
+    """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test (paper's Table 1)."""
+    seed = min(plan.study.grid.seeds)
+    sets = {"test": prepared.test}
+    for batch in reversed([batch for batch in plan.batches if batch.seed == seed]):
+        sets[f"D_{batch.N_D}"] = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+    whole = feature_table(prepared.pool.columns, prepared.commands)
+    alike = choose_features(whole) | {name: (name,) for name, values in whole.items() if np.ptp(values) == 0}
+    return [
+        {"set": name, "quantity": quantity, "min": values.min(), "mean": values.mean(), "max": values.max()}
+        for name, windows in sets.items()
+        for quantity, values in feature_table(windows.columns, prepared.commands).items()
+        if quantity in alike  # equal commands are one input: the first stands for all
+    ]
 
 
 def limits(windows: Windows, commands: Sequence[str]) -> dict[str, tuple[float, float]]:

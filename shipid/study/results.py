@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,6 @@ MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 INSTANTS = 7  # windows of a test run in the browser
 RPM, DEGREE = 60.0, 180.0 / np.pi
 SAILORS = {"n": ("shaft", "rpm", RPM), "alpha": ("azimuth", "deg", DEGREE), "delta": ("rudder", "deg", DEGREE)}
-ENVELOPE = {"u": ("m/s", 1.0), "v": ("m/s", 1.0), "r": ("deg/s", DEGREE), "u_rw": ("m/s", 1.0), "v_rw": ("m/s", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,17 @@ def time_frame(results: Results) -> pd.DataFrame:
                 row["N_D"],
                 "cooperative",
             )
-    return pd.concat(parts, ignore_index=True)
+    return _with_gaps(pd.concat(parts, ignore_index=True), ["run", "model", "N_D", "source"])
+
+
+def _with_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """A row without numbers wherever time jumps within a group, so that no line is drawn across what is not there."""
+    step = frame.groupby(keys, sort=False)["t"].diff()
+    holes = frame[step > 1.5 * step.median()].copy()
+    numbers = [name for name in frame.columns if name not in keys and frame[name].dtype.kind == "f" and name != "t"]
+    holes[numbers] = np.nan
+    holes.index = holes.index - 0.5
+    return pd.concat([frame, holes]).sort_index(kind="stable").reset_index(drop=True)
 
 
 def commands_frame(results: Results) -> pd.DataFrame:
@@ -146,7 +156,8 @@ def commands_frame(results: Results) -> pd.DataFrame:
     result = frame[["run", "t"]].reset_index(drop=True)
     shown: dict[str, str] = {}
     for name in results.dataset.commands:
-        twin = next((other for other in shown if np.allclose(frame[other], frame[name], atol=1e-9)), None)
+        alike = (other for other in shown if other.rpartition(".")[2] == name.rpartition(".")[2])
+        twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
         if twin is None:
             shown[name] = name.partition(".")[0]
         else:
@@ -154,7 +165,7 @@ def commands_frame(results: Results) -> pd.DataFrame:
     for name, components in shown.items():
         word, unit, factor = SAILORS[name.rpartition(".")[2]]
         result[f"{components} {word} [{unit}]"] = frame[name].to_numpy() * factor
-    return result
+    return _with_gaps(result, ["run"])
 
 
 def snapshots(results: Results) -> list[dict[str, Any]]:
@@ -227,25 +238,18 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    frame = results.dataset.frame
-    columns = {name: frame[name].to_numpy() for name in frame.columns}
-    quantities = {name: (unit, factor) for name, (unit, factor) in ENVELOPE.items() if name in columns}
-    if "V_w" in columns:
-        angle = columns["beta_w"] - columns["psi"]
-        columns["u_rw"] = columns["u"] - columns["V_w"] * np.cos(angle)
-        columns["v_rw"] = columns["v"] - columns["V_w"] * np.sin(angle)
-        quantities |= {name: ENVELOPE[name] for name in ("u_rw", "v_rw")}
-    for name in results.dataset.commands:
-        _, unit, factor = SAILORS[name.rpartition(".")[2]]
-        quantities[name] = (unit, factor)
-    test = np.isin(columns["run"], list(results.test.spans))
     rows = []
-    for part, mask in (("training and validation", ~test), ("test", test)):
-        for name, (unit, factor) in quantities.items():
-            values = columns[name][mask] * factor
-            low, mean, high = values.min(), values.mean(), values.max()
-            rows.append({"set": part, "quantity": name, "unit": unit, "min": low, "mean": mean, "max": high})
+    for row in store.read_json(results.folder / store.ENVELOPE):
+        unit, factor = _sailors_unit(row["quantity"])
+        rows.append({**row, "unit": unit, **{name: row[name] * factor for name in ("min", "mean", "max")}})
     return pd.DataFrame(rows)
+
+
+def _sailors_unit(quantity: str) -> tuple[str, float]:
+    """Unit in which sailors read a quantity, and the factor to it from SI."""
+    if "." in quantity:
+        return SAILORS[quantity.rpartition(".")[2]][1:]
+    return ("deg/s", DEGREE) if quantity == "r" else ("m/s", 1.0)
 
 
 def repairs_frame(results: Results) -> pd.DataFrame:
@@ -261,10 +265,13 @@ def naive_summary(results: Results) -> dict[str, float]:
 
 
 def reproducing_command(results: Results) -> str:
-    """Return the command that computes these results again: by name if bundled as it is, else of the stored study."""
-    original = documents.bundled("studies").get(results.plan.name)
-    unchanged = original is not None and documents.read(original) == results.plan.document
-    return f"shipid study run {results.plan.name if unchanged else f'{results.folder.name}/{store.STUDY}'}"
+    """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
+    file = Path(results.provenance["file"])
+    name = results.plan.name if documents.bundled("studies").get(results.plan.name) == file else str(file)
+    changes = results.provenance.get("changes", {})
+    return " ".join(
+        ["shipid study run", name, *(f"--set '{path}={json.dumps(value)}'" for path, value in changes.items())]
+    )
 
 
 def _source_words(source: Any) -> str:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
+from shipid.data.windows import covered
 from shipid.errors import ShipidError
 from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
@@ -24,7 +25,7 @@ from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.plan import Batch, Model, Plan
-from shipid.study.prepare import Prepared, describe, limits, minutes, obtain, own_vessel, prepare
+from shipid.study.prepare import Prepared, describe, envelope, limits, obtain, own_vessel, prepare
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
@@ -59,9 +60,10 @@ def run_study(
     ----------
     workers : processes of the local cluster, one thread each; default: one per core, no more than batches.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
-    device : PyTorch device of training.
+    device : PyTorch device of rollouts and training.
     """
     begun = time.perf_counter()
+    check_device(device)
     store.open_folder(folder, plan)
     if not (folder / store.DATASET).exists():
         made = plan.study.data is not None and plan.study.data.dataset is not None
@@ -72,6 +74,7 @@ def run_study(
     yield Event("note", "rolling out the models")
     prepared = prepare(plan, dataset, device)
     store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
+    store.write_json(folder / store.ENVELOPE, envelope(plan, prepared))
     store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(prepared, m)} for m in prepared.models])
     for note in prepared.notes:
         yield Event("note", note)
@@ -91,7 +94,7 @@ def run_study(
             yield Event("cell", done=cells, total=plan.cells, row=row)
     record = store.read_json(folder / store.PROVENANCE)
     record["notes"] = list(prepared.notes)
-    record["machine"] = machine()
+    record["machine"] = {**machine(), "device": device}
     record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
     store.write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder))
@@ -118,7 +121,7 @@ def run_batch(
         batch.seed,
         device=device,
     )
-    shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": minutes(prepared.pool, runs)}
+    shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for model in prepared.models:
         found = tuned[model.name]
@@ -130,7 +133,8 @@ def run_batch(
             row |= {"status": "failed", "sentence": "no training converged"}
         else:
             chosen = found.compensator.hyperparameters
-            row["hyperparameters"] = ", ".join(f"{name} {value:.4g}" for name, value in chosen.items())
+            searched = {name: chosen[name] for name in plan.recipe.ranges() if name in chosen}
+            row["hyperparameters"] = ", ".join(f"{name} {value:.3g}" for name, value in searched.items())
             predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
             if usable[model.name]:
                 paths = prepared.test_paths[model.name] + found.compensator.predict(prepared.test.columns)

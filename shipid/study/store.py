@@ -20,7 +20,7 @@ from shipid.study.plan import Batch, Model, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, MODELS = "study.toml", "vessels.json", "provenance.json", "models.json"
-DATASET, TEST = "dataset.parquet", "test.npz"
+DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
 
@@ -73,7 +73,9 @@ def open_folder(folder: Path, plan: Plan) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
-    write_json(folder / PROVENANCE, {"digest": plan.digest, "name": plan.name, "file": str(Path(plan.file).absolute())})
+    origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
+    origin["changes"] = dict(plan.changes)
+    write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
     vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
     write_json(folder / VESSELS, vessels)
     write_text(folder / STUDY, plan.text())
@@ -90,9 +92,12 @@ def stored_plan(folder: Path) -> Plan:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
     stored = read_json(folder / VESSELS)
     vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
-    plan = build_plan(document, Path(provenance["file"]), vessels)
+    plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
     if plan.digest != provenance["digest"]:
-        raise ResultError("its study or a vessel was changed by hand: run the study again", file=folder)
+        raise ResultError(
+            "its study or vessels were changed by hand, or this shipid has another recipe: run the study again",
+            file=folder,
+        )
     return plan
 
 

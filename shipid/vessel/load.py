@@ -16,9 +16,12 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat
 from shipid import document as documents
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
+from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.vessel.bindings import bindings, units
 from shipid.vessel.schema import DOFS, components, kinds, term_blocks, term_model, vessel_model
+
+LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,27 @@ def check_vessel(document: Document, file: str) -> Vessel:
         _check_lists(path, block, file)
     _check_units(vessel)
     _check_inertia(vessel)
+    _check_sense(vessel)
     return vessel
+
+
+def _check_sense(vessel: Vessel) -> None:
+    """Refuse what no ship can be: added mass of the wrong sign, a stern ahead of the bow, tonnes for kilograms."""
+    values = vessel.parameters
+    for path, value in values.items():
+        group, _, name = path.rpartition(".")
+        if group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0] and value > 0:
+            message = f"{value:g}: added mass is on the force side, so {name} is negative"
+            raise DocumentError(message, file=vessel.file, path=path)
+        if name == "x_fwd" and value <= values.get(f"{group}.x_aft", -np.inf):
+            raise DocumentError(f"{value:g}: must be ahead of x_aft", file=vessel.file, path=path)
+    sizes = vessel.document.get("particulars", {})
+    rho = vessel.document.get("constants", {}).get("rho")
+    if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
+        share = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
+        if not LEAST_BLOCK < share < MOST_BLOCK:
+            message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which no ship is: is the unit kg?"
+            raise DocumentError(message, file=vessel.file, path="inertia.m")
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:

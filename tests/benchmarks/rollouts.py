@@ -78,8 +78,8 @@ def _casadi(start: Any, commands: Any, environment: Any, options: dict[str, Any]
     scan = casadi_scan(model, 1.0, STEPS, "euler", 1)
     x, c, e = ca.MX.sym("x", 6), ca.MX.sym("c", 4), ca.MX.sym("e", 2)
     p = ca.MX.sym("p", len(model.parameters))
-    path = scan(x, ca.repmat(c, 1, STEPS), ca.repmat(e, 1, STEPS), ca.MX.zeros(3, STEPS), p)
-    one = ca.Function("one", [x, c, e, p], [path[:, -1]], options)
+    path = scan(ca.vertcat(x, 0), ca.repmat(c, 1, STEPS), ca.repmat(e, 1, STEPS), ca.MX.zeros(3, STEPS), p)
+    one = ca.Function("one", [x, c, e, p], [path[:6, -1]], options)
     mapped = one.map(SAMPLES // 2).map(2, "thread")
     arrays = [
         np.stack([start[name] for name in model.state]),

@@ -47,6 +47,13 @@ MAPPINGS = {
     "run_twice": ("segment.1.run", "add ' (2)'"),
     "segment_backwards": ("segment.0", "must lie before end"),
     "unknown_encoding": ("format.encoding", "for example utf-8"),
+    "encoding_of_bytes": ("format.encoding", "no such encoding of text"),
+    "encoding_of_letters": ("format.encoding", "no such encoding of text"),
+    "separator_of_two": ("format.separator", "one ASCII character"),
+    "separator_of_a_pattern": ("format.separator", "or the word 'whitespace'"),
+    "break_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, intervals, kind, reason"),
+    "heading_offset_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, kind, offset, reason, unit"),
+    "lever_arm_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, kind, reason, x"),
     "not_toml": ("", "not valid TOML"),
     "absent": ("", "no such file"),
 }

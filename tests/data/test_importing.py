@@ -134,6 +134,16 @@ def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
     assert frame.groupby("run")["t"].agg(["min", "max", "size"]).to_numpy().tolist() == [[10, 20, 21], [15, 30, 31]]
 
 
+def test_segments_at_unix_time(plain_mapping: Write, tmp_path: Path) -> None:
+    """A run may begin one step of the log before it, not more, however large the clock is."""
+    motion = turning(T).assign(t=1.7e9 + T)
+    segment = '\n[[segment]]\nrun = "a"\nstart = {}\nend = 1700000010.0\n'
+    frame = imported(motion, plain_mapping(segment.format(1699999999.5)), tmp_path).frame
+    assert frame["t"].iloc[[0, -1]].tolist() == [1.7e9, 1.7e9 + 10.0]
+    with pytest.raises(DataError, match="is not in the log"):
+        imported(motion, plain_mapping(segment.format(1699999999.0)), tmp_path)
+
+
 def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
     more = '\n[[segment]]\nrun = "a"\nstart = 0.5\nend = 1.0\n'
     mapping = plain_mapping(more, ('from = "time"', 'from = "time"\nunit = "min"'))
@@ -177,6 +187,9 @@ def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> No
     every_other = turning(T).iloc[::2].reset_index(drop=True)
     np.testing.assert_allclose(frame["north"], every_other["north"], atol=1e-9)
     np.testing.assert_allclose(frame["propeller.n"], every_other["port.n"], atol=1e-12)
+    unix = turning(T).assign(t=1.7e9 + T)
+    moved = imported(unix, plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
+    np.testing.assert_array_equal(moved["propeller.n"], frame["propeller.n"])
 
 
 def test_unknown_repair_to_leave_out(plain_mapping: Write, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from shipid.data.windows import (
     Windows,
     concatenate,
+    covered,
     cut_windows,
     fold_masks,
     from_frame,
@@ -126,6 +127,18 @@ def test_instants_commands_and_columns() -> None:
     assert windows.future.shape == (15, 11, 2)
 
 
+@pytest.mark.parametrize("rate", [2.0, 10.0])
+def test_commands_at_unix_time_are_those_in_force(rate: float) -> None:
+    """Counted in rows from the start: the last row at or before, exactly, and as many windows as at time 0."""
+    ticks = np.arange(601)
+    frame = turning(1.7e9 + ticks / rate).assign(**{"port.n": ticks.astype(float)})
+    windows = cut_windows(as_dataset(frame), horizon=15, step=0.6, interval=0.7)
+    per = rate * (0.7 * np.arange(len(windows)) + 0.6 * np.arange(15)[:, None])  # rows since the start
+    np.testing.assert_array_equal(windows.planned["port.n"], np.floor(per + 1e-6))
+    np.testing.assert_array_equal(windows.columns["port.n"], np.floor(per[0] + 1e-6))
+    assert len(windows) == int((600 / rate - 9.0) / 0.7 + 1e-6) + 1
+
+
 def test_no_future_leaves_its_run_or_crosses_a_break() -> None:
     broken = turning(T).assign(flags=np.where(T == 25.0, 1, 0))
     windows = cut_windows(as_dataset(broken, turning(T[:41])), horizon=10)
@@ -192,6 +205,30 @@ def test_runs_with_their_own_clocks_do_not_exclude_each_other() -> None:
         fold_masks(windows, ["z"])
 
 
+def test_covered_counts_a_moment_once_on_a_shared_clock() -> None:
+    overlapping = ((0.0, 30.0), (20.0, 50.0), (70.0, 85.0))
+    assert covered(runs_at(*overlapping)) == pytest.approx(50.0 + 15.0)
+    assert covered(runs_at(*overlapping, clock="run")) == pytest.approx(30.0 + 30.0 + 15.0)
+    sparse = runs_at((0.0, 60.0)).select([30, 0, 25])  # out of order: 0 to 10 s, 25 to 40 s
+    assert covered(sparse) == pytest.approx(25.0)
+    assert covered(sparse.select([])) == 0.0
+
+
+@given(st.lists(spans, min_size=1, max_size=5), st.booleans(), st.data())
+def test_covered_is_the_time_that_is_touched(
+    runs: list[tuple[float, float]], shared: bool, data: st.DataObject
+) -> None:
+    """Counted second by second: windows of 10 s start at whole seconds."""
+    windows = runs_at(*runs, clock="shared" if shared else "run")
+    windows = windows.select(data.draw(st.lists(st.integers(0, len(windows) - 1), min_size=1)))
+    seen = {
+        ("" if shared else str(run), int(t) + second)
+        for run, t in zip(windows.run, windows.t, strict=True)
+        for second in range(10)
+    }
+    assert covered(windows) == pytest.approx(len(seen))
+
+
 @given(st.integers(2, 17), st.integers(0, 2**32))
 def test_folds_deal_every_run_once(num_folds: int, seed: int) -> None:
     folds = split_folds(NAMES, num_folds, seed)
@@ -220,6 +257,21 @@ def test_held_out_share(share: float, seed: int) -> None:
 
 def test_splits_depend_on_the_seed() -> None:
     assert len({nested_runs(NAMES, [5], seed)[5] for seed in range(20)}) == 20
+
+
+def test_draws_for_different_purposes_differ() -> None:
+    """The runs that validate with all data are not those of the smallest amount, but a set that shares a fifth."""
+    runs = [f"run {number}" for number in range(100)]
+    shared = []
+    for seed in range(50):
+        smallest, largest = nested_runs(runs, [20, 100], seed).values()
+        held_out = split_runs(largest, 0.2, seed)[1]
+        drawn = [set(smallest), set(held_out), set(split_folds(largest, 5, seed)[0])]
+        shared += [[len(one & other) for one, other in combinations(drawn, 2)]]
+        assert split_runs(reversed(largest), 0.2, seed)[1] == held_out
+    # hypergeometric: 20 of 100 twice share 4 on average, standard deviation 1.6; of the mean of 50 draws 0.23
+    np.testing.assert_allclose(np.mean(shared, axis=0), 4.0, atol=1.0)
+    assert np.max(shared) < 20
 
 
 def test_impossible_splits() -> None:

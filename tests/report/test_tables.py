@@ -39,4 +39,4 @@ def test_envelope_and_repairs_hold_their_numbers(full_scale):
     table = envelope(full_scale)
     assert list(table.columns) == ["input", "unit", "train, all folds", "test"]
     assert table.rows[0][3].text == "0.00 / 2.30 / 5.88"
-    assert repairs(full_scale).takeaway == "415 samples repaired or flagged: repeated samples and jump in position."
+    assert repairs(full_scale).takeaway == "2 repairs: repeated samples and jump in position."

@@ -121,7 +121,7 @@ def test_turn_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
 
 
 def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
-    """Both units' forces on the recorded motion, within the 8 % that the surrogate was seen to keep once under way."""
+    """Both units' forces on the recorded motion: surge within 3 %, sway within 6 % once under way (2.2 and 4.9 seen)."""
     from shipid.physics.thruster import azimuth  # one term alone
 
     recorded = [turn[f"bodyforce{i}_{axis}"] for axis in ("surge", "sway") for i in (0, 1)]
@@ -132,6 +132,6 @@ def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> No
         motions = zip(turn["surge_vel"], turn["sway_vel"], np.radians(turn["yaw_vel"]), strict=True)
         wrenches = [azimuth(np.array([u, v, 0, 0, 0, r]), 100 / 60, np.radians(20), **values) for u, v, r in motions]
         found.append(np.array([[float(w[0]), float(w[1])] for w in wrenches]))
-    surge = np.stack([f[:, 0] for f in found])
-    late = slice(40, None)
-    np.testing.assert_allclose(surge[:, late], np.stack(recorded[:2])[:, late], rtol=0.09)
+    for axis, kept, rtol in ((0, recorded[:2], 0.03), (1, recorded[2:], 0.06)):
+        forces, late = np.stack([f[:, axis] for f in found]), slice(40, None)
+        np.testing.assert_allclose(forces[:, late], np.stack(kept)[:, late], rtol=rtol)

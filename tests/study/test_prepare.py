@@ -18,7 +18,7 @@ from shipid.errors import DataError, DocumentError
 from shipid.predictor import Predictor
 from shipid.simulation.rollout import rollout
 from shipid.study.plan import Plan, build_plan, read_plan
-from shipid.study.prepare import Prepared, constant_motion, limits, minutes, obtain, own_vessel, prepare, window_memory
+from shipid.study.prepare import Prepared, constant_motion, envelope, limits, obtain, own_vessel, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import draw, resolve
@@ -329,10 +329,24 @@ def test_a_mapping_is_looked_for_beside_the_study(
     assert obtain(plan).runs == ["good"]
 
 
-def test_limits_and_minutes(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    """Per D_4, D_6 and test, from the windows that each sees."""
+    plan, _, prepared = tiny
+    rows = {(row["set"], row["quantity"]): row for row in envelope(plan, prepared)}
+    batches = {f"D_{batch.N_D}": batch for batch in plan.batches if batch.seed == min(plan.study.grid.seeds)}
+    assert {name for name, _ in rows} == {*batches, "test"}
+    for name in ("test", *batches):
+        chosen = prepared.runs(plan, batches[name]) if name in batches else ()
+        windows = prepared.pool.select(np.isin(prepared.pool.run, chosen)) if chosen else prepared.test
+        u, V_w = windows.columns["u"], windows.columns["V_w"]
+        u_rw = u - V_w * np.cos(windows.columns["beta_w"] - windows.columns["psi"])
+        for quantity, values in (("u", u), ("u_rw", u_rw)):
+            row = rows[name, quantity]
+            assert (row["min"], row["mean"], row["max"]) == pytest.approx((values.min(), values.mean(), values.max()))
+
+
+def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
-    runs = list(prepared.pool.spans)[:3]
-    assert minutes(prepared.pool, runs) == pytest.approx(3 * 20 / 60)
     found = limits(prepared.pool, prepared.commands)
     assert set(found) == {"u", "v", "r", "V_w", *dataset.commands}
     rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]

@@ -51,15 +51,16 @@ def test_commands_are_what_was_ordered(read: Results, tiny_run: Path) -> None:
     np.testing.assert_allclose(frame.iloc[:, 3], np.degrees(ordered["port.alpha"]))
 
 
-def test_envelope_in_sailors_units(read: Results, tiny_run: Path) -> None:
+def test_envelope_in_sailors_units(read: Results) -> None:
     frame = frames.envelope_frame(read).set_index(["set", "quantity"])
-    log = read_dataset(tiny_run / store.DATASET).frame
-    test = log["run"].isin(list(read.test.spans))
-    for part, rows in (("test", log[test]), ("training and validation", log[~test])):
-        assert frame.loc[(part, "port.n"), "max"] == pytest.approx(rows["port.n"].max() * 60)
-        assert frame.loc[(part, "r"), "min"] == pytest.approx(np.degrees(rows["r"].min()))
-        towards = rows["beta_w"] - rows["psi"]
-        assert frame.loc[(part, "u_rw"), "mean"] == pytest.approx((rows["u"] - rows["V_w"] * np.cos(towards)).mean())
+    columns = read.test.columns
+    assert frame.loc[("test", "port.n"), "max"] == pytest.approx(columns["port.n"].max() * 60)
+    assert frame.loc[("test", "r"), "min"] == pytest.approx(np.degrees(columns["r"].min()))
+    towards = columns["beta_w"] - columns["psi"]
+    assert frame.loc[("test", "u_rw"), "mean"] == pytest.approx(
+        (columns["u"] - columns["V_w"] * np.cos(towards)).mean()
+    )
+    assert ("test", "starboard.n") not in frame.index, "equal commands are one input"
     assert frame["unit"]["test"].to_dict()["r"] == "deg/s"
 
 
@@ -105,12 +106,14 @@ def test_provenance_says_what_it_stands_on(read: Results) -> None:
 
 
 def test_the_command_reproduces_the_study(read: Results) -> None:
-    """A bundled study by its name, unless `--set` has changed it; any other from the stored document."""
-    assert frames.reproducing_command(read) == "shipid study run run/study.toml"
-    quick = replace(read, plan=read_plan("quick"))
+    """A bundled study by its name, any other by its file; with what `--set` changed."""
+    assert frames.reproducing_command(read) == f"shipid study run {read.plan.file}"
+    plan = read_plan("quick")
+    quick = replace(read, plan=plan, provenance={"file": plan.file})
     assert frames.reproducing_command(quick) == "shipid study run quick"
-    changed = replace(read, plan=read_plan("quick", {"grid.N_D": [10]}))
-    assert frames.reproducing_command(changed) == "shipid study run run/study.toml"
+    changed = replace(quick, provenance={"file": plan.file, "changes": {"grid.N_D": [10], "recipe.kind": "paper"}})
+    expected = "shipid study run quick --set 'grid.N_D=[10]' --set 'recipe.kind=\"paper\"'"
+    assert frames.reproducing_command(changed) == expected
 
 
 def test_a_diverged_model_is_marked_and_left_out_of_curves(read: Results) -> None:
