@@ -121,7 +121,7 @@ def test_turn_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
 
 
 def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
-    """Both units' forces on the recorded motion: surge within 3 %, sway within 6 % once under way (2.2 and 4.9 seen)."""
+    """Both units' forces on the recorded motion: surge within 3 %, sway within 6 % once under way."""
     from shipid.physics.thruster import azimuth  # one term alone
 
     recorded = [turn[f"bodyforce{i}_{axis}"] for axis in ("surge", "sway") for i in (0, 1)]
