@@ -51,7 +51,6 @@ MISSING = 1e300  # sorts after every number (page.js knows it)
 # Column of the frame -> heading and, of numbers, the decimals.
 CELLS = {
     "model": ("model", None),
-    "kind": ("family", None),
     "A": ("A [m]", 2),
     "N_D": ("N_D [1]", 0),
     "minutes": ("data [min]", 1),
@@ -61,7 +60,7 @@ CELLS = {
     "rms": ("rms [m]", 2),
     "status": ("status", None),
     "seconds": ("time [s]", 0),
-    "hyperparameters": ("hyperparameters", None),
+    "hyperparameters": ("chosen", None),
 }
 MODELS = {
     "model": ("model", None),

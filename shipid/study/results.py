@@ -142,7 +142,8 @@ def time_frame(results: Results) -> pd.DataFrame:
 def _with_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """A row without numbers wherever time jumps within a group, so that no line is drawn across what is not there."""
     step = frame.groupby(keys, sort=False)["t"].diff()
-    holes = frame[step > 1.5 * step.median()].copy()
+    hole = step > 1.5 * step.median()
+    holes = frame[hole].assign(t=frame["t"][hole] - step[hole] / 2)
     numbers = [name for name in frame.columns if name not in keys and frame[name].dtype.kind == "f" and name != "t"]
     holes[numbers] = np.nan
     holes.index = holes.index - 0.5

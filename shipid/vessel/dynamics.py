@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from shipid.physics import ACTUATORS, SIGNALS, TERMS
+from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
 from shipid.physics.frames import current, kinematics
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.vessel.bindings import Binding, bindings
@@ -105,33 +106,19 @@ def _assemble(vessel: Vessel) -> Dynamics:
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
     force = M_A @ nu_c_dot - coriolis(M_RB, nu) - coriolis(M_A, nu_r)
+    summed, mapped = _sum_of_terms(terms, {**shared, **actual}, bound, value_of)
+    force += summed
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
     rows, options = list(axes), {"cse": True}
-    sums: list[SumOverComponents] = []
-    for path, key, block in terms:
-        component = path.rsplit(".", 1)[-1]
-        own = {name.rpartition(".")[2]: value for name, value in actual.items() if name.startswith(f"{component}.")}
-        available = {**shared, **own}
-        keywords = _values(bound[path], value_of)
-        term = TERMS[key]
-        if term.components is None:
-            force += term.function(*(available[name] for name in signals(term.function)), **keywords)
-            continue
-        columns = term.components(**{name: block[name] for name in counts(term)})
-        arrays = np.column_stack(list(columns.values()))
-        if len(arrays) <= UNROLL_UP_TO:
-            for row in arrays:
-                here = {**available, **dict(zip(columns, row, strict=True))}
-                force += term.function(*(here[name] for name in signals(term.function)), **keywords)
-            continue
-        entry = SX.sym("component", len(columns))
-        here = {**available, **dict(zip(columns, ca.vertsplit(entry), strict=True))}
-        wrench = term.function(*(here[name] for name in signals(term.function)), **keywords)
-        function = ca.Function(
-            f"sum_{len(sums)}", [*inputs, entry], [ca.densify(wrench[rows])], [*INPUTS, "component"], ["tau"], options
+    sums = [
+        SumOverComponents(
+            ca.Function(
+                f"sum_{i}", [*inputs, entry], [ca.densify(wrench[rows])], [*INPUTS, "component"], ["tau"], options
+            ),
+            arrays,
         )
-        sums.append(SumOverComponents(function, arrays))
-
+        for i, (entry, wrench, arrays) in enumerate(mapped)
+    ]
     acceleration = ca.inv_minor(ca.densify((M_RB + M_A)[rows, rows])) @ (force[rows] + tau_extra)
     rates = ca.vertcat(kinematics(eta, nu)[rows], acceleration)
     return Dynamics(
@@ -148,6 +135,44 @@ def _assemble(vessel: Vessel) -> Dynamics:
         environment=environment_names,
         parameters=tuple(vessel.parameters),
     )
+
+
+def _sum_of_terms(
+    terms: list[tuple[str, str, Mapping[str, Any]]],
+    available: Mapping[str, SX],
+    bound: Mapping[str, Binding],
+    value_of: Mapping[str, SX],
+) -> tuple[SX, list[tuple[SX, SX, np.ndarray]]]:
+    """Wrench (6) of all terms; and, of what has too many components to write out, (component, its wrench, all)."""
+    total, mapped = SX(6, 1), []
+    for path, key, block in terms:
+        component = path.rsplit(".", 1)[-1]
+        own = {
+            name: available[f"{component}.{name}"] for name in SIGNALS.commands if f"{component}.{name}" in available
+        }
+        wrench = partial(_wrench, TERMS[key], {**available, **own}, _values(bound[path], value_of))
+        columns, arrays = _components(TERMS[key], block)
+        if len(arrays) <= UNROLL_UP_TO:
+            for row in arrays:
+                total += wrench(dict(zip(columns, row, strict=True)))
+        else:
+            entry = SX.sym("component", len(columns))
+            mapped.append((entry, wrench(dict(zip(columns, ca.vertsplit(entry), strict=True))), arrays))
+    return total, mapped
+
+
+def _components(term: Term, block: Mapping[str, Any]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and values (num_components, num_arguments) of what a term sums over; one empty row if it does not."""
+    if term.components is None:
+        return (), np.zeros((1, 0))
+    columns = term.components(**{name: block[name] for name in counts(term)})
+    return tuple(columns), np.column_stack(list(columns.values()))
+
+
+def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> Any:
+    """One term on its signals, found by name; `entries` are those of one component."""
+    here = {**available, **entries}
+    return term.function(*(here[name] for name in signals(term.function)), **keywords)
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:
