@@ -402,7 +402,9 @@ def _table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) ->
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(*columns, box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(Text(column))  # as text: rich would take [m] for markup
     for row in rows:
         table.add_row(*(Text(str(cell)) for cell in row))
     return table

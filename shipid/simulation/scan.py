@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import signal
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
@@ -70,12 +73,29 @@ def run_casadi(
     mapped = scan.map(num_samples, "thread", min(os.cpu_count() or 1, num_samples))
     records, worst = [], []
     for values in batch.parameters:
-        found = np.array(mapped(*inputs, np.tile(values[:, None], (1, num_samples))))
+        with uninterrupted():
+            found = np.array(mapped(*inputs, np.tile(values[:, None], (1, num_samples))))
         path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, rows])
         worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so
     return np.stack(records, axis=1), np.stack(worst)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold back Ctrl-C until a call into CasADi is over: there it would turn into a complaint about arguments."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if held:
+        raise KeyboardInterrupt
 
 
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
@@ -106,6 +126,7 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
         ],
     ).mapaccum(count)
     values = np.array(list(vessel.parameters.values()))[:, None]
-    after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
+    with uninterrupted():
+        after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
     states = np.concatenate([first[:, None], after], axis=1)
     return dict(zip(model.memory, states, strict=True))

@@ -219,12 +219,14 @@ def _gaps(results: Results, claims: Claims, N_D: int) -> pd.Series:
 def _worst_share(results: Results, N_D: int) -> tuple[str, float]:
     """Which predictor, physics alone included, is most often worst over the horizon; share of steps where `none` is."""
     curves: dict[str, list[np.ndarray]] = {}
+    claims = results.plan.study.claims
+    aside = {model.name for model in results.plan.models if claims and model.family in claims.aside}
     for row in results.cells[results.cells["N_D"] == N_D].itertuples():
-        if row.cell in results.paths:
+        if row.cell in results.paths and row.model not in aside:
             error = position_error(results.paths[str(row.cell)], results.test.future)
             curves.setdefault(str(row.model), []).append(over_horizon(error)["mean"])
     for model, path in results.physics.items():
-        if model != NO_MODEL and np.isfinite(path).all():
+        if model not in (NO_MODEL, *aside) and np.isfinite(path).all():
             error = position_error(path, results.test.future)
             curves[f"{model} alone"] = [over_horizon(error)["mean"]]
     names = list(curves)

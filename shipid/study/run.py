@@ -8,7 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -23,6 +23,7 @@ from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
+from shipid.simulation.scan import uninterrupted
 from shipid.study import store
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, envelope, limits, obtain, own_vessel, prepare
@@ -219,10 +220,8 @@ def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[A
                 yield client
             return
         count = min(workers or os.cpu_count() or 1, most)
-        with (
-            LocalCluster(
-                n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50, memory_limit=0
-            ) as cluster,
-            Client(cluster) as client,
-        ):
+        options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50, "memory_limit": 0}
+        with ExitStack() as stack:
+            with uninterrupted():  # half a cluster cannot be closed in good order
+                client = stack.enter_context(Client(stack.enter_context(LocalCluster(n_workers=count, **options))))
             yield client

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 from shipid.errors import DataError, ShipidError
 from shipid.simulation.integrate import Method
 from shipid.simulation.rollout import rollout
-from shipid.simulation.scan import memory_along
+from shipid.simulation.scan import memory_along, uninterrupted
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
@@ -266,3 +268,19 @@ def test_a_family_is_its_members_one_by_one(draw_inputs: Draw) -> None:
     for row, variant in enumerate(variants):
         alone = rollout(base.with_values(variant.values), **given, step=1.0, num_steps=10)
         np.testing.assert_allclose(together.states[:, row], alone.states[:, 0], rtol=1e-12)
+
+
+def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
+    reached = False
+    before = signal.getsignal(signal.SIGINT)
+
+    def work() -> None:
+        nonlocal reached
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            reached = True
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert reached
+    assert signal.getsignal(signal.SIGINT) is before
