@@ -74,7 +74,7 @@ def rollout(
     memory : hidden state -> (S,); default: each actuator has reached its first command.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     keep : channels to record, default all states and memories.
-    engine : `casadi`, `torch` (eager), `compiled` (torch.compile), or by size.
+    engine : `casadi`, `torch` (eager), `compiled` (one TorchInductor kernel a step), or `auto`: by size.
     """
     model = dynamics(vessel)
     if not start:
