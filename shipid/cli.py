@@ -234,6 +234,26 @@ def study_report(folder: Folder) -> None:
     typer.echo(str(_report(folder)))
 
 
+@study_app.command("compare")
+def study_compare(
+    folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],
+) -> None:
+    """Show findings and errors of one study in several worlds: other manoeuvres, families and training."""
+    from shipid.study.compare import compare_errors, compare_findings, read_worlds
+
+    worlds = read_worlds(folders)
+    found = compare_findings(worlds)
+    if len(found):
+        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [least, greatest]"]
+        values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in found.itertuples()]
+        _print(_table(words, zip(found["id"], found["verdicts"], found["number"], values, strict=True)))
+    errors = compare_errors(worlds)
+    errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
+    wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
+    columns = ["H [m]", *(f"N_D = {amount}" for amount in wide.columns)]
+    _print(_table(columns, wide.reset_index().to_numpy().tolist()))
+
+
 @app.command("predict")
 def predict(
     folder: Folder,
@@ -346,15 +366,18 @@ def _content(results: Results) -> ReportContent:
     from shipid.report import Finding, ReportContent, Sentence, Snapshot
     from shipid.study import advise
     from shipid.study import results as frames
+    from shipid.study.findings import findings
 
     return ReportContent(
         title=results.plan.study.question,
         name=results.plan.name,
         answer=[Sentence(text, figure) for text, figure in advise.answer(results)],
-        findings=[Finding(**finding) for finding in advise.findings(results)],  # type: ignore[arg-type]
+        findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=frames.naive_summary(results),
         models=results.models,
+        factors=frames.factors_frame(results),
+        trials=frames.trials_frame(results),
         horizon=frames.horizon_frame(results),
         over_time=frames.time_frame(results),
         commands=frames.commands_frame(results),

@@ -70,6 +70,15 @@ def digest(document: Any) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
 
+def merge(under: Document, over: Document) -> Document:
+    """A new document: `over` laid on `under`, table by table; anything else in `over` replaces what is there."""
+    result = dict(under)
+    for key, value in over.items():
+        below = result.get(key)
+        result[key] = merge(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return result
+
+
 def leaves(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted path and value of every leaf, in document order; entries of a list are addressed by index."""
     items: Any

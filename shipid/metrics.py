@@ -60,3 +60,43 @@ def over_time(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     mean: Array = error.mean(axis=0)
     return mean
+
+
+def roughness(paths: Array) -> float:
+    """Return the mean length [m] of the second difference over the horizon of paths (T, S, 2) [m], T at least 3.
+
+    Steady motion has (U^2 / R) h^2 at speed U, radius R and step h: compare with true paths, not with zero.
+    """
+    if len(paths) < 3 or paths.shape[-1:] != (2,):
+        raise ValueError(f"a second difference needs paths (T, S, 2) of 3 steps or more, got {paths.shape}")
+    second = np.diff(paths, n=2, axis=0)
+    return float(np.hypot(second[..., 0], second[..., 1]).mean())
+
+
+def error_by_axis(predicted: Array, true: Array) -> tuple[float, float]:
+    """Return the mean absolute error [m] along x and across, along y, of paths (T, S, 2) [m] in the frame (11)."""
+    along, across = np.abs(predicted - true).mean(axis=(0, 1))
+    return float(along), float(across)
+
+
+def rank_correlation(first: Array, second: Array) -> float:
+    """Return Spearman's rank correlation of two samples (n,), ties sharing their mean rank; 0 if one is constant."""
+    if np.ptp(first) == 0 or np.ptp(second) == 0:
+        return 0.0
+    return float(np.corrcoef(_ranks(first), _ranks(second))[0, 1])
+
+
+def _ranks(values: Array) -> Array:
+    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
+    ranks: Array = (np.cumsum(counts) - (counts - 1) / 2)[place]
+    return ranks
+
+
+def median_slope(x: Array, y: Array) -> float:
+    """Return the median slope of y over x (n,) over all pairs of points (Theil 1950, Sen 1968).
+
+    One point far off bends it little. NaN where no two x differ.
+    """
+    i, j = np.triu_indices(len(x), k=1)
+    apart = x[i] != x[j]
+    return float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else float("nan")

@@ -61,3 +61,40 @@ def test_shapes_that_cannot_be_meant_are_refused(paths):
         metrics.position_error(paths[0][..., 0], paths[1][..., 0])
     with pytest.raises(ValueError, match="no window"):
         metrics.summary(np.empty((30, 0)))
+
+
+def test_roughness_by_hand():
+    """A zigzag of 1 m has second differences of 2 m; a circle of radius R has (speed x step)^2 / R."""
+    zigzag = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 1.0]])[:, None, :]
+    assert metrics.roughness(zigzag) == pytest.approx(2.0)
+    angle = 0.01 * np.arange(30)
+    circle = 50.0 * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=-1)[:, None, :]
+    assert metrics.roughness(circle) == pytest.approx(0.5**2 / 50.0, rel=1e-4)
+    assert metrics.roughness(np.concatenate([zigzag, np.zeros_like(zigzag)], axis=1)) == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="3 steps or more"):
+        metrics.roughness(zigzag[:2])
+
+
+def test_errors_by_axis_bound_the_distance(paths):
+    along, across = metrics.error_by_axis(*paths)
+    assert along == pytest.approx(np.abs(paths[0][..., 0] - paths[1][..., 0]).mean())
+    assert max(along, across) <= metrics.position_error(*paths).mean() <= along + across
+    assert along != across
+
+
+def test_rank_correlation_knows_order_alone():
+    x = np.array([1.0, 2.0, 5.0, 9.0])
+    assert metrics.rank_correlation(x, np.exp(x)) == pytest.approx(1.0)
+    assert metrics.rank_correlation(x, -(x**3)) == pytest.approx(-1.0)
+    assert metrics.rank_correlation(x, np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)  # 1 - 6 x 2 / (4 x 15)
+    assert metrics.rank_correlation(np.array([1.0, 1.0, 2.0]), np.array([3.0, 3.0, 8.0])) == pytest.approx(1.0)
+    assert metrics.rank_correlation(x, np.ones(4)) == 0.0
+
+
+def test_median_slope_ignores_a_point_far_off():
+    x = np.arange(7.0)
+    y = 3.0 + 0.5 * x
+    y[6] = 100.0
+    assert metrics.median_slope(x, y) == pytest.approx(0.5)
+    assert metrics.median_slope(np.array([0.0, 0.0, 2.0]), np.array([5.0, 1.0, 3.0])) == pytest.approx(0.0)
+    assert np.isnan(metrics.median_slope(np.ones(3), np.arange(3.0)))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from shipid.physics import hull, thruster, wind
+from shipid.physics import hull, radiation, restoring, thruster, waves, wind
 
 
 @dataclass(frozen=True)
@@ -18,12 +18,20 @@ class Term:
     """A member of the sum of forces.
 
     function : signals (and component arrays) in, wrench (6) [N, N m] out.
-    components : for a sum over components, a function from structural numbers to one array per component argument;
+    components : for a sum over components, a function from structural keys to one array per component argument;
         `function` is then written for one component.
+    drawn : the same where components are drawn outside, for each sample of a rollout: from structural keys to the
+        width of each component argument.
+    states : for a term with states of its own, a function from its block to their names; `function` and `rates` then
+        take them as the signal `state`.
+    rates : d(state)/dt from signals; integrated with the motion. Takes what parameters of `function` it names.
     """
 
     function: Callable[..., Any]
     components: Callable[..., Mapping[str, Any]] | None = None
+    drawn: Callable[..., Mapping[str, int]] | None = None
+    states: Callable[[Mapping[str, Any]], tuple[str, ...]] | None = None
+    rates: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class Memory:
 class Signals:
     """Names and units of what a term may ask for by a positional argument."""
 
-    motion: tuple[str, ...] = ("eta", "nu", "nu_r", "psi")
+    motion: tuple[str, ...] = ("eta", "nu", "nu_r", "psi", "state")
     commands: Mapping[str, str] = field(default_factory=lambda: {"n": "rev/s", "alpha": "rad", "delta": "rad"})
     environment: Mapping[str, str] = field(
         default_factory=lambda: {"V_w": "m/s", "beta_w": "rad", "V_c": "m/s", "beta_c": "rad"}
@@ -52,6 +60,15 @@ TERMS: dict[str, Term] = {
     "hull.prime_derivatives": Term(hull.prime_derivatives),
     "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
     "hull.resistance": Term(hull.resistance),
+    "restoring.hydrostatic": Term(restoring.hydrostatic),
+    "radiation.heave_pitch": Term(
+        radiation.heave_pitch, states=radiation.heave_pitch_states, rates=radiation.heave_pitch_rates
+    ),
+    "radiation.roll": Term(radiation.roll, states=radiation.roll_states, rates=radiation.roll_rates),
+    "waves.first_order": Term(
+        waves.first_order, drawn=waves.first_order_widths, states=waves.clock, rates=waves.clock_rate
+    ),
+    "waves.drift": Term(waves.drift, drawn=waves.drift_widths),
     "wind.table": Term(wind.table),
     "wind.blendermann": Term(wind.blendermann),
     "thruster.azimuth": Term(thruster.azimuth),

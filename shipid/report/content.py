@@ -16,6 +16,7 @@ PathKey = tuple[str, str, int]
 DATA_DRIVEN = "none"  # the family (column `kind`) of the model without physics
 ANCHORS = (
     "findings",
+    "map",
     "gain",
     "horizon",
     "over-time",
@@ -24,10 +25,15 @@ ANCHORS = (
     "manoeuvres",
     "envelope",
     "repairs",
+    "factors",
     "models",
+    "search",
     "cells",
     "provenance",
 )
+# Columns of a trial; whatever else its frame holds is a searched hyperparameter.
+TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
+PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
 
 
 @dataclass(frozen=True)
@@ -99,13 +105,19 @@ class ReportContent:
     cells : one row per cell: model, kind, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
     naive : mean, p90, rms [m] of the floor of constant u, v, r.
-    models : model, family, A, A_90, A_rms [m], status, description.
+    models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
+        absolute error of the physics along x and y of the frame (11).
+    factors : one row per perturbed number of a model: model, path, group ("hull", "inertia", ...), factor [1]; a term
+        that was removed has factor 0.
+    trials : one row per trial of the search: cell, model, N_D, seed, number, state ("complete", "diverged",
+        "stopped"), value [m^2] (NaN where diverged), epochs, seconds, chosen, and one float column per searched
+        hyperparameter.
     horizon : model, N_D, seed, source, ahead [s], mean, p90 [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
     commands : run, t [s], one column per command in sailors' units, the unit in brackets: "port shaft [rpm]".
     snapshots : windows of the test runs.
     tracks : run, set ("train", "validation", "test", ...), north, east [m].
-    envelope : set, quantity, unit, min, mean, max.
+    envelope : set, quantity, unit, min, mean, max; the set "published" holds the numbers of the paper.
     repairs : kind, column, count, note.
     provenance : label -> value.
     study_document, command : the document as TOML text and the command that reproduces the study.
@@ -128,6 +140,8 @@ class ReportContent:
     snapshots: list[Snapshot] = field(default_factory=list)
     tracks: pd.DataFrame = field(default_factory=lambda: _empty("run", "set", "north", "east"))
     envelope: pd.DataFrame = field(default_factory=lambda: _empty("set", "quantity", "unit", "min", "mean", "max"))
+    factors: pd.DataFrame = field(default_factory=lambda: _empty("model", "path", "group", "factor"))
+    trials: pd.DataFrame = field(default_factory=lambda: _empty(*TRIAL))
     repairs: pd.DataFrame = field(default_factory=lambda: _empty("kind", "column", "count", "note"))
     provenance: Mapping[str, str] = field(default_factory=dict)
     study_document: str = ""

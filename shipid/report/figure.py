@@ -45,12 +45,26 @@ class Panel:
 
 @dataclass(frozen=True)
 class FixedWindow:
-    """A panel that shows one window of the browser: indices of run, instant and N_D among those offered there."""
+    """A panel that shows one window of the browser: indices of run, instant and N_D among those offered there.
+
+    `model` restricts it to the lines of one model; empty for those of all.
+    """
 
     caption: str
     run: int
     instant: int
     size: int
+    model: str = ""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What colours mean: a label with its unit, the smallest and largest value, the CSS variable of the gradient."""
+
+    label: str
+    low: float
+    high: float
+    gradient: str = "--scale"
 
 
 @dataclass(frozen=True)
@@ -64,7 +78,7 @@ class Figure:
     height : of one panel [px].
     windows : panels drawn from the windows of the page instead of views.
     browser : whether it is the window browser, instead of views.
-    scale : smallest and largest A [m] of the colour scale, if lines are coloured by it.
+    scale : the logarithmic colour scale, if there is one.
     """
 
     id: str
@@ -78,7 +92,7 @@ class Figure:
     chips: Sequence[Chip] = ()
     windows: Sequence[FixedWindow] = ()
     browser: bool = False
-    scale: tuple[float, float] | None = None
+    scale: Scale | None = None
 
 
 def label(text: str) -> str:
@@ -90,6 +104,12 @@ def axis(title: str, **options: Any) -> dict[str, Any]:
     """Make an axis; its title carries the unit."""
     base = {"gridcolor": GRID, "linecolor": GRID, "zeroline": False, "automargin": True}
     return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
+
+
+def logarithmic(title: str, steps: Sequence[int] = (1, 2, 5), **options: Any) -> dict[str, Any]:
+    """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
+    ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
+    return axis(title, type="log", **{"tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks], **options})
 
 
 def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
 from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, listed, metres
@@ -47,15 +47,23 @@ def gain(content: ReportContent) -> Figure:
 
 def unplotted(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
-    failed = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
-    names = [f"{row.model} at N_D = {row.N_D} ({row.status})" for row in failed.itertuples()]
+    names = []
+    for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=False):
+        failed = cells[cells.status.ne("ok") | cells.H.isna()]
+        if len(failed):
+            share = f", {len(failed)} of {len(cells)} seeds" if len(failed) < len(cells) else ""
+            names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
     return f" Not plotted: {listed(names, 6)}; reasons in the table of cells." if names else ""
 
 
 def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
-    looks = styles(content)
+    looks, span = styles(content), accuracy_range(content)
     order = [str(name) for name in families(content).model if name in set(content.cells.model)]
-    views = {str(i): [Panel(_lines(content, means, statistic, looks))] for i, statistic in enumerate(STATISTICS)}
+    views = {
+        f"{i}-{j}": [Panel(_lines(content, means, statistic, looks, log_axis))]
+        for i, statistic in enumerate(STATISTICS)
+        for j, log_axis in enumerate((False, True))
+    }
     accuracy = content.cells.groupby("model").A.first()
     chips = [
         Chip(
@@ -72,19 +80,25 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         title="What another manoeuvre buys",
         takeaway=_takeaway_sizes(content, means),
         how=HOW.format(seeds="the line joins their means and the pale points are the seeds")
-        + " Colour is A; the marker is the family; N_D counts manoeuvres to train and to validate."
+        + (" Colour is A; the" if span else " The")
+        + " marker is the family; N_D counts manoeuvres to train and to validate."
         + unplotted(content),
         alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
         "The numbers are in the table of cells.",
-        height=460,
+        height=460 if len(order) <= 10 else 560,
         views=views,
-        controls=[Control("Position error", [statistic.name for statistic in STATISTICS])],
+        controls=[
+            Control("Position error", [statistic.name for statistic in STATISTICS]),
+            Control("Axis", ["linear", "logarithmic"]),
+        ],
         chips=[*chips, Chip("naive", "constant velocity", NAIVE, "dash")],
-        scale=accuracy_range(content),
+        scale=Scale("error of the physics alone, A [m]", *span) if span else None,
     )
 
 
-def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style]) -> go.Figure:
+def _lines(
+    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style], log_axis: bool
+) -> go.Figure:
     sizes = sorted(content.cells.N_D.unique())
     traces = []
     for name, style in looks.items():
@@ -105,7 +119,8 @@ def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, lo
             traces[-1].opacity = 0.4
     traces.append(_floor(content, statistic, [sizes[0], sizes[-1]], across=True))
     x = axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
-    y = axis(f"position error, {statistic.name} [m]", rangemode="tozero")
+    title = f"position error, {statistic.name} [m]"
+    y = logarithmic(title) if log_axis else axis(title, rangemode="tozero")
     return go.Figure(traces, layout(x, y, hovermode="closest"))
 
 

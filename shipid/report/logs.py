@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import ReportContent
+from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line, plane
-from shipid.report.palette import category
+from shipid.report.palette import MUTED, category
 from shipid.report.selection import thinned
 from shipid.report.wording import counted, distance, listed, number
 
 TRAIN, TEST, VALIDATION = 0, 1, 2  # indices of the category colours
+NEAR = 0.2  # of the published range: an end this close is met
 PIXELS = 2000  # a track needs no more detail than extent / PIXELS
 
 
@@ -59,12 +60,15 @@ def envelope(content: ReportContent) -> Figure | None:
     frame = content.envelope
     if frame.empty:
         return None
+    frame = frame.iloc[frame["set"].eq(PUBLISHED).to_numpy().argsort(kind="stable")]
     panels = [Panel(_ranges(mine)) for _, mine in frame.groupby("quantity", sort=False)]
+    compared = " The open bar is what the paper published, not data of this study."
     return Figure(
         id="envelope",
         title="What the inputs cover",
         takeaway=_takeaway(frame),
-        how="Bar: smallest to largest value at the instants of prediction; dot: mean. The table below has the numbers.",
+        how="Bar: smallest to largest value at the instants of prediction; dot: mean. The table below has the numbers."
+        + (compared if frame["set"].eq(PUBLISHED).any() else ""),
         alternative="Ranges of the inputs per set; the table below holds the same numbers.",
         height=24 * frame["set"].nunique() + 74,
         views={"": panels},
@@ -81,9 +85,11 @@ def _ranges(mine: pd.DataFrame) -> go.Figure:
         bar = line(names[row], [numbers[0], numbers[2]], [row, row], [], line={"color": ink, "width": 5})
         dot = line(names[row], numbers[1:2], [row], [], mode="markers", marker={"color": ink, "size": 11})
         text = " / ".join(number(value) for value in numbers)
+        bar.opacity = 0.55
+        if names[row] == PUBLISHED:
+            bar, dot = _open_bar(numbers, row)
         for trace in (bar, dot):
             trace.hovertemplate = f"{label(names[row])}: {text} {label(unit)}<extra></extra>"
-        bar.opacity = 0.55
         traces += [bar, dot]
     y = axis("", tickvals=list(range(len(names))), ticktext=[label(name) for name in names], showgrid=False)
     y["range"] = [len(names) - 0.4, -0.6]
@@ -93,8 +99,38 @@ def _ranges(mine: pd.DataFrame) -> go.Figure:
     return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
 
 
+def _open_bar(numbers: Sequence[float], row: int) -> tuple[go.Scatter, go.Scatter]:
+    """Outline of a bar and an open dot: a range that somebody else found."""
+    low, mean, high = numbers
+    x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]
+    bar = line(PUBLISHED, x, y, [], line={"color": MUTED, "width": 1.5})
+    ink = {"symbol": "circle-open", "color": MUTED, "size": 9, "line": {"width": 2}}
+    return bar, line(PUBLISHED, [mean], [row], [], mode="markers", marker=ink)
+
+
 def _takeaway(frame: pd.DataFrame) -> str:
-    """Whether the test asks for anything outside what was trained on."""
+    """Whether the test asks for anything outside what was trained on, and how near the paper's ranges are."""
+    ours, published = frame[frame["set"] != PUBLISHED], frame[frame["set"] == PUBLISHED]
+    return " ".join(part for part in (_beyond(ours), _near(ours, published)) if part)
+
+
+def _near(ours: pd.DataFrame, published: pd.DataFrame) -> str:
+    """Count the ends of all sets together that lie within a fifth of the published range from the published end."""
+    if ours.empty or published.empty:
+        return ""
+    found, far = 0, []
+    for theirs in published.itertuples():
+        mine = ours[ours.quantity == theirs.quantity]
+        low, high = float(str(theirs.min)), float(str(theirs.max))
+        for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
+            found += bool(pd.notna(value))
+            if abs(float(value) - end) > NEAR * (high - low):
+                far.append(f"{word} of {theirs.quantity}")
+    text = f"{found - len(far)} of {found} published ends are met within {100 * NEAR:.0f} % of the published range"
+    return f"{text}; not {listed(far, 6)}." if far else f"{text}."
+
+
+def _beyond(frame: pd.DataFrame) -> str:
     is_test = frame["set"].map(lambda name: set_colour(name) == category(TEST))
     tested = frame[is_test].groupby("quantity", sort=False).agg(low=("min", "min"), high=("max", "max"))
     seen = frame[~is_test].groupby("quantity").agg(low=("min", "min"), high=("max", "max")).reindex(tested.index)

@@ -1,6 +1,6 @@
 "use strict";
 (() => {
-  const CONFIG = { responsive: true, displayModeBar: false, showTips: false };
+  const CONFIG = { responsive: true, displayModeBar: false, showTips: false, scrollZoom: false };
   const root = document.documentElement;
   const redraws = [];
   const json = (element) => JSON.parse(element.textContent || "null");
@@ -22,7 +22,15 @@
     const { data, layout } = painted(spec, getComputedStyle(root));
     for (const trace of data) trace.visible = !(trace.meta || []).some((key) => hidden.has(key));
     // Dragging would catch a finger that only wants to scroll the page.
-    layout.dragmode = matchMedia("(pointer: coarse)").matches ? false : "zoom";
+    const coarse = matchMedia("(pointer: coarse)").matches;
+    layout.dragmode = coarse ? false : "zoom";
+    if (layout.scene) {
+      layout.scene.dragmode = coarse ? false : "turntable";
+      // A scene fits its height; where the page is narrow it has to shrink.
+      const room = Math.min(1, plot.clientWidth / plot.clientHeight / 1.65);
+      const { x, y, z } = layout.scene.aspectratio;
+      layout.scene.aspectratio = { x: x * room, y: y * room, z: z * Math.min(1, 1.7 * room) };
+    }
     layout.uirevision = view;
     Plotly.react(plot, data, layout, CONFIG);
   }
@@ -78,17 +86,23 @@
   const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
   const pathsOf = (shot, size) => shot.paths.filter((path) => path[1] === size || path[1] === -1);
 
-  function drawWindow(plot, shot, size, hidden, view) {
+  function drawWindow(plot, shot, size, hidden, view, panel = {}) {
     const [x, y] = shot.truth;
     const end = x.length - 1;
     const truth = { x: y, y: x, mode: "lines", name: "true path", meta: ["truth"], line: windows.truth,
                     hovertemplate: "true path<extra></extra>" };
-    const lines = pathsOf(shot, size).map(([line, , ahead, aside]) => ({
+    const shown = pathsOf(shot, size).filter((path) => !panel.lines || panel.lines.includes(path[0]));
+    const lines = shown.map(([line, , ahead, aside]) => ({
       x: aside, y: ahead, mode: "lines", meta: windows.lines[line].keys, line: windows.lines[line].line,
       hovertemplate: `${escaped(windows.lines[line].name)}<extra></extra>`,
     }));
     const data = [truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
-    draw(plot, { data, layout: windows.layout }, hidden, view);
+    const layout = { ...windows.layout };
+    if (panel.spans) {
+      layout.xaxis = { ...layout.xaxis, range: panel.spans[0] };
+      layout.yaxis = { ...layout.yaxis, range: panel.spans[1] };
+    }
+    draw(plot, { data, layout }, hidden, view);
   }
 
   function showWind(place, wind) {
@@ -104,9 +118,9 @@
     const figure = script.closest("figure");
     const fixed = json(script);
     const panels = figure.querySelectorAll(".panel");
-    setUp(figure, (hidden) => fixed.forEach(([run, instant, size], i) => {
-      const shot = windows.runs[run][instant];
-      drawWindow(panels[i].querySelector(".plot"), shot, size, hidden, "fixed");
+    setUp(figure, (hidden) => fixed.forEach((panel, i) => {
+      const shot = windows.runs[panel.run][panel.instant];
+      drawWindow(panels[i].querySelector(".plot"), shot, panel.size, hidden, "fixed", panel);
       showWind(panels[i].querySelector(".wind"), shot.wind);
     }));
   }

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from shipid.errors import ResultError
-from shipid.report import errors_over, gain, logs, palette, paths, tables
+from shipid.report import error_map, errors_over, factors, gain, logs, palette, paths, search, tables
 from shipid.report.content import ReportContent
 from shipid.report.figure import Figure
 from shipid.report.tables import Table
@@ -32,15 +32,16 @@ class Section:
 def sections(content: ReportContent) -> list[Section]:
     """Follow the storyboard; a new figure is one more entry here."""
     listing = [
-        Section("results", "What physics and data buy", (gain.gain(content),)),
+        Section("results", "What physics and data buy", (error_map.error_map(content), gain.gain(content))),
         Section("errors", "Where the error grows", (errors_over.horizon(content), errors_over.over_time(content))),
         Section("predictions", "The predictions", (paths.browser(content), paths.snapshots(content))),
-        Section("the-models", "The models", (tables.models(content),)),
+        Section("the-models", "The models", (factors.factors(content), tables.models(content))),
         Section(
             "data",
             "The data",
             (logs.manoeuvres(content), logs.envelope(content), tables.envelope(content), tables.repairs(content)),
         ),
+        Section("the-search", "The search", (search.search(content), search.table(content))),
         Section("all-cells", "The cells", (tables.cells(content),)),
     ]
     return [section for section in listing if any(section.items)]
@@ -60,6 +61,11 @@ def render(content: ReportContent) -> str:
         anchors=anchors,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
         views={item.id: _embedded(_views(item)) for item in _figures(parts)},
+        fixed={
+            item.id: _embedded(paths.fixed_data(item.windows, windows))
+            for item in _figures(parts)
+            if item.windows and windows
+        },
         windows=_embedded(windows) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),

@@ -32,7 +32,7 @@ class Style:
 
 
 def variables(dark: bool) -> str:
-    """CSS declarations of the model colours: viridis cut to what stands out from the page, and Okabe-Ito."""
+    """CSS declarations: viridis for lines, cut to what stands out from the page, and whole for areas; Okabe-Ito."""
     ends = (0.28, 1.0) if dark else (0.0, 0.72)
     scale = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
     lines = [f"--scale-{i}: {colour};" for i, colour in enumerate(scale)]
@@ -40,6 +40,9 @@ def variables(dark: bool) -> str:
     named = (OKABE_ITO[-1], *OKABE_ITO[1:-1], OKABE_ITO[0]) if dark else OKABE_ITO
     lines += [f"--category-{i}: {colour};" for i, colour in enumerate(named)]
     lines.append(f"--scale: linear-gradient(90deg, {', '.join(scale)});")
+    whole = sample_colorscale("Viridis", list(np.linspace(0.0, 1.0, LEVELS)))
+    lines += [f"--heat-{i}: {colour};" for i, colour in enumerate(whole)]
+    lines.append(f"--heat: linear-gradient(90deg, {', '.join(whole)});")
     return " ".join(lines)
 
 
@@ -71,10 +74,13 @@ def styles(content: ReportContent) -> dict[str, Style]:
     return result
 
 
+def level(value: float, span: tuple[float, float]) -> int:
+    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off."""
+    low, high, here = np.log(np.maximum([*span, value], 1e-3))
+    return round(float(np.clip((here - low) / (high - low), 0, 1)) * (LEVELS - 1)) if high > low else 0
+
+
 def _by_accuracy(accuracy: float, span: tuple[float, float]) -> str:
-    """Colour on a logarithmic scale: degraded models are factors apart, and a few of them far off."""
-    low, high, value = np.log(np.maximum([*span, accuracy], 1e-3))
     if not np.isfinite(accuracy):  # A could not be found: its physics diverged
         return MUTED
-    share = (value - low) / (high - low) if high > low else 0.0
-    return f"var(--scale-{round(share * (LEVELS - 1))})"
+    return f"var(--scale-{level(accuracy, span)})"

@@ -6,17 +6,18 @@ The page holds every window once, as finely as a pixel can show, and draws it it
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import Floats, PathKey, ReportContent, Snapshot
+from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
 from shipid.report.figure import Chip, Control, Figure, FixedWindow, plane
 from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
-from shipid.report.selection import FEW_RUNS, data_driven, exemplars, sizes, spread, thinned
-from shipid.report.wording import counted, metres, number
+from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
+from shipid.report.wording import counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_WINDOWS = 600  # in all: with six models at three N_D this is about 3 MB of the page
@@ -70,33 +71,58 @@ def browser(content: ReportContent) -> Figure | None:
 
 
 def snapshots(content: ReportContent) -> Figure | None:
-    """One window at small, middle and large N_D; at a single N_D, three instants of one run. None without windows."""
+    """Draw some windows side by side, as in the paper's Fig. 7; None without windows.
+
+    With several N_D, one window: a row per model (data-driven and one of each of the two largest families) and a
+    column per N_D; with a single family, all models in one row. At a single N_D, three instants of one run.
+    """
     runs, counts = windows_of(content), window_sizes(content)
     if not runs:
         return None
-    names = list(runs)
+    names, models = list(runs), _compared(content)
     if len(counts) > 1:
         run, instant = _middle(runs)
-        caption = f"{names[run]}, t = {runs[names[run]][instant].t:g} s"
-        windows = [FixedWindow(f"{caption}, N_D = {c}", run, instant, i) for i, c in enumerate(counts)]
-        title, chosen = "One window, more and more data", "The window is the one of middle physics error."
+        window = runs[names[run]][instant]
+        where = f"{names[run]}, t = {window.t:g} s"
+        title, chosen = (
+            "One window, more and more data",
+            f"{where}: the window of middle physics error. All panels share their axes; physics alone may leave them.",
+        )
+        windows = [
+            FixedWindow(f"{name or where}, N_D = {c}", run, instant, i, name)
+            for name in models or [""]
+            for i, c in enumerate(counts)
+        ]
+        takeaway = _takeaway_models(window, models, counts) if models else _takeaway_row(content, [window] * 3, counts)
     else:
         run = max(range(len(names)), key=lambda i: len(runs[names[i]]))
         mine = runs[names[run]]
         instants = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
         windows = [FixedWindow(f"{names[run]}, t = {mine[i].t:g} s", run, i, 0) for i in instants]
         title, chosen = "Three instants of a test run", "Instants at one, three and five sixths of the run."
+        takeaway = _takeaway_row(content, [mine[i] for i in instants], counts * len(instants))
     return Figure(
         id="snapshots",
         title=title,
-        takeaway=_takeaway_windows(content, [runs[names[w.run]][w.instant] for w in windows], counts),
+        takeaway=takeaway,
         how=HOW + chosen,
-        alternative=f"{len(windows)} small plots of true and predicted paths; captions name run and instant.",
-        height=380,
+        alternative=f"{len(windows)} small plots of true and predicted paths; captions name what they show.",
+        height=300 if models and len(counts) > 1 else 380,
         views={},
-        chips=_chips(content),
+        chips=_chips(content, models if len(counts) > 1 else []),
         windows=windows,
     )
+
+
+def _compared(content: ReportContent) -> list[str]:
+    """Pure data-driven and one model of each of the two largest families, by A; empty if families are too few."""
+    recorded = {model for window in content.snapshots for model, source, _ in window.paths if source == "cooperative"}
+    middle = {family: name for family, name in middles(content).items() if name in recorded}
+    physics = [name for family, name in middle.items() if family != DATA_DRIVEN][:2]
+    if len(physics) < 2:
+        return []
+    order = [str(name) for name in families(content).model]
+    return [middle[DATA_DRIVEN]] * (DATA_DRIVEN in middle) + sorted(physics, key=order.index)
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:
@@ -134,6 +160,41 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     }
 
 
+def fixed_data(panels: Sequence[FixedWindow], data: dict[str, Any]) -> list[dict[str, Any]]:
+    """What page.js needs for panels that show a window of `window_data`: indices and lines.
+
+    Panels of one window share their axes, so that they can be compared; these reach over the true path and what was
+    compensated or learned, and physics alone may leave them.
+    """
+    together = {i for i, line in enumerate(data["lines"]) if "source:cooperative" in line["keys"]}
+    result = []
+    for panel in panels:
+        shot = data["runs"][panel.run][panel.instant]
+        lines = [
+            i
+            for i, line in enumerate(data["lines"])
+            if not panel.model or f"model:{panel.model}" in line["keys"] or "source:naive" in line["keys"]
+        ]
+        result.append({"run": panel.run, "instant": panel.instant, "size": panel.size, "lines": lines})
+        same = [other for other in panels if (other.run, other.instant) == (panel.run, panel.instant)]
+        if len(same) > 1:
+            models = {f"model:{other.model}" for other in same}
+            shown = {i for i in together if not panel.model or models & set(data["lines"][i]["keys"])}
+            result[-1]["spans"] = _spans(shot, shown)
+    return result
+
+
+def _spans(shot: dict[str, Any], lines: set[int]) -> list[list[float]]:
+    """Range of y, then of x [m] that holds the true path and those of some lines."""
+    spans = []
+    for place in (1, 0):
+        paths = [shot["truth"][place], *(path[2 + place] for path in shot["paths"] if path[0] in lines)]
+        values = [value for path in paths for value in path if value is not None]
+        spans.append([min(values), max(values)])
+    room = 0.06 * max(high - low for low, high in spans)
+    return [[round(low - room, 2), round(high + room, 2)] for low, high in spans]
+
+
 def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     style = styles(content).get(model)
     pure = model == data_driven(content)
@@ -146,9 +207,12 @@ def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     }
 
 
-def _chips(content: ReportContent) -> list[Chip]:
+def _chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
+    """Legend of the windows; of some models, if they are given."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
-    return [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
+    chips = [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
+    others = {f"model:{name}" for name in exemplars(content) if name not in only} if only else set()
+    return [chip for chip in chips if chip.key not in others]
 
 
 def _detail(windows: list[Snapshot]) -> float:
@@ -205,14 +269,25 @@ def _takeaway(content: ReportContent, size: int) -> str:
     )
 
 
-def _takeaway_windows(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
+def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
     """How far the compensated paths end from the truth in each panel."""
     pure, drawn = data_driven(content), exemplars(content)
-    chosen = counts if len(counts) > 1 else counts * len(windows)
     means = []
-    for window, size in zip(windows, chosen, strict=True):
+    for window, size in zip(windows, counts, strict=False):
         keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in drawn and k[0] != pure}
         means.append(_mean_end_error([window], keys))
     if not np.isfinite(means).any():
         return "No compensated path was recorded for these windows."
     return f"In this order, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."
+
+
+def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:
+    """How far each model ends from the truth, by rising N_D."""
+    parts = []
+    for name in models:
+        ends = [_mean_end_error([window], {(name, "cooperative", size)}) for size in counts]
+        alone = _mean_end_error([window], {(name, "physics", 0)})
+        text = f"{name} {', '.join(number(end) for end in ends)} m"
+        parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
+    sizes_said = listed([str(size) for size in counts])
+    return f"Distance from the true place at the end, with N_D = {sizes_said}: {'; '.join(parts)}."

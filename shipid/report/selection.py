@@ -37,14 +37,19 @@ def data_driven(content: ReportContent) -> str | None:
     return None if names.empty else str(names.iloc[0])
 
 
+def middles(content: ReportContent) -> dict[str, str]:
+    """Per family, the model of middle A; families of many members first, then by rising A."""
+    frame = families(content)
+    kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
+    groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
+    return {str(family): str(group.model.iloc[len(group) // 2]) for family, group in groups}
+
+
 def exemplars(content: ReportContent) -> list[str]:
     """Models drawn in close-ups: all of a few, else per family the one of middle A."""
-    frame = families(content)
-    if len(frame) <= FEW_MODELS:
-        return [str(name) for name in frame.model]
-    kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
-    middle = {str(group.model.iloc[len(group) // 2]) for _, group in kept.groupby("family")}
-    return [str(name) for name in frame.model if name in middle]
+    names = [str(name) for name in families(content).model]
+    middle = set(middles(content).values())
+    return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
 
 
 def sizes(values: pd.Series[int], count: int = 3) -> list[int]:

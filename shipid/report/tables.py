@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from shipid.report.content import ReportContent
+from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.wording import counted, listed, number
 
 
@@ -60,6 +60,9 @@ CELLS = {
     "rms": ("rms [m]", 2),
     "status": ("status", None),
     "seconds": ("time [s]", 0),
+    "trials": ("trials [1]", 0),
+    "stopped": ("stopped [1]", 0),
+    "diverged": ("diverged [1]", 0),
     "hyperparameters": ("chosen", None),
 }
 MODELS = {
@@ -68,6 +71,8 @@ MODELS = {
     "A": ("A [m]", 2),
     "A_90": ("A_90 [m]", 2),
     "A_rms": ("rms [m]", 2),
+    "A_along": ("A along [m]", 2),
+    "A_across": ("A across [m]", 2),
     "status": ("status", None),
     "description": ("what it is", None),
 }
@@ -83,9 +88,18 @@ def cells(content: ReportContent) -> Table:
     """Every cell of the study; a failed one says so where its numbers would stand."""
     frame = content.cells
     bad = int((frame.status.ne("ok") | frame.H.isna()).sum())
-    takeaway = f"{counted(len(frame), 'cell')} in {_duration(float(frame.seconds.sum()))} of computing; "
+    takeaway = f"{counted(len(frame), 'cell')} in {duration(float(frame.seconds.sum()))} of computing; "
     takeaway += f"{counted(bad, 'cell')} gave no result." if bad else "all gave a result."
-    return _table("cells", "Every cell", takeaway, frame, CELLS)
+    return _table("cells", "Every cell", takeaway, _with_trials(frame, content.trials), CELLS)
+
+
+def _with_trials(cells: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
+    """Cells with how many trials they had, and how many of them were stopped or diverged."""
+    if trials.empty:
+        return cells
+    states = pd.crosstab(trials.cell, trials.state).reindex(columns=["complete", "stopped", "diverged"], fill_value=0)
+    states = states.assign(trials=trials.groupby("cell").size()).drop(columns="complete")
+    return cells.merge(states, how="left", left_on="cell", right_index=True)
 
 
 def models(content: ReportContent) -> Table:
@@ -115,7 +129,7 @@ def envelope(content: ReportContent) -> Table | None:
     frame = content.envelope
     if frame.empty:
         return None
-    sets = [str(name) for name in pd.unique(frame["set"])]
+    sets = sorted((str(name) for name in pd.unique(frame["set"])), key=lambda name: name == PUBLISHED)
     rows = []
     for (quantity, unit), mine in frame.groupby(["quantity", "unit"], sort=False):
         by_set = mine.set_index("set")
@@ -149,7 +163,8 @@ def _table(
     return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Write a time as a reader would say it."""
     return (
         f"{seconds:.0f} s"
         if seconds < 120

@@ -17,7 +17,8 @@ class Batch:
     """Inputs of a rollout as plain arrays, channel first: the layout that both engines share.
 
     state (nx, S), memory (nm, S), commands (T, nc, S), environment (T, ne, S), tau_extra (T, n_dof, S) with T = 1 when
-    held over the horizon, parameters (V, P).
+    held over the horizon, parameters (V, P). state holds the hidden states of terms after eta and nu; components holds,
+    for each sum whose components are drawn, (num_entries, S, num_components).
     """
 
     state: Array
@@ -26,6 +27,7 @@ class Batch:
     environment: Array
     tau_extra: Array
     parameters: Array
+    components: tuple[Array, ...] = ()
 
 
 def integrate(

@@ -1,13 +1,14 @@
-"""A CasADi SX function as PyTorch: one tensor operation an instruction, so that whole batches go at once.
+"""A CasADi SX function in another language, one operation an instruction, so that whole batches go at once.
 
 The printer walks the instructions of the function. What depends on parameters alone, or on commands and weather, is
-printed into stages that run early; the rest broadcasts over (variant, sample). Nothing of the physics is written twice.
+printed into stages that run early; the rest goes over (variant, sample). Nothing of the physics is written twice.
+PyTorch is one dialect; the C of `shipid.simulation.native` is another.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,7 @@ import casadi as ca
 import numpy as np
 import torch
 
-_UNARY = {
+_UNARY: dict[int, str] = {
     ca.OP_NEG: "(-{0})",
     ca.OP_EXP: "torch.exp({0})",
     ca.OP_LOG: "torch.log({0})",
@@ -38,7 +39,7 @@ _UNARY = {
     ca.OP_FLOOR: "torch.floor({0})",
     ca.OP_CEIL: "torch.ceil({0})",
 }
-_BINARY = {
+_BINARY: dict[int, str] = {
     ca.OP_ADD: "({0} + {1})",
     ca.OP_SUB: "({0} - {1})",
     ca.OP_MUL: "({0} * {1})",
@@ -100,18 +101,52 @@ _NAMES = {
 
 
 @dataclass(frozen=True)
+class Dialect:
+    """How a language writes an operation, an assignment `a = ...`, a plain number, and a truth value as a number."""
+
+    operations: Mapping[int, str]
+    assignment: str
+    constant: Callable[[float], str]
+    number: str
+
+
+PYTORCH = Dialect(_UNARY | _BINARY, "    {0} = {1}", repr, "_number({0})")
+STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A function as text, in stages: what depends on early inputs alone is computed early, and once.
+
+    lines : of each stage, then of main; a value `a7` of an earlier stage is read as `s0[3]`.
+    saved : of each stage, what later ones read, in order.
+    outputs : text of each output entry, in order.
+    names, stage_of : the function's inputs in order, and the stage that takes each (main takes the last).
+    """
+
+    lines: tuple[tuple[str, ...], ...]
+    saved: tuple[tuple[str, ...], ...]
+    outputs: tuple[str, ...]
+    names: tuple[str, ...]
+    stage_of: tuple[int, ...]
+
+    def inputs(self, stage: int) -> list[str]:
+        """Names of the inputs that a stage takes."""
+        return [name for name, place in zip(self.names, self.stage_of, strict=True) if place == stage]
+
+
+@dataclass(frozen=True)
 class Lowered:
-    """A lowered function, in stages: what depends on early inputs alone is computed early, and once.
+    """A lowered function as PyTorch, in stages.
 
     early : one function a stage: (the stage's inputs, then what earlier stages saved) -> saved (num_saved, ...).
     main : the other inputs in the function's order, then what all stages saved -> list of output channels.
-    names, stage_of : the function's inputs in order, and the stage that takes each (main takes the last).
+    stage_of : the stage that takes each input of the function (main takes the last).
     num_instructions : of main.
     """
 
     early: tuple[Callable[..., torch.Tensor], ...]
     main: Callable[..., list[Any]]
-    names: tuple[str, ...]
     stage_of: tuple[int, ...]
     num_instructions: int
 
@@ -124,15 +159,27 @@ class Lowered:
         return list(saved[-1])
 
 
-STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
-
-
 def lower(function: ca.Function, stages: Sequence[Sequence[str]] = STAGES) -> Lowered:
     """Lower an SX function of dense vectors with one output; `stages` names the inputs that are known early.
 
     An instruction that has no PyTorch counterpart raises ValueError with its number.
     """
-    printer = _Printer(function, stages)
+    printed = print_function(function, stages, PYTORCH)
+    last = len(stages)
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack}
+    for number in range(last + 1):
+        arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])
+        saved = "" if number == last else ", ".join(printed.saved[number])
+        end = f"[{', '.join(printed.outputs)}]" if number == last else f"_stack([{arguments}], [{saved}])"
+        source = [f"def stage{number}({arguments}):", *printed.lines[number], f"    return {end}"]
+        exec(compile("\n".join(source), f"<lowered {function.name()}>", "exec"), space)
+    early = tuple(space[f"stage{number}"] for number in range(last))
+    return Lowered(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
+
+
+def print_function(function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> Printed:
+    """Print an SX function of dense vectors with one output; ValueError for an instruction the dialect lacks."""
+    printer = _Printer(function, stages, dialect)
     for k in range(function.n_instructions()):
         printer.instruction(k)
     return printer.finish()
@@ -148,17 +195,17 @@ class _Value:
 
 
 class _Printer:
-    """Prints instructions as Python lines, each in the earliest stage that knows its operands."""
+    """Prints instructions as lines, each in the earliest stage that knows its operands."""
 
-    def __init__(self, function: ca.Function, stages: Sequence[Sequence[str]]) -> None:
+    def __init__(self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> None:
         self.function = function
+        self.dialect = dialect
         self.names = [function.name_in(i) for i in range(function.n_in())]
-        self.stages = [[name for name in self.names if name in stage] for stage in stages]
-        early = {name: number for number, stage in enumerate(self.stages) for name in stage}
-        self.last = len(self.stages)
+        early = {name: number for number, stage in enumerate(stages) for name in stage}
+        self.last = len(stages)
         self.stage_of = [early.get(name, self.last) for name in self.names]
         self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
-        self.saved: list[dict[str, int]] = [{} for _ in self.stages]
+        self.saved: list[dict[str, int]] = [{} for _ in stages]
         self.slot: dict[int, _Value] = {}
         self.outputs: dict[int, _Value] = {}
 
@@ -177,37 +224,32 @@ class _Printer:
 
     def operation(self, k: int, operation: int, operands: list[_Value]) -> _Value:
         """Print an operation; one on numbers alone is done here and now."""
-        template = _UNARY.get(operation) or _BINARY.get(operation)
+        template = self.dialect.operations.get(operation)
         if template is None:
-            raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no PyTorch counterpart")
+            raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no counterpart")
         stage = max(operand.stage for operand in operands)
         if stage < 0:
             return _Value(repr(float(ca.evalf(_on_numbers(operation, [float(o.text) for o in operands])))), -1)
         bare = _TAKES_TRUTH.get(operation, 0)
         texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
-        self.lines[stage].append(f"    a{k} = {template.format(*texts)}")
+        self.lines[stage].append(self.dialect.assignment.format(f"a{k}", template.format(*texts)))
         return _Value(f"a{k}", stage, operation in _TRUTH)
 
     def use(self, value: _Value, stage: int, truth_is_fine: bool = False) -> str:
         """Text of a value inside a stage; one of an earlier stage is saved there, as a number."""
-        if value.stage in (-1, stage):
-            return f"_number({value.text})" if value.truth and not truth_is_fine else value.text
+        if value.stage < 0:
+            return self.dialect.constant(float(value.text))
+        if value.stage == stage:
+            return self.dialect.number.format(value.text) if value.truth and not truth_is_fine else value.text
+        text = self.dialect.number.format(value.text) if value.truth else value.text
         saved = self.saved[value.stage]
-        return f"s{value.stage}[{saved.setdefault(value.text, len(saved))}]"
+        return f"s{value.stage}[{saved.setdefault(text, len(saved))}]"
 
-    def finish(self) -> Lowered:
-        """Compile what was printed."""
-        result = ", ".join(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
-        space: dict[str, Any] = {**_NAMES, "_stack": _stack}
-        late = [name for name, stage in zip(self.names, self.stage_of, strict=True) if stage == self.last]
-        for number, inputs in enumerate([*self.stages, late]):
-            arguments = ", ".join([*inputs, *(f"s{earlier}" for earlier in range(number))])
-            end = f"[{result}]" if number == self.last else f"_stack([{arguments}], [{', '.join(self.saved[number])}])"
-            source = [f"def stage{number}({arguments}):", *self.lines[number], f"    return {end}"]
-            exec(compile("\n".join(source), f"<lowered {self.function.name()}>", "exec"), space)
-        early = tuple(space[f"stage{number}"] for number in range(self.last))
-        main = space[f"stage{self.last}"]
-        return Lowered(early, main, tuple(self.names), tuple(self.stage_of), len(self.lines[self.last]))
+    def finish(self) -> Printed:
+        """Everything that was printed."""
+        outputs = tuple(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
+        lines = tuple(tuple(stage) for stage in self.lines)
+        return Printed(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))
 
 
 def _on_numbers(operation: int, values: Sequence[float]) -> ca.SX:

@@ -7,22 +7,24 @@ samples), PyTorch runs it over whole batches (many windows, many variants). Both
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from shipid.errors import DataError, ShipidError, choices
+from shipid.physics.helm import Helmsman
 from shipid.simulation.integrate import Array, Batch, Method
+from shipid.simulation.native import compiler, run_native
 from shipid.simulation.scan import run_casadi
-from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
-Engine = Literal["auto", "casadi", "torch", "compiled"]
+Engine = Literal["auto", "casadi", "torch", "compiled", "native"]
 
 SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
-COMPILE_FROM = 5e8  # rate evaluations: below it a compilation costs more than it saves
+NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
+COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 
@@ -59,6 +61,8 @@ def rollout(
     parameters: Array | None = None,
     memory: Mapping[str, Array] | None = None,
     tau_extra: Array | None = None,
+    components: Mapping[str, Array] | None = None,
+    helmsman: Helmsman | None = None,
     keep: Sequence[str] | None = None,
     engine: Engine = "auto",
     device: str = "cpu",
@@ -71,28 +75,37 @@ def rollout(
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. Default: the vessel's own.
-    memory : hidden state -> (S,); default: each actuator has reached its first command.
+    memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
+    components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
+        from `shipid.simulation.sea`; default: none, calm water.
+    helmsman : gives the orders in place of the commands, which are then what he is told; see `simulation.manoeuvre`.
     keep : channels to record, default all states and memories.
-    engine : `casadi`, `torch` (eager), `compiled` (one TorchInductor kernel a step), or `auto`: by size.
+    engine : `native` (C on SIMD vectors and threads), `casadi` (its virtual machine, sample by sample), `torch`
+        (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
+    device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
     """
-    model = dynamics(vessel)
+    model = dynamics(vessel, helmsman)
     if not start:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
     num_samples = len(next(iter(start.values())))
     values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
     if values.shape[1] != len(model.parameters):
         raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), found {values.shape}")
-    command_array = _channels(model.commands, commands, num_samples, num_steps, "command", vessel)
+    at_rest = dict.fromkeys(model.hidden, np.zeros(num_samples))
     batch = Batch(
-        state=_channels(model.state, start, num_samples, num_steps, "state", vessel)[0],
-        memory=_memory(model, memory, command_array, num_samples, num_steps, vessel),
-        commands=command_array,
+        state=_channels((*model.state, *model.hidden), {**at_rest, **start}, num_samples, num_steps, "state", vessel)[
+            0
+        ],
+        memory=np.zeros((0, num_samples)),
+        commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
         environment=_channels(model.environment, environment or {}, num_samples, num_steps, "environment", vessel),
         tau_extra=_tau(tau_extra, model.num_dof, num_samples, num_steps),
         parameters=values,
+        components=_components(model, components or {}, num_samples),
     )
-    names = (*model.state, *(f"actual.{name}" for name in model.memory))
+    batch = replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
+    names = (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
     kept = tuple(names if keep is None else keep)
     unknown = next((name for name in kept if name not in names), None)
     if unknown is not None:
@@ -101,14 +114,16 @@ def rollout(
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, found {num_steps} and {every}")
     work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1)
-    chosen = _by_size(work, num_samples * len(values)) if engine == "auto" else engine
-    if chosen == "compiled" and device == "cpu" and not _has_compiler():
-        raise ShipidError("engine 'compiled' needs a C++ compiler, and there is none: install g++, or use 'torch'")
+    chosen = _by_size(work, num_samples * len(values), device) if engine == "auto" else engine
+    if chosen in ("native", "casadi") and device != "cpu":
+        raise ShipidError(f"engine {chosen!r} runs on the CPU: use 'torch' or 'compiled' on {device!r}")
     if num_samples == 0:
         raise ShipidError("a rollout needs at least one sample")
     with np.errstate(all="ignore"):
         if chosen == "casadi":
             records, worst = run_casadi(model, batch, step, num_steps, method, every, rows)
+        elif chosen == "native":
+            records, worst = run_native(model, batch, step, num_steps, method, every, rows)
         else:
             from shipid.simulation.batched import run_torch
 
@@ -119,22 +134,18 @@ def rollout(
 
 def _finite(batch: Batch) -> Array:
     """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
-    inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra)
+    drawn = (part.swapaxes(1, 2) for part in batch.components)
+    inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
     samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 
 
-def _by_size(work: float, width: int) -> Engine:
-    if width < BATCH_FROM:
-        return "casadi"
-    return "compiled" if work > COMPILE_FROM and _has_compiler() else "torch"
-
-
-@lru_cache
-def _has_compiler() -> bool:
-    import shutil
-
-    return any(shutil.which(name) for name in ("g++", "clang++", "c++"))
+def _by_size(work: float, width: int, device: str) -> Engine:
+    if device != "cpu":
+        return "compiled" if work > COMPILE_FROM else "torch"
+    if work > NATIVE_FROM and compiler() is not None:
+        return "native"
+    return "casadi" if width < BATCH_FROM else "torch"
 
 
 def _channels(
@@ -158,17 +169,34 @@ def _channels(
     return np.stack(stacked, axis=1) if stacked else np.zeros((1, 0, num_samples))
 
 
-def _memory(
-    model: Dynamics,
-    memory: Mapping[str, Array] | None,
-    commands: Array,
-    num_samples: int,
-    num_steps: int,
-    vessel: Vessel,
-) -> Array:
-    if memory is None:
-        return np.asarray(commands[0, [model.commands.index(name) for name in model.memory]])
-    return np.asarray(_channels(tuple(model.memory), memory, num_samples, num_steps, "memory", vessel)[0])
+def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, num_steps: int, vessel: Vessel) -> Array:
+    """Hidden memories (nm, S) at the start: as given, else what a helmsman begins with and orders already reached."""
+    num_samples = batch.state.shape[1]
+    begun = model.helmsman.memory if model.helmsman else {}
+    helm = {f"{HELM}.{name}": np.full(num_samples, float(value)) for name, value in begun.items()}
+    if memory is not None:
+        return np.asarray(
+            _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel)[0]
+        )
+    unknown = np.zeros((len(model.memory) - len(helm), num_samples))
+    known = np.concatenate([np.array(list(helm.values())).reshape(-1, num_samples), unknown])
+    inputs = (batch.state, known, batch.commands[0], batch.environment[0], batch.parameters[:1].T)
+    orders = dict(zip(model.ordered, np.array(model.orders.map(num_samples)(*inputs)), strict=True))
+    return np.array([helm[name] if name in helm else orders[name] for name in model.memory]).reshape(-1, num_samples)
+
+
+def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
+    """Drawn components, channel first, for each sum that has them; still water where none are given."""
+    result = []
+    for term in model.drawn:
+        entries = sum(term.widths.values())
+        found = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
+        if found.ndim != 3 or found.shape[::2] != (num_samples, entries):
+            raise ShipidError(
+                f"components of {term.path} must be ({num_samples}, count, {entries}), found {found.shape}"
+            )
+        result.append(np.ascontiguousarray(found.transpose(2, 0, 1)))
+    return tuple(result)
 
 
 def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:

@@ -19,18 +19,32 @@ from shipid.vessel.load import Vessel
 
 
 @lru_cache(maxsize=32)
-def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, every: int) -> ca.Function:
-    """One sample: ([state, memory, greatest speed], commands, environment, tau, parameters) -> records of the first."""
-    state, memory = ca.MX.sym("state", len(model.state)), ca.MX.sym("memory", len(model.memory))
+def casadi_scan(
+    model: Dynamics, step: float, num_steps: int, method: Method, every: int, counts: tuple[int, ...] = ()
+) -> ca.Function:
+    """One sample: ([state, memory, greatest speed], commands, environment, tau, fixed) -> records of the first.
+
+    fixed is what does not change from step to step: the parameters, then the components that are drawn for the sample,
+    so many of each drawn sum as `counts` says.
+    """
+    num_states = len(model.state) + len(model.hidden)
+    state, memory = ca.MX.sym("state", num_states), ca.MX.sym("memory", len(model.memory))
     commands, environment = ca.MX.sym("commands", len(model.commands)), ca.MX.sym("environment", len(model.environment))
-    tau, parameters = ca.MX.sym("tau", model.num_dof), ca.MX.sym("parameters", len(model.parameters))
+    tau = ca.MX.sym("tau", model.num_dof)
+    sizes = [sum(term.widths.values()) for term in model.drawn]
+    places = np.cumsum([0, len(model.parameters), *(n * size for n, size in zip(counts, sizes, strict=True))])
+    fixed = ca.MX.sym("fixed", int(places[-1]))
+    parameters, *drawn = ca.vertsplit(fixed, places.tolist())
+    entries = {
+        term.path: ca.reshape(part, size, -1) for term, part, size in zip(model.drawn, drawn, sizes, strict=True)
+    }
 
     def rates(x: Any, m: Any) -> Any:
         total = tau
         for term in model.sums:
-            mapped = term.function.map(len(term.arrays))
-            columns = [ca.repmat(a, 1, len(term.arrays)) for a in (x, m, commands, environment, parameters)]
-            total = total + ca.sum2(mapped(*columns, ca.DM(term.arrays.T)))
+            own = entries[term.path] if term.arrays is None else ca.DM(term.arrays.T)
+            columns = [ca.repmat(a, 1, own.shape[1]) for a in (x, m, commands, environment, parameters)]
+            total = total + ca.sum2(term.function.map(own.shape[1])(*columns, own))
         return model.rates(x, m, commands, environment, parameters, total)
 
     def advance(m: Any, dt: float) -> Any:
@@ -40,29 +54,33 @@ def casadi_scan(model: Dynamics, step: float, num_steps: int, method: Method, ev
     after, memory_after = integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
     one = ca.Function(
         "step",
-        [ca.vertcat(state, memory, greatest), commands, environment, tau, parameters],
-        [ca.vertcat(after, memory_after, ca.fmax(greatest, ca.mmax(ca.fabs(after[model.num_dof :]))))],
+        [ca.vertcat(state, memory, greatest), commands, environment, tau, fixed],
+        [
+            ca.vertcat(
+                after, memory_after, ca.fmax(greatest, ca.mmax(ca.fabs(after[model.num_dof : 2 * model.num_dof])))
+            )
+        ],
     )
     if every > 1:
         x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), every)
         e, t = ca.MX.sym("e", len(model.environment), every), ca.MX.sym("t", model.num_dof, every)
-        inner = one.mapaccum(every)(x, c, e, t, ca.repmat(parameters, 1, every))
-        one = ca.Function("steps", [x, c, e, t, parameters], [inner[:, -1]])
+        inner = one.mapaccum(every)(x, c, e, t, ca.repmat(fixed, 1, every))
+        one = ca.Function("steps", [x, c, e, t, fixed], [inner[:, -1]])
     count = num_steps // every
     x = ca.MX.sym("x", one.size1_in(0))
     c, e = ca.MX.sym("c", len(model.commands), num_steps), ca.MX.sym("e", len(model.environment), num_steps)
     t = ca.MX.sym("t", model.num_dof, num_steps)
-    path = one.mapaccum(count)(x, c, e, t, ca.repmat(parameters, 1, count))
-    return ca.Function("rollout", [x, c, e, t, parameters], [path])
+    path = one.mapaccum(count)(x, c, e, t, ca.repmat(fixed, 1, count))
+    return ca.Function("rollout", [x, c, e, t, fixed], [path])
 
 
 def run_casadi(
     model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
 ) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
-    scan = casadi_scan(model, step, num_steps, method, every)
+    scan = casadi_scan(model, step, num_steps, method, every, tuple(drawn.shape[2] for drawn in batch.components))
     num_samples, num_records = batch.state.shape[1], num_steps // every
-    greatest = np.abs(batch.state[model.num_dof :]).max(axis=0, keepdims=True)
+    greatest = np.abs(batch.state[model.num_dof : 2 * model.num_dof]).max(axis=0, keepdims=True)
     start = np.concatenate([batch.state, batch.memory, greatest])
 
     def over_time(held: Array) -> Array:  # (T, C, S) -> (C, S * num_steps), a sample's steps side by side
@@ -71,10 +89,11 @@ def run_casadi(
 
     inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
     mapped = scan.map(num_samples, "thread", min(os.cpu_count() or 1, num_samples))
+    drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
     records, worst = [], []
     for values in batch.parameters:
         with uninterrupted():
-            found = np.array(mapped(*inputs, np.tile(values[:, None], (1, num_samples))))
+            found = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
         path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, rows])
@@ -121,7 +140,12 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
         ],
         [
             model.advance(
-                ca.MX.zeros(len(model.state)), memory, order, ca.MX.zeros(len(model.environment)), parameters, dt
+                ca.MX.zeros(len(model.state) + len(model.hidden)),
+                memory,
+                order,
+                ca.MX.zeros(len(model.environment)),
+                parameters,
+                dt,
             )
         ],
     ).mapaccum(count)

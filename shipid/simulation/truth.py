@@ -1,4 +1,4 @@
-"""A simulated truth: seeded draws of manoeuvres and weather, run as one batch, logged like a sea trial."""
+"""A simulated truth: seeded draws of manoeuvres, weather and sea, run as one batch, logged like a sea trial."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.errors import DocumentError
-from shipid.simulation.rollout import rollout
+from shipid.simulation import gusts
+from shipid.simulation.gusts import Gusts
+from shipid.simulation.rollout import Trajectories, rollout
+from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.sensors import Sensor, measure
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
@@ -39,6 +43,10 @@ class Truth(BaseModel):
     n_rpm: Range = (50.0, 200.0)
     alpha_deg: Range = (-50.0, 50.0)
     wind_speed: Range = (0.0, 6.0)
+    gusts: Gusts | None = None
+    waves: Sea | None = None
+    current_speed: Annotated[Range, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
+    sensors: dict[str, Sensor] = Field(default={}, description="logged column -> sensor model")
     start_speed: Annotated[Range, Field(description="m/s ahead at the start of a manoeuvre")] = (0.0, 0.0)
     actuators_at: Annotated[
         Literal["order", "rest"], Field(description="where lagged actuators stand when the manoeuvre starts")
@@ -50,7 +58,7 @@ class Truth(BaseModel):
             raise ValueError(f"interval {self.interval:g} s must be a multiple of step {self.step:g} s")
         if self.duration < self.interval:
             raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
-        for name in ("n_rpm", "alpha_deg", "wind_speed", "start_speed"):
+        for name in ("n_rpm", "alpha_deg", "wind_speed", "current_speed", "start_speed"):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"{name} runs backwards: give [low, high], found [{low:g}, {high:g}]")
@@ -60,25 +68,37 @@ class Truth(BaseModel):
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Run all manoeuvres in one batch and log them: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
-    Both propulsors take the same orders, from t = 0 on; the wind is constant. Raises DocumentError if one diverges.
+    Both propulsors take the same orders, from t = 0 on; mean wind, current and the direction of the waves are constant.
+    What is logged is that of the origin, the centre of gravity projected on the calm waterline: u and v horizontal,
+    along and across the heading, and r = d(psi)/dt. Raises DocumentError if a manoeuvre diverges.
     """
     model = dynamics(vessel)
-    start, commands, environment = _draw(truth, model.commands, model.environment)
-    steps_a_row = round(truth.interval / truth.step)
+    if truth.waves is not None and not model.drawn:
+        raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
+    if truth.current_speed != (0.0, 0.0) and "V_c" not in model.environment:
+        raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
+    start, commands, environment, chi = _draw(truth, model.commands, model.environment)
     rows = int(truth.duration / truth.interval + 1e-9)
-    at_rest = {name: np.zeros(truth.manoeuvres) for name in model.memory} if truth.actuators_at == "rest" else None
+    steps_a_row = round(truth.interval / truth.step)
+    every = 1 if truth.sensors else steps_a_row
+    num_steps = rows * steps_a_row
+    weather = dict(environment)
+    if truth.gusts is not None and "V_w" in weather:
+        keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]
+        time = truth.step * np.arange(num_steps + 1, dtype=float)
+        weather["V_w"] = environment["V_w"] + gusts.series(truth.gusts, environment["V_w"], time, keys)
     path = rollout(
         vessel,
         start,
         commands,
-        environment,
+        {name: values if values.ndim == 1 else values[:-1] for name, values in weather.items()},
         step=truth.step,
-        num_steps=rows * steps_a_row,
-        every=steps_a_row,
+        num_steps=num_steps,
+        every=every,
         method=truth.method,
-        memory=at_rest,
+        memory=dict.fromkeys(model.memory, np.zeros(truth.manoeuvres)) if truth.actuators_at == "rest" else None,
+        components=_sea(truth, vessel, chi),
         keep=model.state,
-        engine="casadi",
     )
     if path.diverged.any():
         worst = int(np.argmax(path.diverged[0]))
@@ -87,17 +107,45 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
             f"{truth.step:g} s or narrower ranges",
             path="truth",
         )
-    names = run_names(truth.manoeuvres)
-    frame = pd.DataFrame(
-        {"run": np.repeat(names, rows + 1), "t": np.tile(np.arange(rows + 1) * truth.interval, len(names))}
-    )
-    for name in model.state:
-        frame["z" if name == "down" else name] = path[name][:, 0].T.ravel()
-    measured = {name: values for name, values in environment.items() if name in ON_BOARD}
-    for name, values in {**commands, **measured}.items():
-        frame[name] = np.repeat(values, rows + 1)
+    measured = {name: values[::every] if values.ndim == 2 else values for name, values in weather.items()}
+    frame = _logged(path, {**commands, **{name: measured[name] for name in ON_BOARD if name in measured}})
+    if truth.sensors:
+        frame = measure(frame, truth.sensors, truth.interval, truth.seed)
     frame["flags"] = 0
     return frame
+
+
+def _sea(truth: Truth, vessel: Vessel, chi: np.ndarray) -> dict[str, np.ndarray] | None:
+    """Wave loads of every manoeuvre's own sea; None in calm water."""
+    if truth.waves is None:
+        return None
+    names = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]
+    return wave_loads(vessel, draw_components(truth.waves, chi, names))
+
+
+def _logged(path: Trajectories, beside: dict[str, np.ndarray]) -> pd.DataFrame:
+    """Records as rows of a log; `beside` are orders and weather, (S,) or (R, S)."""
+    count, _, num_samples, _ = path.states.shape
+    names = run_names(num_samples)
+    time = np.arange(count) * path.interval
+    columns: dict[str, np.ndarray] = {}
+    for name in path.names:
+        columns["z" if name == "down" else name] = path[name][:, 0].T.ravel()
+    columns |= _horizontal(columns)
+    for name, values in beside.items():
+        columns[name] = np.broadcast_to(values, (count, num_samples)).T.ravel()
+    return pd.DataFrame({"run": np.repeat(names, count), "t": np.tile(time, num_samples), **columns})
+
+
+def _horizontal(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Horizontal u and v along and across the heading, r = d(psi)/dt (Fossen 2021, eqs. 2.31 and 2.40)."""
+    zero = np.zeros_like(columns["u"])
+    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
+    u, v, r = columns["u"], columns["v"], columns["r"]
+    across = v * np.cos(phi) - w * np.sin(phi)
+    down = v * np.sin(phi) + w * np.cos(phi)
+    turning = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
+    return {"u": u * np.cos(theta) + down * np.sin(theta), "v": across, "r": turning}
 
 
 def run_names(count: int) -> list[str]:
@@ -107,19 +155,24 @@ def run_names(count: int) -> list[str]:
 
 def _draw(
     truth: Truth, command_names: tuple[str, ...], environment_names: tuple[str, ...]
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Start, commands and environment of every manoeuvre, name -> (manoeuvres,), SI."""
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
+    """Start, commands and environment of every manoeuvre, name -> (manoeuvres,), and where its waves go; SI."""
 
     def between(quantity: str, limits: tuple[float, float], unit: float = 1.0) -> np.ndarray:
         low, high = limits
         draws = [uniform(truth.seed, "manoeuvre", number, quantity) for number in range(truth.manoeuvres)]
         return (low + (high - low) * np.array(draws)) * unit
 
-    zero = np.zeros(truth.manoeuvres)
+    zero, around = np.zeros(truth.manoeuvres), (0.0, 360.0)
     start = dict.fromkeys(("north", "east", "down", "phi", "theta", "v", "w", "p", "q", "r"), zero)
-    start |= {"psi": between("psi", (0.0, 360.0), DEGREE), "u": between("start_speed", truth.start_speed)}
+    start |= {"psi": between("psi", around, DEGREE), "u": between("start_speed", truth.start_speed)}
     orders = {"n": between("n", truth.n_rpm, RPM), "alpha": between("alpha", truth.alpha_deg, DEGREE)}
     orders["delta"] = orders["alpha"]
     commands = {name: orders[name.rpartition(".")[2]] for name in command_names}
-    weather = {"V_w": between("V_w", truth.wind_speed), "beta_w": between("beta_w", (0.0, 360.0), DEGREE)}
-    return start, commands, {name: weather.get(name, zero) for name in environment_names}
+    weather = {
+        "V_w": between("V_w", truth.wind_speed),
+        "beta_w": between("beta_w", around, DEGREE),
+        "V_c": between("V_c", truth.current_speed),
+        "beta_c": between("beta_c", around, DEGREE),
+    }
+    return start, commands, {name: weather[name] for name in environment_names}, between("chi", around, DEGREE)

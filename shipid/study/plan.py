@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,12 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
+WORLDS = 1000  # top-level `seed` times this is added to every other seed
+PUBLISHED = {  # key of a published envelope -> signal, factor to SI
+    **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
+    "n_rpm": ("n", 1 / 60),
+    **{f"{name}_deg": (name, math.pi / 180) for name in ("r", "alpha", "delta")},
+}
 
 
 class Strict(BaseModel):
@@ -77,11 +84,48 @@ class Grid(Strict):
 
 
 class Claims(Strict):
-    """`[claims]`: families that findings R1-R4 of the method speak of."""
+    """`[claims]`: families that the findings of the method speak of: R1-R4 at full scale, S1-S7 in simulation."""
 
-    accurate: str
-    inaccurate: str
+    accurate: str | None = Field(default=None, description="with `inaccurate`: findings R1-R4")
+    inaccurate: str | None = None
+    moderate: str | None = Field(default=None, description="with `high`: findings S1-S7")
+    high: str | None = None
+    nominal: str | None = Field(default=None, description="the base as it is: the floor, in no claim")
     aside: list[str] = Field(default=[], description="families that saw the test runs: shown, but in no claim")
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Claims:
+        for one, other in (("accurate", "inaccurate"), ("moderate", "high")):
+            if (getattr(self, one) is None) != (getattr(self, other) is None):
+                raise ValueError(f"`{one}` and `{other}` go together")
+        return self
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """Role -> family, of the roles that are given."""
+        every = ("accurate", "inaccurate", "moderate", "high", "nominal")
+        return {role: getattr(self, role) for role in every if getattr(self, role) is not None}
+
+    @property
+    def not_judged(self) -> set[str]:
+        """Families that no claim and no sentence of the answer counts among degraded models."""
+        return {*self.aside, *([self.nominal] if self.nominal else [])}
+
+
+class Published(Strict):
+    """`[published]`: the input envelope that others report, to be shown beside the study's own."""
+
+    source: Annotated[str, Field(min_length=3)]
+    envelope: dict[str, list[FiniteFloat]] = Field(description="key -> [min, mean, max]")
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Published:
+        for key, limits in self.envelope.items():
+            if key not in PUBLISHED:
+                raise ValueError(f"envelope.{key} is no input: {choices(key, PUBLISHED)}")
+            if len(limits) != 3 or limits != sorted(limits):
+                raise ValueError(f"envelope.{key}: give [min, mean, max], found {limits}")
+        return self
 
 
 class Study(Strict):
@@ -89,6 +133,7 @@ class Study(Strict):
 
     question: Annotated[str, Field(min_length=3)]
     description: str | None = None
+    seed: NonNegativeInt = Field(default=0, description="another world: other manoeuvres, families, data, training")
     truth: Truth | None = None
     data: Data | None = None
     split: Split
@@ -96,6 +141,7 @@ class Study(Strict):
     grid: Grid
     recipe: dict[str, Any] = {"kind": "fast"}
     claims: Claims | None = None
+    published: Published | None = None
     family: Annotated[list[Family], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -103,6 +149,18 @@ class Study(Strict):
         if (self.truth is None) == (self.data is None):
             raise ValueError("give either [truth] (simulation) or [data] (recorded runs)")
         return self
+
+    def in_its_world(self) -> Study:
+        """Return the study with `WORLDS` times its top-level seed added to the seeds of truth, split, grid, families.
+
+        Seed 0 leaves all as they are; recorded runs stay the same in every world.
+        """
+        shift = WORLDS * self.seed
+        truth = self.truth and self.truth.model_copy(update={"seed": self.truth.seed + shift})
+        split = self.split.model_copy(update={"seed": self.split.seed + shift})
+        grid = self.grid.model_copy(update={"seeds": [seed + shift for seed in self.grid.seeds]})
+        family = [one.model_copy(update={"seed": one.seed + shift}) for one in self.family]
+        return self.model_copy(update={"truth": truth, "split": split, "grid": grid, "family": family})
 
 
 @dataclass(frozen=True)
@@ -138,6 +196,7 @@ class Batch:
 class Plan:
     """A study ready to run: checked document, models before any redraw, recipe and batches.
 
+    study : the checked document with the seeds of its world; `document` holds them as written.
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
     vessels : every vessel that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from.
@@ -159,10 +218,18 @@ class Plan:
     @property
     def digest(self) -> str:
         """Digest of the document, every vessel, the data's sources and the recipe in full: what results depend on."""
+        return self._digest(self.document)
+
+    @property
+    def digest_in_any_world(self) -> str:
+        """The same digest without the top-level seed: equal for repetitions of one study."""
+        return self._digest({key: value for key, value in self.document.items() if key != "seed"})
+
+    def _digest(self, document: Document) -> str:
         standing = [self.truth, *(model.vessel for model in self.models)]
         vessels = sorted({vessel.digest for vessel in standing if vessel is not None})
         depends = {"vessels": vessels, "sources": dict(self.sources), "recipe": self.recipe.model_dump()}
-        return documents.digest({"study": self.document, **depends})
+        return documents.digest({"study": document, **depends})
 
     @property
     def cells(self) -> int:
@@ -203,7 +270,7 @@ def build_plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
-    study: Study = documents.parse(Study, document, file)
+    study = documents.parse(Study, document, file).in_its_world()
     known = dict(vessels or {})
     models = _models(study, file, known)
     _check_claims(study, models, file)
@@ -317,20 +384,30 @@ def _recipe(study: Study, file: Path) -> Recipe:
 
 
 def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
+    """Refuse claims about families that are not there, or that are not what their role needs."""
     if study.claims is None:
         return
     families = [model.family for model in models if model.family != NO_MODEL]
-    for role, name in (("accurate", study.claims.accurate), ("inaccurate", study.claims.inaccurate)):
-        if name not in families:
-            raise DocumentError(
-                f"{name!r} is not a family: {choices(name, set(families))}", file=file, path=f"claims.{role}"
-            )
-        if families.count(name) > 1:
-            message = f"{name!r} has {families.count(name)} members: the findings compare one model with one"
-            raise DocumentError(message, file=file, path=f"claims.{role}")
-    for name in study.claims.aside:
+    named = [*study.claims.roles.items(), *(("aside", name) for name in study.claims.aside)]
+    for role, name in named:
         if name not in families:
             message = f"{name!r} is not a family: {choices(name, set(families))}"
-            raise DocumentError(message, file=file, path="claims.aside")
-    if study.claims.accurate == study.claims.inaccurate:
-        raise DocumentError("the same family as claims.accurate", file=file, path="claims.inaccurate")
+            raise DocumentError(message, file=file, path=f"claims.{role}")
+    roles = study.claims.roles
+    for role in ("accurate", "inaccurate", "nominal"):
+        count = families.count(roles.get(role, ""))
+        if count > 1:
+            use = (
+                "the nominal row is the base as it is"
+                if role == "nominal"
+                else "the findings compare one model with one"
+            )
+            raise DocumentError(f"{roles[role]!r} has {count} members: {use}", file=file, path=f"claims.{role}")
+    rivals = (("accurate", "inaccurate"), ("moderate", "high"), ("moderate", "nominal"), ("high", "nominal"))
+    for one, other in rivals:
+        if one in roles and roles[one] == roles.get(other):
+            raise DocumentError(f"the same family as claims.{one}", file=file, path=f"claims.{other}")
+    nominal = next((model for model in models if model.family == roles.get("nominal")), None)
+    if nominal is not None and nominal.variant is not None and nominal.variant.values:
+        message = f"{nominal.name!r} is perturbed: the nominal row is the base as it is"
+        raise DocumentError(message, file=file, path="claims.nominal")

@@ -14,10 +14,10 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
-from shipid.metrics import over_horizon, over_time, position_error, summary
+from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.plan import NO_MODEL, Plan
+from shipid.study.plan import NO_MODEL, PUBLISHED, Plan
 from shipid.study.prepare import constant_motion
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
@@ -71,7 +71,7 @@ def read_results(folder: Path) -> Results:
         folder=folder,
         plan=plan,
         cells=cells,
-        models=_models(folder, physics),
+        models=_models(folder, physics, test),
         test=test,
         physics=physics,
         naive=naive,
@@ -81,13 +81,30 @@ def read_results(folder: Path) -> Results:
     )
 
 
-def _models(folder: Path, physics: Mapping[str, np.ndarray]) -> pd.DataFrame:
+def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
+    """One row per model: accuracy [m], also by axis of the frame (11), and whether it diverged on the test windows."""
     frame = pd.DataFrame(store.read_json(folder / store.MODELS))
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
     frame["status"] = ["diverged" if diverged[name] else "ok" for name in frame["model"]]
+    known = {name: error_by_axis(path, test.future) for name, path in physics.items() if name != NO_MODEL}
+    for axis, column in enumerate(("A_along", "A_across")):
+        frame[column] = [known[name][axis] if name in known else np.nan for name in frame["model"]]
     return frame
+
+
+def shown_amounts(results: Results) -> list[int]:
+    """Return the N_D that curves and paths are kept for: smallest, middle (of the logarithm) and largest."""
+    amounts = sorted(set(results.cells["N_D"]))
+    middle = np.sqrt(amounts[0] * amounts[-1])
+    return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
+
+
+def _shown_cells(results: Results) -> list[dict[str, Any]]:
+    """Rows of the cells that have paths, at the shown amounts."""
+    amounts = shown_amounts(results)
+    return [row for row in results.rows if row["cell"] in results.paths and row["N_D"] in amounts]
 
 
 def horizon_frame(results: Results) -> pd.DataFrame:
@@ -97,10 +114,9 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
             parts.append(_horizon(position_error(path, results.test.future), ahead, model, 0, 0, "physics"))
-    for row in results.rows:
-        if row["cell"] in results.paths:
-            error = position_error(results.paths[row["cell"]], results.test.future)
-            parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
+    for row in _shown_cells(results):
+        error = position_error(results.paths[row["cell"]], results.test.future)
+        parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -128,8 +144,8 @@ def time_frame(results: Results) -> pd.DataFrame:
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
             add(position_error(path, results.test.future), model, 0, "physics")
-    for row in results.rows:
-        if row["cell"] in results.paths and row["seed"] == seed:
+    for row in _shown_cells(results):
+        if row["seed"] == seed:
             add(
                 position_error(results.paths[row["cell"]], results.test.future),
                 row["model"],
@@ -176,7 +192,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     )
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
-    found, naive = [], constant_motion(test)
+    found, naive, cells = [], constant_motion(test), _shown_cells(results)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
@@ -185,8 +201,8 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 for model, path in results.physics.items()
                 if model != NO_MODEL and np.isfinite(path[:, index]).all()
             }
-            for row in results.rows:
-                if row["cell"] in results.paths and row["seed"] == seed:
+            for row in cells:
+                if row["seed"] == seed:
                     paths[row["model"], "cooperative", row["N_D"]] = results.paths[row["cell"]][:, index]
             paths["", "naive", 0] = naive[:, index]
             origin = np.zeros((1, 2))
@@ -243,7 +259,22 @@ def envelope_frame(results: Results) -> pd.DataFrame:
     for row in store.read_json(results.folder / store.ENVELOPE):
         unit, factor = _sailors_unit(row["quantity"])
         rows.append({**row, "unit": unit, **{name: row[name] * factor for name in ("min", "mean", "max")}})
-    return pd.DataFrame(rows)
+    return pd.DataFrame([*rows, *_published(results, [row["quantity"] for row in rows])])
+
+
+def _published(results: Results, quantities: list[str]) -> list[dict[str, Any]]:
+    """Rows of the published envelope, set "published", for those quantities that the study has."""
+    if results.plan.study.published is None:
+        return []
+    known = {PUBLISHED[key]: limits for key, limits in results.plan.study.published.envelope.items()}
+    rows = []
+    for quantity in dict.fromkeys(quantities):
+        unit, factor = _sailors_unit(quantity)
+        for (signal, to_SI), limits in known.items():
+            if signal == quantity.rpartition(".")[2]:
+                values = dict(zip(("min", "mean", "max"), (to_SI * factor * limit for limit in limits), strict=True))
+                rows.append({"set": "published", "quantity": quantity, "unit": unit, **values})
+    return rows
 
 
 def _sailors_unit(quantity: str) -> tuple[str, float]:
@@ -251,6 +282,31 @@ def _sailors_unit(quantity: str) -> tuple[str, float]:
     if "." in quantity:
         return SAILORS[quantity.rpartition(".")[2]][1:]
     return ("deg/s", DEGREE) if quantity == "r" else ("m/s", 1.0)
+
+
+def factors_frame(results: Results) -> pd.DataFrame:
+    """One row per perturbed number of a model: its path, its group (hull, inertia, ...) and factor; 0 is removed."""
+    rows = [
+        {"model": model["model"], "path": path, "group": path.partition(".")[0], "factor": float(factor)}
+        for model in results.models.to_dict("records")
+        for path, factor in (model["factors"].items() if isinstance(model.get("factors"), Mapping) else ())
+    ]
+    return pd.DataFrame(rows, columns=["model", "path", "group", "factor"])
+
+
+def trials_frame(results: Results) -> pd.DataFrame:
+    """One row per trial of the search, value [m^2], with a column per searched hyperparameter; `chosen` is the best."""
+    searched, rows = list(results.plan.recipe.ranges()), []
+    for cell in results.rows:
+        done = [trial for trial in cell["trials"] if trial["state"] == "complete"]
+        best = min(done, key=lambda trial: trial["value"], default=None)
+        for trial in cell["trials"]:
+            row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
+            row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
+            row |= {"chosen": trial is best, **{name: trial["params"].get(name) for name in searched}}
+            rows.append(row)
+    columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
+    return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))
 
 
 def repairs_frame(results: Results) -> pd.DataFrame:
@@ -298,6 +354,10 @@ def provenance_words(results: Results) -> dict[str, str]:
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
         "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s",
     }
+    if study.seed:
+        words["world"] = f"seed {study.seed}"
+    if study.published is not None:
+        words["published envelope"] = study.published.source
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)

@@ -9,7 +9,7 @@ from shipid.document import Document
 from shipid.physics import ACTUATORS, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.inertia import added_mass, rigid_body
-from shipid.vessel.schema import SHARED, Parameter, parameters, term_blocks
+from shipid.vessel.schema import SHARED, Parameter, parameters, term_blocks, term_parameters
 
 Binding = dict[str, str | list[str] | dict[str, str] | float]
 
@@ -40,7 +40,7 @@ def bindings(document: Document) -> dict[str, Binding]:
     found = {"inertia": bind("inertia", document["inertia"], parameters(rigid_body))}
     found["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
     for path, key, block in term_blocks(document):
-        found[path] = bind(path, block, parameters(TERMS[key].function))
+        found[path] = bind(path, block, term_parameters(TERMS[key]))
         for command, actuator in (block.get("actuator") or {}).items():
             if isinstance(actuator, Mapping):
                 where = f"{path}.actuator.{command}"
@@ -50,15 +50,15 @@ def bindings(document: Document) -> dict[str, Binding]:
 
 def units(document: Document) -> dict[str, str]:
     """Dotted path -> unit of every parameter, in the order of use."""
-    functions: dict[str, Any] = {"inertia": rigid_body, "added_mass": added_mass}
+    known = {"inertia": parameters(rigid_body), "added_mass": parameters(added_mass)}
     for path, key, block in term_blocks(document):
-        functions[path] = TERMS[key].function
+        known[path] = term_parameters(TERMS[key])
         for command, actuator in (block.get("actuator") or {}).items():
             if isinstance(actuator, Mapping):
-                functions[f"{path}.actuator.{command}"] = ACTUATORS[actuator["kind"]].advance
+                known[f"{path}.actuator.{command}"] = parameters(ACTUATORS[actuator["kind"]].advance)
     rows: list[tuple[str, str]] = []
     for where, binding in bindings(document).items():
-        declared = {parameter.name: parameter for parameter in parameters(functions[where])}
+        declared = {parameter.name: parameter for parameter in known[where]}
         table = next((parameter for parameter in declared.values() if parameter.kind == "open"), None)
         for keyword, target in binding.items():
             parameter = declared.get(keyword, table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,30 +11,39 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from shipid.errors import DocumentError, choices
 from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
 from shipid.physics.frames import current, kinematics
+from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.vessel.bindings import Binding, bindings
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import counts, signals, term_blocks
+from shipid.vessel.schema import parameters as declared
+from shipid.vessel.schema import signals, structural, term_blocks
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
 ETA_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
+PLANE = (0, 1, 5)
+HELM = "helm"  # prefix of what a helmsman remembers
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
 
 @dataclass(frozen=True, eq=False)
 class SumOverComponents:
-    """A term written for one component, to be mapped over its component arrays and added to tau_extra.
+    """A term written for one component, to be mapped over its components and added to tau_extra.
 
+    path : of the term's block.
     function : (state, memory, commands, environment, parameters, component) -> wrench (n_dof).
-    arrays : (num_components, num_arguments).
+    widths : component argument -> how many entries of `component` it takes, in order.
+    arrays : (num_components, num_entries); None where they are drawn for each sample of a rollout.
     """
 
+    path: str
     function: ca.Function
-    arrays: np.ndarray
+    widths: Mapping[str, int]
+    arrays: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,136 +52,235 @@ class Dynamics:
 
     rates : (state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt.
     advance : (state, memory, commands, environment, parameters, dt) -> memory after dt, exactly.
-    state, memory, commands, environment, parameters : names of the entries of each input vector.
+    orders : (state, memory, commands, environment, parameters) -> what each actuator is ordered.
+    state, hidden : names of the entries of the state vector: eta and nu, then the states that terms keep.
+    memory, commands, environment, parameters : names of the entries of each other input vector.
+    ordered : names of the orders; they are the commands unless a helmsman gives them.
     """
 
     rates: ca.Function
     advance: ca.Function
+    orders: ca.Function
     sums: tuple[SumOverComponents, ...]
     state: tuple[str, ...]
+    hidden: tuple[str, ...]
     memory: dict[str, str]
     commands: tuple[str, ...]
     environment: tuple[str, ...]
     parameters: tuple[str, ...]
+    ordered: tuple[str, ...]
+    helmsman: Helmsman | None = None
 
     @property
     def num_dof(self) -> int:
         """Degrees of freedom."""
         return len(self.state) // 2
 
-
-_compiled: dict[str, Dynamics] = {}
-
-
-def dynamics(vessel: Vessel) -> Dynamics:
-    """Equations of a vessel; vessels of one structure (all members of a family) share one object."""
-    if vessel.structure not in _compiled:
-        _compiled[vessel.structure] = _assemble(vessel)
-    return _compiled[vessel.structure]
+    @property
+    def drawn(self) -> tuple[SumOverComponents, ...]:
+        """Sums whose components are drawn for each sample."""
+        return tuple(term for term in self.sums if term.arrays is None)
 
 
-def _assemble(vessel: Vessel) -> Dynamics:
+_compiled: dict[tuple[str, Helmsman | None], Dynamics] = {}
+
+
+def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
+    """Equations of a vessel; vessels of one structure (all members of a family) share one object.
+
+    With a helmsman, what he is told takes the place of the commands; DocumentError if he orders what is not there.
+    """
+    key = (vessel.structure, helmsman)
+    if key not in _compiled:
+        _compiled[key] = _assemble(vessel, helmsman)
+    return _compiled[key]
+
+
+def _symbols(name: str, entries: Sequence[str]) -> tuple[SX, dict[str, SX]]:
+    """A vector and its entries by name."""
+    vector = SX.sym(name, len(entries))
+    return vector, dict(zip(entries, ca.vertsplit(vector) if entries else [], strict=True))
+
+
+def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     axes = vessel.axes
-    state_names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
+    rows = list(axes)
     terms = list(term_blocks(vessel.document))
-    command_names = tuple(
+    names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
+    hidden = _hidden(terms)
+    ordered = tuple(
         f"{path.rsplit('.', 1)[-1]}.{signal}"
         for path, key, _ in terms
         for signal in signals(TERMS[key].function)
         if signal in SIGNALS.commands
     )
-    environment_names = _environment(vessel)
-    state, commands = SX.sym("state", 2 * len(axes)), SX.sym("commands", len(command_names))
-    environment = SX.sym("environment", len(environment_names))
-    parameters = SX.sym("parameters", len(vessel.parameters))
+    state, state_of = _symbols("state", [*names, *(name for own in hidden.values() for name in own)])
+    commands, told = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
+    environment, weather = _symbols("environment", _environment(vessel))
+    parameters, value_of = _symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
-    value_of = dict(zip(vessel.parameters, ca.vertsplit(parameters) if len(vessel.parameters) else [], strict=True))
     bound = bindings(vessel.document)
+
+    helm: dict[str, SX] = {f"{HELM}.{name}": SX.sym(name) for name in (helmsman.memory if helmsman else ())}
+    orders, helm_after = dict(told), []
+    if helmsman:
+        seen = {name: state_of[name] for name in names}
+        remembered = {name.removeprefix(f"{HELM}."): symbol for name, symbol in helm.items()}
+        orders = _ordered(helmsman, ordered, helmsman.orders(seen, told, remembered), vessel)
+        if helmsman.advance:
+            after = helmsman.advance(seen, told, remembered, dt)
+            helm_after = [after[name] for name in remembered]
+    lags, actual, lags_after = _actuators(terms, bound, orders, value_of, dt)
+    memory = {**helm, **lags}
 
     eta, nu = SX(6, 1), SX(6, 1)
     for position, axis in enumerate(axes):
         eta[axis], nu[axis] = state[position], state[len(axes) + position]
-    given = dict(zip(command_names, ca.vertsplit(commands) if command_names else [], strict=True))
-    given.update(zip(environment_names, ca.vertsplit(environment) if environment_names else [], strict=True))
-
-    memory, actual, advanced = _actuators(terms, bound, given, value_of, dt)
-
     nu_c, nu_c_dot = SX(6, 1), SX(6, 1)
     if "current" in vessel.document:
-        nu_c, nu_c_dot = current(eta, nu, given["V_c"], given["beta_c"])
-    nu_r = nu - nu_c
-    shared = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **given}
+        nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"])
+    own = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
+    available = {"eta": eta, "nu": nu, "nu_r": nu - nu_c, "psi": eta[5], **weather, **actual}
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
-    force = M_A @ nu_c_dot - coriolis(M_RB, nu) - coriolis(M_A, nu_r)
-    summed, mapped = _sum_of_terms(terms, {**shared, **actual}, bound, value_of)
-    force += summed
-    inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
-    rows, options = list(axes), {"cse": True}
-    sums = [
-        SumOverComponents(
-            ca.Function(
-                f"sum_{i}", [*inputs, entry], [ca.densify(wrench[rows])], [*INPUTS, "component"], ["tau"], options
-            ),
-            arrays,
-        )
-        for i, (entry, wrench, arrays) in enumerate(mapped)
+    force = M_A @ (nu_c_dot + _inertial_heave(nu)) - coriolis(M_RB, nu) - coriolis(_in_plane(M_A), nu - nu_c)
+    summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
+    inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
+    acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
+    more = [
+        _rates(TERMS[key], {**available, "state": own[path]}, _values(bound[path], value_of))
+        for path, key, _ in terms
+        if path in own
     ]
-    acceleration = ca.inv_minor(ca.densify((M_RB + M_A)[rows, rows])) @ (force[rows] + tau_extra)
-    rates = ca.vertcat(kinematics(eta, nu)[rows], acceleration)
+    inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
+
+    def function(name: str, result: SX, *extra: SX) -> ca.Function:
+        last = [entry.name() if entry.is_scalar() else "tau_extra" for entry in extra]
+        return ca.Function(name, [*inputs, *extra], [ca.densify(result)], [*INPUTS, *last], ["result"], {"cse": True})
+
     return Dynamics(
-        rates=ca.Function(
-            "rates", [*inputs, tau_extra], [ca.densify(rates)], [*INPUTS, "tau_extra"], ["rates"], options
+        rates=function("rates", ca.vertcat(kinematics(eta, nu)[rows], acceleration, *more), tau_extra),
+        advance=function("advance", ca.vertcat(*helm_after, *lags_after), dt),
+        orders=function("orders", ca.vertcat(*(orders[name] for name in ordered))),
+        sums=tuple(
+            SumOverComponents(
+                path,
+                ca.Function(
+                    f"sum_{i}",
+                    [*inputs, entry],
+                    [ca.densify(wrench[rows])],
+                    [*INPUTS, "component"],
+                    ["tau"],
+                    {"cse": True},
+                ),
+                widths,
+                arrays,
+            )
+            for i, (path, entry, wrench, widths, arrays) in enumerate(mapped)
         ),
-        advance=ca.Function(
-            "advance", [*inputs, dt], [ca.densify(ca.vertcat(*advanced))], [*INPUTS, "dt"], ["memory_after"], options
-        ),
-        sums=tuple(sums),
-        state=state_names,
-        memory={name: _command_unit(name) for name in memory},
-        commands=command_names,
-        environment=environment_names,
+        state=names,
+        hidden=tuple(name for entries in hidden.values() for name in entries),
+        memory={name: "-" if name in helm else _command_unit(name) for name in memory},
+        commands=tuple(told),
+        environment=tuple(weather),
         parameters=tuple(vessel.parameters),
+        ordered=ordered,
+        helmsman=helmsman,
     )
+
+
+def _inertial_heave(nu: SX) -> SX:
+    """What turns the rate of w into the downward acceleration: heave added mass acts in the inertial frame."""
+    result = SX(6, 1)
+    result[2] = nu[0] * nu[4] - nu[1] * nu[3]
+    return result
+
+
+def _in_plane(M_A: SX) -> SX:
+    """Surge, sway and yaw part of the added mass: only these carry Coriolis terms (manoeuvring in calm water)."""
+    result = SX(6, 6)
+    for i in PLANE:
+        for j in PLANE:
+            result[i, j] = M_A[i, j]
+    return result
+
+
+def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
+    """Path -> names of the states that a term keeps, `path.name`."""
+    kept = ((path, TERMS[key].states, block) for path, key, block in terms)
+    return {path: [f"{path}.{name}" for name in states(block)] for path, states, block in kept if states}
+
+
+def _rates(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
+    """Rates of a term's own states."""
+    assert term.rates is not None
+    own = {parameter.name for parameter in declared(term.rates)}
+    kept = {keyword: value for keyword, value in keywords.items() if keyword in own}
+    return SX(term.rates(*(available[name] for name in signals(term.rates)), **kept))
+
+
+def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel) -> dict[str, SX]:
+    """Every order by name, from the helmsman's by name or by signal."""
+    names = {name for name in given if name in ordered or any(name == o.rsplit(".", 1)[-1] for o in ordered)}
+    unknown = sorted(set(given) - names)
+    result = {name: given.get(name, given.get(name.rsplit(".", 1)[-1])) for name in ordered}
+    missing = [name for name, order in result.items() if order is None]
+    if missing or (unknown and not names):
+        message = f"{helmsman.name} gives no order for {', '.join(missing) or choices(unknown[0], ordered)}"
+        raise DocumentError(message, file=vessel.file)
+    return {name: SX(order) for name, order in result.items()}
 
 
 def _sum_of_terms(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
+    own_states: Mapping[str, SX],
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
-) -> tuple[SX, list[tuple[SX, SX, np.ndarray]]]:
-    """Wrench (6) of all terms; and, of what has too many components to write out, (component, its wrench, all)."""
+) -> tuple[SX, list[tuple[str, SX, SX, dict[str, int], np.ndarray | None]]]:
+    """Wrench (6) of all terms; and, of what is not written out, (path, component, its wrench, widths, arrays)."""
     total, mapped = SX(6, 1), []
     for path, key, block in terms:
-        component = path.rsplit(".", 1)[-1]
+        term, component = TERMS[key], path.rsplit(".", 1)[-1]
         own = {
             name: available[f"{component}.{name}"] for name in SIGNALS.commands if f"{component}.{name}" in available
         }
-        wrench = partial(_wrench, TERMS[key], {**available, **own}, _values(bound[path], value_of))
-        columns, arrays = _components(TERMS[key], block)
-        if len(arrays) <= UNROLL_UP_TO:
+        if path in own_states:
+            own["state"] = own_states[path]
+        wrench = partial(_wrench, term, {**available, **own}, _values(bound[path], value_of))
+        widths, arrays = _components(term, block)
+        if arrays is not None and len(arrays) <= UNROLL_UP_TO:
             for row in arrays:
-                total += wrench(dict(zip(columns, row, strict=True)))
+                total += wrench(dict(zip(widths, row, strict=True)))
         else:
-            entry = SX.sym("component", len(columns))
-            mapped.append((entry, wrench(dict(zip(columns, ca.vertsplit(entry), strict=True))), arrays))
+            entry = SX.sym("component", sum(widths.values()))
+            parts = ca.vertsplit(entry, [0, *np.cumsum(list(widths.values())).tolist()])
+            mapped.append((path, entry, wrench(dict(zip(widths, parts, strict=True))), widths, arrays))
     return total, mapped
 
 
-def _components(term: Term, block: Mapping[str, Any]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names and values (num_components, num_arguments) of what a term sums over; one empty row if it does not."""
+def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
+    """Arguments that a term sums over, with their widths, and their values (num_components, num_entries).
+
+    No values where they are drawn outside; one empty row for a term that sums over nothing.
+    """
+    keys = {name: block[name] for name in structural(term)}
+    if term.drawn is not None:
+        return dict(term.drawn(**keys)), None
     if term.components is None:
-        return (), np.zeros((1, 0))
-    columns = term.components(**{name: block[name] for name in counts(term)})
-    return tuple(columns), np.column_stack(list(columns.values()))
+        return {}, np.zeros((1, 0))
+    columns = term.components(**keys)
+    return dict.fromkeys(columns, 1), np.column_stack(list(columns.values()))
 
 
 def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> Any:
     """One term on its signals, found by name; `entries` are those of one component."""
     here = {**available, **entries}
-    return term.function(*(here[name] for name in signals(term.function)), **keywords)
+    only = {parameter.name for parameter in declared(term.rates)} if term.rates else set()
+    only -= {parameter.name for parameter in declared(term.function)}
+    own = {keyword: value for keyword, value in keywords.items() if keyword not in only}
+    return term.function(*(here[name] for name in signals(term.function)), **own)
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:
@@ -186,13 +294,13 @@ def _environment(vessel: Vessel) -> tuple[str, ...]:
 def _actuators(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     bound: Mapping[str, Binding],
-    given: Mapping[str, SX],
+    orders: Mapping[str, SX],
     value_of: Mapping[str, SX],
     dt: SX,
 ) -> tuple[dict[str, SX], dict[str, SX], list[SX]]:
-    """Memory states of lagged commands, the signals that the terms then see, and the states after dt."""
+    """Memory states of lagged orders, the signals that the terms then see, and the states after dt."""
     memory: dict[str, SX] = {}
-    actual = dict(given)
+    actual = dict(orders)
     advanced = []
     for path, _, block in terms:
         for command, actuator in (block.get("actuator") or {}).items():
@@ -203,7 +311,7 @@ def _actuators(
             memory[name] = SX.sym(name)
             actual[name] = member.output(memory[name])
             keywords = _values(bound[f"{path}.actuator.{command}"], value_of)
-            advanced.append(member.advance(given[name], memory[name], dt, **keywords))
+            advanced.append(member.advance(orders[name], memory[name], dt, **keywords))
     return memory, actual, advanced
 
 

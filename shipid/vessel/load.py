@@ -11,15 +11,18 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import pandas as pd
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
+from shipid.physics import TERMS
 from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
-from shipid.vessel.schema import DOFS, components, kinds, term_blocks, term_model, vessel_model
+from shipid.vessel.schema import DOFS, TABLE, components, kinds, term_blocks, term_model, vessel_model
 
 LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
@@ -85,7 +88,57 @@ def _load(file: Path, above: tuple[Path, ...]) -> Vessel:
     document = documents.read(file)
     if "base" in document:
         return _patched(document, file, above)
-    return check_vessel(document, str(file))
+    return check_vessel(_whole(document, file, above), str(file))
+
+
+def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
+    """A document with what it `extends` underneath and the tables that it names read in."""
+    document = _with_tables(document, file)
+    if "extends" not in document:
+        return document
+    under = _other(document.pop("extends"), "extends", file, above)
+    if "base" in documents.read(under):
+        raise DocumentError(f"{under.stem!r} is a patch: extend a vessel", file=file, path="extends")
+    return documents.merge(_whole(documents.read(under), under, (*above, file.resolve())), document)
+
+
+def _with_tables(document: Document, file: Path) -> Document:
+    """Named tables as columns: what a document says does not change with a file that it names."""
+    found = {}
+    for path, key, block in term_blocks(document):
+        if key in TERMS and isinstance(block.get(TABLE), str):
+            found[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
+    return documents.replace(document, found) if found else dict(document)
+
+
+def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
+    """Columns of a CSV file with a header; lines that begin with # are words."""
+    try:
+        frame = pd.read_csv(source, comment="#")
+    except OSError:
+        raise DocumentError(f"{source}: no such file, looked for beside the vessel", file=file, path=path) from None
+    except ValueError:
+        raise DocumentError(f"{source}: not a CSV table with a header", file=file, path=path) from None
+    missing = next((name for name in columns if name not in frame), None)
+    if missing is not None:
+        message = f"{source}: has no column {missing!r}: {choices(missing, [str(name) for name in frame])}"
+        raise DocumentError(message, file=file, path=path)
+    numbers = frame[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    if not np.isfinite(numbers).all():
+        row, column = np.argwhere(~np.isfinite(numbers))[0]
+        raise DocumentError(f"{source}: row {row + 1} has no number in {columns[column]!r}", file=file, path=path)
+    return {name: numbers[:, i].tolist() for i, name in enumerate(columns)}
+
+
+def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
+    """File of the vessel that a document stands on."""
+    try:
+        found = documents.find(str(name), "models", file.parent)
+    except DocumentError as error:
+        raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    if found.resolve() in (*above, file.resolve()):
+        raise DocumentError(f"{name!r} stands on this very document: name a vessel that does not", file=file, path=path)
+    return found
 
 
 class Patch(BaseModel):
@@ -102,14 +155,7 @@ class Patch(BaseModel):
 
 def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
     patch: Patch = documents.parse(Patch, document, file)
-    try:
-        base_file = documents.find(patch.base, "models", file.parent)
-    except DocumentError as error:
-        raise DocumentError(f"{patch.base!r}: {error.message}", file=file, path="base") from None
-    chain = (*above, file.resolve())
-    if base_file.resolve() in chain:
-        raise DocumentError(f"{patch.base!r} is a patch of this patch: name a vessel", file=file, path="base")
-    base = _load(base_file, chain)
+    base = _load(_other(patch.base, "base", file, above), (*above, file.resolve()))
     if patch.base_digest not in (None, base.digest):
         changed = f"the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew"
         raise DocumentError(f"{patch.base_digest!r}: {changed}", file=file, path="base_digest")

@@ -15,6 +15,7 @@ from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
 
+FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
 
 PARTICULARS = {
@@ -63,6 +64,15 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
 
 
 @cache
+def term_parameters(term: Term) -> tuple[Parameter, ...]:
+    """Parameters of a term: of its function, then those that only its rates take."""
+    own = parameters(term.function)
+    names = {parameter.name for parameter in own}
+    more = parameters(term.rates) if term.rates else ()
+    return own + tuple(parameter for parameter in more if parameter.name not in names)
+
+
+@cache
 def signals(function: Callable[..., Any]) -> tuple[str, ...]:
     """Positional arguments of a physics function."""
     return tuple(
@@ -73,9 +83,13 @@ def signals(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 @cache
-def counts(term: Term) -> tuple[str, ...]:
-    """Structural whole numbers of a term that sums over components, such as `strips`."""
-    return tuple(inspect.signature(term.components).parameters) if term.components else ()
+def structural(term: Term) -> tuple[str, ...]:
+    """Structural keys of a term that sums over components, such as the whole number `strips`, or a `table`."""
+    source = term.components or term.drawn
+    return tuple(inspect.signature(source).parameters) if source else ()
+
+
+TABLE = "table"  # the structural key that names a file of columns; every other one is a whole number
 
 
 class Block(BaseModel):
@@ -83,6 +97,9 @@ class Block(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
     source: str | None = Field(default=None, description="where the numbers come from")
+
+
+_Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
 
 
 def _number(parameter: Parameter) -> Any:
@@ -101,12 +118,12 @@ def _checked_table(grammar: Grammar) -> Any:
     return Annotated[dict[str, FiniteFloat], AfterValidator(check)]
 
 
-def block_model(name: str, function: Callable[..., Any], **extra: Any) -> type[Block]:
+def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[Block]:
     """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
     fields: dict[str, Any] = dict(extra)
     validators: dict[str, Any] = {}
     config = ConfigDict(extra="forbid", strict=True)
-    for parameter in parameters(function):
+    for parameter in declared:
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
@@ -116,7 +133,10 @@ def block_model(name: str, function: Callable[..., Any], **extra: Any) -> type[B
             continue
         note = Field(description=_unit_note(parameter))
         if parameter.kind == "list":
-            fields[parameter.name] = (Annotated[list[FiniteFloat], Field(min_length=2), note], ...)
+            fields[parameter.name] = (
+                Annotated[GenericAlias(list, (_number(parameter),)), Field(min_length=2), note],
+                ...,
+            )
         elif parameter.kind == "table":
             assert isinstance(parameter.unit, Grammar)
             fields[parameter.name] = (Annotated[_checked_table(parameter.unit), note], ...)
@@ -151,22 +171,24 @@ def term_model(key: str) -> type[Block]:
     term = TERMS[key]
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
-    if group != "hull":
+    if group not in FIXED:
         extra["kind"] = (Literal[kind], ...)
-    for count in counts(term):
-        extra[count] = (Annotated[int, Field(ge=1, le=1000)], ...)
+    for name in structural(term):
+        extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
     commands = [signal for signal in signals(term.function) if signal in SIGNALS.commands]
     if commands:
         fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
-    return block_model(f"{group}_{kind}", term.function, **extra)
+    return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 
 def _actuator_union() -> Any:
-    models = [
-        block_model(f"actuator_{kind}", memory.advance, kind=(Literal[kind], ...)) for kind, memory in ACTUATORS.items()
-    ]
-    return _union(models)
+    return _union(
+        [
+            block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...))
+            for kind, memory in ACTUATORS.items()
+        ]
+    )
 
 
 def _union(models: list[type[Block]]) -> Any:
@@ -187,10 +209,14 @@ def _named(group: str) -> Any:
     return _union([term_model(f"{group}.{kind}") for kind in kinds(group)])
 
 
+def _fixed(group: str) -> Any:
+    fields: dict[str, Any] = {kind: (term_model(f"{group}.{kind}") | None, None) for kind in kinds(group)}
+    return create_model(group, __base__=Block, **fields)
+
+
 @cache
 def vessel_model() -> type[BaseModel]:
     """Pydantic model of a whole vessel document; its JSON schema serves editors."""
-    hull: dict[str, Any] = {kind: (term_model(f"hull.{kind}") | None, None) for kind in kinds("hull")}
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),
@@ -198,9 +224,9 @@ def vessel_model() -> type[BaseModel]:
         "dof": (Literal[3, 4, 6], ...),
         "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
-        "inertia": (block_model("inertia", rigid_body), ...),
-        "added_mass": (block_model("added_mass", added_mass) | None, None),
-        "hull": (create_model("hull", __base__=Block, **hull) | None, None),
+        "inertia": (block_model("inertia", parameters(rigid_body)), ...),
+        "added_mass": (block_model("added_mass", parameters(added_mass)) | None, None),
+        **{group: (_fixed(group) | None, None) for group in FIXED},
         "wind": (_named("wind") | None, None),
         "thruster": (GenericAlias(dict, (str, _named("thruster"))), {}),
         "current": (create_model("current", __base__=Block, **current) | None, None),

@@ -15,7 +15,7 @@ def traces(figure: Figure, view: str) -> dict[str, list]:
     return found
 
 
-@pytest.mark.parametrize(("view", "column", "floor"), [("0", "H", 5.01), ("1", "H_90", 11.2), ("2", "rms", 6.3)])
+@pytest.mark.parametrize(("view", "column", "floor"), [("0-0", "H", 5.01), ("1-0", "H_90", 11.2), ("2-1", "rms", 6.3)])
 def test_lines_are_means_over_seeds(simulation, view, column, floor):
     drawn = traces(gain(simulation), view)
     cells = simulation.cells
@@ -35,10 +35,26 @@ def test_a_failed_size_leaves_a_gap(simulation):
     cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
     cells.loc[failed, "status"] = "diverged"
     figure = gain(replace(simulation, cells=cells))
-    (line,) = traces(figure, "0")["high-1"]
+    (line,) = traces(figure, "0-0")["high-1"]
     assert list(np.isfinite(line.y)) == [True, False, True]
     assert line.connectgaps is False
     assert "Not plotted: high-1 at N_D = 30 (diverged)" in figure.how
+
+
+def test_a_seed_that_failed_is_told_from_a_cell_that_failed(simulation):
+    cells = simulation.cells.copy()
+    failed = cells.model.eq("high-1") & cells.N_D.eq(30) & cells.seed.eq(1)
+    cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[failed, "status"] = "diverged"
+    assert "high-1 at N_D = 30 (diverged, 1 of 2 seeds)" in gain(replace(simulation, cells=cells)).how
+
+
+def test_a_logarithmic_axis_is_offered(simulation):
+    figure = gain(simulation)
+    kinds = [figure.views[view][0].figure.layout.yaxis.type for view in ("0-0", "0-1")]
+    assert kinds == [None, "log"]
+    ticks = figure.views["0-1"][0].figure.layout.yaxis
+    assert [float(word) for word in ticks.ticktext] == list(ticks.tickvals)
 
 
 def test_takeaway_counts_what_physics_is_worth(simulation):
@@ -51,7 +67,7 @@ def test_takeaway_counts_what_physics_is_worth(simulation):
 
 
 def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
-    drawn = {name: found[0] for name, found in traces(gain(simulation), "0").items()}
+    drawn = {name: found[0] for name, found in traces(gain(simulation), "0-0").items()}
     assert drawn["no model"].line.color == "var(--ink)"
     assert drawn["no model"].line.width > drawn["nominal"].line.width
     models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]

@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.report.paths import browser, snapshots, window_data, windows_of
+from shipid.report.paths import browser, fixed_data, snapshots, window_data, windows_of
+from shipid.report.wording import number
 
 
 def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
@@ -58,11 +59,48 @@ def test_a_diverged_path_becomes_gaps(full_scale):
     assert snapshots(replace(full_scale, snapshots=[replace(first, paths=paths)])) is not None
 
 
-def test_sizes_are_small_middle_large_of_one_window(simulation):
+def test_a_row_per_model_and_a_column_per_size(simulation):
     figure = snapshots(simulation)
-    assert [window.size for window in figure.windows] == [0, 1, 2]
+    names = ["no model", "moderate-2", "high-2"]
+    assert [(w.model, w.size) for w in figure.windows] == [(name, size) for name in names for size in (0, 1, 2)]
     assert len({(window.run, window.instant) for window in figure.windows}) == 1
-    assert [window.caption.rsplit(", ")[-1] for window in figure.windows] == ["N_D = 10", "N_D = 30", "N_D = 100"]
+    assert figure.windows[4].caption == "moderate-2, N_D = 30"
+    assert {chip.key for chip in figure.chips if chip.key.startswith("model:")} == {f"model:{name}" for name in names}
+
+
+def test_the_takeaway_names_each_model_and_its_ends(simulation):
+    figure = snapshots(simulation)
+    data = window_data(simulation)
+    first = data["runs"][figure.windows[0].run][figure.windows[0].instant]
+    shot = next(s for s in simulation.snapshots if s.t == first["t"] and s.run == next(iter(windows_of(simulation))))
+    ends = [np.linalg.norm(shot.paths["no model", "cooperative", c][-1] - shot.truth[-1]) for c in (10, 30, 100)]
+    assert f"no model {', '.join(number(end) for end in ends)} m" in figure.takeaway
+
+
+def test_panels_share_axes_and_show_one_model(simulation):
+    data = window_data(simulation)
+    panels = fixed_data(snapshots(simulation).windows, data)
+    names = [{data["lines"][i]["name"] for i in panel["lines"]} for panel in panels]
+    assert names[0] == {"no model"}
+    assert names[3] >= {"moderate-2, compensated", "moderate-2, physics alone"}
+    assert not any(name.startswith("high") for name in names[3])
+    assert len({json.dumps(panel["spans"]) for panel in panels}) == 1
+    (low, high), _ = panels[0]["spans"]
+    truth = data["runs"][panels[0]["run"]][panels[0]["instant"]]["truth"]
+    assert low < min(truth[1]) <= max(truth[1]) < high
+
+
+def test_one_family_shows_all_its_models_in_one_row(simulation):
+    kept = simulation.models.family.isin(["moderate", "none"])
+    names = set(simulation.models.model[kept])
+    shots = [
+        replace(shot, paths={key: path for key, path in shot.paths.items() if key[0] in names})
+        for shot in simulation.snapshots[:20]
+    ]
+    cells = simulation.cells[simulation.cells.model.isin(names)]
+    figure = snapshots(replace(simulation, models=simulation.models[kept], cells=cells, snapshots=shots))
+    assert [(window.model, window.size) for window in figure.windows] == [("", 0), ("", 1), ("", 2)]
+    assert figure.takeaway.startswith("In this order")
 
 
 def test_one_size_gives_three_instants_of_one_run(full_scale):

@@ -5,13 +5,17 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.selection import exemplars, families, sizes, spread, thinned, trained
+from shipid.report.selection import exemplars, families, middles, sizes, spread, thinned, trained
 
 
 def test_few_models_are_all_drawn_many_by_their_middle(simulation, full_scale):
     assert exemplars(full_scale) == list(families(full_scale).model)
     assert exemplars(simulation) == ["nominal", "moderate-2", "high-2", "no model"]
     assert list(families(simulation).model)[-1] == "no model"
+
+
+def test_the_largest_families_come_first(simulation):
+    assert list(middles(simulation).items())[:2] == [("moderate", "moderate-2"), ("high", "high-2")]
 
 
 def test_sizes_are_ends_and_middle():

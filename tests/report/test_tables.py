@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -33,6 +35,25 @@ def test_models_are_ordered_by_accuracy(simulation):
     table = models(simulation)
     assert [row[0].text for row in table.rows][:2] == ["nominal", "moderate-1"]
     assert table.takeaway == "A runs from 0.90 m (nominal) to 13.0 m (high-2)."
+
+
+def test_cells_count_their_trials(simulation):
+    table = cells(simulation)
+    first = simulation.trials[simulation.trials.cell == simulation.cells.cell.iloc[0]]
+    numbers = dict(zip(table.columns, table.rows[0], strict=True))
+    assert numbers["trials [1]"].key == len(first) == 12
+    assert numbers["diverged [1]"].key == first.state.eq("diverged").sum()
+    assert "trials [1]" not in cells(replace(simulation, trials=simulation.trials.iloc[:0])).columns
+
+
+def test_where_a_model_errs_is_shown_where_known(simulation):
+    assert {"A along [m]", "A across [m]"} <= set(models(simulation).columns)
+    bare = simulation.models.drop(columns=["A_along", "A_across"])
+    assert "A along [m]" not in models(replace(simulation, models=bare)).columns
+
+
+def test_the_published_set_is_the_last_column(simulation):
+    assert list(envelope(simulation).columns)[-2:] == ["test", "published"]
 
 
 def test_envelope_and_repairs_hold_their_numbers(full_scale):

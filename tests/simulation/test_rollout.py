@@ -56,7 +56,7 @@ def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> Non
         for s in ("n", "alpha")
     }
     environment = {"V_w": np.full(2, 6.0), "beta_w": np.array([0.8, -0.8])}
-    found = rollout(bundled_vessel, start, commands, environment, step=0.5, num_steps=100)
+    found = rollout(bundled_vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
     for name, sign in (("north", 1), ("east", -1), ("psi", -1), ("u", 1), ("v", -1), ("r", -1)):
         np.testing.assert_allclose(found[name][..., 1], sign * found[name][..., 0], rtol=1e-9, atol=1e-9)
     assert found["psi"][-1, 0, 0] < -1  # alpha > 0 turns to port
@@ -71,7 +71,7 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
     model = dynamics(bundled_vessel)
     start = zeros(model.state, len(u)) | {"u": u, "v": v, "r": r}
     held = zeros(model.commands, len(u)), zeros(model.environment, len(u))
-    found = rollout(bundled_vessel, start, *held, step=1.0, num_steps=600, every=60, method="rk4")
+    found = rollout(bundled_vessel, start, *held, step=0.5, num_steps=1200, every=120, method="rk4")
     energy = 0.5 * (found["u"] ** 2 + found["v"] ** 2 + 70 * found["r"] ** 2)[:, 0]  # r_66^2 = 70 m^2
     assert not found.diverged.any()
     assert (energy <= energy[0]).all()
@@ -110,8 +110,8 @@ def test_order_of_the_integrator(vessel: Vessel, draw_inputs: Draw, method: Meth
     """Halving the step divides the error by 2^order, also with lagged actuators and held commands."""
     calm = smooth(vessel)
     exact = last_state(calm, draw_inputs, "rk4", 1 / 32)
-    errors = [np.abs(last_state(calm, draw_inputs, method, step / 2**k) - exact).max() for k in range(3)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    errors = [np.abs(last_state(calm, draw_inputs, method, step / 2**k) - exact).max(axis=1) for k in range(3)]
+    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink of its own
     assert np.abs(orders - order).min() < 0.35
     assert orders[-1] == pytest.approx(order, abs=0.5)
 

@@ -1,92 +1,14 @@
-"""Sentences and verdicts on tables made by hand: the numbers they name, the harm they tell, the doubt they keep."""
+"""Sentences on tables made by hand: the numbers they name, the harm they tell, the doubt they keep."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
-import pytest
-
-from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows
 from shipid.report.content import ANCHORS
-from shipid.study.advise import CLAIMS, answer, by_model, findings
-from shipid.study.plan import build_plan
+from shipid.study.advise import answer, by_model
 from shipid.study.results import Results
-from tests.study.tiny import logged, tiny_plan
-
-STEPS = 4
-ALONE = {"good": 2.0, "bad": 6.0}
-Cells = Mapping[tuple[str, int, int], float | None]
-
-
-@pytest.fixture
-def made(tmp_path: Path) -> Any:
-    """Results of cells (model, N_D, seed) -> H [m]; None has failed. Errors are equal at all steps unless said."""
-
-    def make(
-        cells: Cells,
-        *,
-        planned: int | None = None,
-        claims: bool = True,
-        naive: float = 10.0,
-        alone: Mapping[str, float] = ALONE,
-        curves: Mapping[tuple[str, int, int], list[float]] | None = None,
-        losses: Mapping[str, float] | None = None,
-    ) -> Results:
-        document = tiny_plan(tmp_path).document
-        document["family"] = [{"name": name, "base": "gunnerus-28.9"} for name in alone]
-        document["grid"] = {"N_D": sorted({N for _, N, _ in cells}), "seeds": sorted({seed for *_, seed in cells})}
-        if claims:
-            document["claims"] = {"accurate": "good", "inaccurate": "bad"}
-        document["truth"]["manoeuvres"] = 200
-        plan = build_plan(document, tmp_path / "tiny.toml")
-        if planned is None:
-            assert plan.cells == len(cells), "a complete study by hand"
-        rows, paths = [], {}
-        for (model, N_D, seed), H in cells.items():
-            A = alone.get(model, np.nan)
-            row = {
-                "cell": f"{model}-{N_D}-{seed}",
-                "model": model,
-                "kind": model,
-                "member": 0,
-                "N_D": N_D,
-                "seed": seed,
-            }
-            row |= {"runs": N_D, "minutes": 1.0, "A": A, "A_90": A, "A_rms": A, "H": np.nan, "H_90": np.nan}
-            row["trials"] = [{"value": (losses or {}).get(model, H)}]
-            row |= {"rms": np.nan, "status": "failed", "sentence": "no training converged"}
-            if H is not None:
-                row |= {"H": H, "H_90": 1.5 * H, "rms": 1.1 * H, "status": "ok", "sentence": ""}
-                curve = (curves or {}).get((model, N_D, seed), [H] * STEPS)
-                paths[row["cell"]] = np.stack([np.array(curve), np.zeros(STEPS)], axis=-1)[:, None, :]
-            rows.append(row)
-        straight = np.zeros((STEPS, 1, 2))
-        physics = {name: straight + np.array([A, 0.0]) for name, A in alone.items()} | {"none": straight}
-        columns = {name: np.zeros(1) for name in ("north", "east", "psi", "u", "v", "r")}
-        return Results(
-            folder=tmp_path,
-            plan=plan,
-            cells=pd.DataFrame(rows),
-            models=pd.DataFrame(),
-            test=Windows(np.array(["a"]), np.zeros(1), columns, straight, {}, STEPS, 2.0),
-            physics=physics,
-            naive=np.full((STEPS, 1), naive),
-            paths=paths,
-            dataset=Dataset(logged({"a": {}}, np.arange(2.0)).frame, {"flags": []}),
-            provenance={},
-        )
-
-    return make
-
-
-def grid(H: Mapping[str, tuple[float | None, ...]], amounts: tuple[int, ...] = (10, 30)) -> dict[Any, float | None]:
-    return {(model, N, 0): value for model, values in H.items() for N, value in zip(amounts, values, strict=True)}
+from tests.study.byhand import grid
 
 
 def text(results: Results) -> str:
@@ -216,73 +138,31 @@ def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     assert "leaves 25% to 25% of the error of physics alone (over 1 model)" in said
 
 
-# R1 to R4
+def test_the_map_carries_what_needs_it(made: Any) -> None:
+    H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
+    anchors = [anchor for _, anchor in answer(made(grid(H)))]
+    assert anchors.count("map") == 2
+    alone = {"good": 2.0}
+    one_model = made(grid({name: H[name] for name in ("good", "none")}), alone=alone, claims=None)
+    assert "map" not in [anchor for _, anchor in answer(one_model)]
+    assert "map" not in [anchor for _, anchor in answer(made(grid({m: H[m][:1] for m in H}, (10,))))]
 
 
-def verdicts(results: Results) -> dict[str, str]:
-    found = findings(results)
-    assert [finding["id"] for finding in found] == list(CLAIMS)
-    assert all(finding["claim"] == CLAIMS[finding["id"]] for finding in found)
-    return {finding["id"]: finding["verdict"] for finding in found}
+def test_the_nominal_model_is_a_floor_and_no_degraded_model(made: Any) -> None:
+    """It would be the best of all; the answer speaks of `good` and tells the floor once."""
+    H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "exact": (0.5, 0.25), "none": (9.0, 4.0)}
+    results = made(grid(H), alone={"good": 2.0, "bad": 6.0, "exact": 0.75}, claims={"nominal": "exact"})
+    said = text(results)
+    assert "With 30 runs, good (best in validation;" in said
+    assert "(over 2 models)" in said
+    assert said.count("exact") == 1
+    assert "Exact coefficients (exact) leave 0.75 m alone, the floor" in said
+    assert said.endswith("and 0.25 m compensated with 30 runs.")
 
 
-def one(good: float, bad: float, none: float) -> dict[Any, float | None]:
-    return grid({"good": (good,), "bad": (bad,), "none": (none,)}, (30,))
-
-
-def test_all_confirmed(made: Any) -> None:
-    assert verdicts(made(one(1.0, 2.1, 9.0))) == dict.fromkeys(CLAIMS, "confirmed")
-
-
-@pytest.mark.parametrize(
-    ("H", "refuted"),
-    [
-        ((2.1, 2.0, 9.0), {"R1"}),  # compensation worsens `good`
-        ((1.0, 2.3, 9.0), {"R2"}),  # 15 % above what accurate physics does alone
-        ((1.0, 5.5, 9.0), {"R2", "R3"}),  # gap 4.0 m before, 4.5 m after
-        ((1.0, 2.0, 3.0), {"R4"}),  # `bad` alone is worse than pure data-driven
-    ],
-)
-def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
-    found = verdicts(made(one(*H)))
-    assert {key for key, verdict in found.items() if verdict == "refuted"} == refuted
-    assert {verdict for key, verdict in found.items() if key not in refuted} == {"confirmed"}
-
-
-def test_undecided_where_seeds_disagree(made: Any) -> None:
-    """Each holds on average over two seeds and not for one of them."""
-
-    def seeds(good: tuple[float, float], bad: tuple[float, float]) -> dict[Any, float | None]:
-        cells = {("good", 30, k): good[k] for k in (0, 1)} | {("bad", 30, k): bad[k] for k in (0, 1)}
-        return {**cells, **{("none", 30, k): 9.0 for k in (0, 1)}}
-
-    assert verdicts(made(seeds((1.0, 2.5), (2.0, 2.0))))["R1"] == "undecided"
-    assert verdicts(made(seeds((1.0, 1.0), (1.5, 2.5))))["R2"] == "undecided"
-    assert verdicts(made(seeds((0.5, 0.5), (0.6, 5.0))))["R3"] == "undecided"
-
-
-def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
-    curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
-    results = made(one(1.0, 2.1, 7.0), curves=curves)
-    assert verdicts(results)["R4"] == "undecided"
-    assert "worst at 75% of the steps" in findings(results)[3]["evidence"]
-    results = made(one(1.0, 2.1, 3.0))
-    assert "worst at 0% of the steps" in findings(results)[3]["evidence"]
-    assert "most often worst: bad alone" in findings(results)[3]["evidence"]
-
-
-def test_evidence_names_the_numbers(made: Any) -> None:
-    evidence = {finding["id"]: finding["evidence"] for finding in findings(made(one(1.0, 2.1, 9.0)))}
-    assert evidence["R1"] == "good 2.00 m -> 1.00 m; bad 6.00 m -> 2.10 m"
-    assert evidence["R2"] == "inaccurate and compensated 2.10 m, accurate alone 2.00 m"
-    assert evidence["R3"] == "gap 4.00 m before, 1.10 m after"
-
-
-def test_a_missing_cell_leaves_all_undecided(made: Any) -> None:
-    results = made(grid({"good": (1.0,), "bad": (None,), "none": (9.0,)}, (30,)))
-    assert set(verdicts(results).values()) == {"undecided"}
-
-
-def test_no_claims_no_findings(made: Any) -> None:
-    assert findings(made(one(1.0, 2.0, 9.0), claims=False)) == []
-    assert findings(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (30,)))) == []
+def test_a_long_list_of_names_is_cut(made: Any) -> None:
+    names = [f"m{k}" for k in range(9)]
+    H = dict.fromkeys(names, (5.0, 5.0)) | {"good": (1.5, 1.0), "none": (4.0, 3.0)}
+    assert "At 30 runs m0, m1, m2, m3, m4 and 4 more do no better" in text(
+        made(grid(H), alone=dict.fromkeys([*names, "good"], 9.0), claims=None)
+    )

@@ -61,6 +61,19 @@ BROKEN = {
     "claims-of-no-physics": ("claims.inaccurate", "valid: right, wrong"),
     "claims-of-many-members": ("claims.inaccurate", "2 members"),
     "claims-of-one-family": ("claims.inaccurate", "the same family"),
+    "claims-of-accurate-alone": ("claims", "`accurate` and `inaccurate` go together"),
+    "claims-of-high-alone": ("claims", "`moderate` and `high` go together"),
+    "claims-of-one-degraded-family": ("claims.high", "the same family as claims.moderate"),
+    "claims-of-unknown-moderate": ("claims.moderate", "did you mean 'wrong'?"),
+    "nominal-of-many-members": ("claims.nominal", "2 members: the nominal row is the base as it is"),
+    "nominal-that-is-perturbed": ("claims.nominal", "'wrong' is perturbed"),
+    "nominal-that-is-degraded": ("claims.nominal", "the same family as claims.moderate"),
+    "aside-of-nobody": ("claims.aside", "did you mean 'right'?"),
+    "published-without-source": ("published.source", "missing"),
+    "published-unknown-quantity": ("published", "envelope.u_deg is no input: did you mean"),
+    "published-out-of-order": ("published", "envelope.r_deg: give [min, mean, max], found [0.0, 8.0, 6.0]"),
+    "published-of-two-numbers": ("published", "envelope.r_deg: give [min, mean, max], found [0.0, 8.0]"),
+    "negative-world": ("seed", "greater than or equal to 0"),
 }
 
 

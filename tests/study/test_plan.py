@@ -14,7 +14,15 @@ from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
 
 
-@pytest.mark.parametrize(("name", "models", "batches"), [("quick", 3 + 2 + 1, 3), ("full-scale", 3 + 1, 3 * 3)])
+@pytest.mark.parametrize(
+    ("name", "models", "batches"),
+    [
+        ("quick", 3 + 2 + 1, 3),
+        ("full-scale", 3 + 1, 3 * 3),
+        ("simulation", 10 + 8 + 1 + 1, 10),
+        ("simulation-small", 4 + 3 + 1 + 1, 3 * 2),
+    ],
+)
 def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
     plan = read_plan(name)
     assert (len(plan.models), len(plan.batches), plan.cells) == (models, batches, models * batches)
@@ -23,7 +31,7 @@ def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
 
 
 def test_every_bundled_study_is_tested() -> None:
-    assert set(bundled("studies")) == {"quick", "full-scale"}
+    assert set(bundled("studies")) == {"quick", "full-scale", "simulation", "simulation-small"}
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
@@ -44,6 +52,58 @@ def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
     accurate = models["accurate"].variant
     assert accurate is not None
     assert accurate.parameters == list(base.values())
+
+
+def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
+    """19 models and the nominal one, N_D = 10, 20, ... 100, 50 trials per cell; the small one is a part of it."""
+    full, small = read_plan("simulation"), read_plan("simulation-small")
+    assert [batch.N_D for batch in full.batches] == list(range(100, 0, -10))
+    assert (full.recipe.trials, full.recipe.sampler, full.recipe.refit) == (50, "tpe", 0)
+    assert read_plan("simulation", {"recipe.kind": "fast"}).recipe == small.recipe
+    assert small.study.truth == full.study.truth
+    assert small.study.split == full.study.split
+    assert small.study.prediction == full.study.prediction
+    assert small.study.published == full.study.published
+    wide = {model.name: model.variant for model in full.models}
+    assert all(model.variant is None or model.variant.values == wide[model.name].values for model in small.models)
+    nominal = wide["nominal"]
+    assert nominal is not None
+    assert not nominal.values
+
+
+def test_seed_0_is_the_world_as_written(tmp_path: Path) -> None:
+    plain, zero = tiny_plan(tmp_path), tiny_plan(tmp_path, {"seed": 0})
+    assert zero.study == plain.study
+    assert [m.variant and m.variant.values for m in zero.models] == [
+        m.variant and m.variant.values for m in plain.models
+    ]
+    assert zero.batches == plain.batches
+
+
+def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path: Path) -> None:
+    changes = {"grid.seeds": [0, 2]}
+    here, there = tiny_plan(tmp_path, changes), tiny_plan(tmp_path, {**changes, "seed": 3})
+    assert here.study.truth is not None
+    assert there.study.truth is not None
+    assert there.study.truth.seed == here.study.truth.seed + 3000
+    assert there.study.split.seed == here.study.split.seed + 3000
+    assert sorted({batch.seed for batch in there.batches}) == there.study.grid.seeds == [3000, 3002]
+    for one, other in zip(here.models, there.models, strict=True):
+        assert one.name == other.name
+        if one.variant and other.variant and one.variant.values:
+            assert all(one.variant.values[path] != other.variant.values[path] for path in one.variant.values)
+    assert there.digest != here.digest
+    assert there.digest_in_any_world == here.digest_in_any_world
+    assert tiny_plan(tmp_path, {**changes, "recipe.epochs": 7}).digest_in_any_world != here.digest_in_any_world
+
+
+def test_a_stored_world_is_the_same_world(tmp_path: Path) -> None:
+    """The document keeps the seeds as written: they are not shifted again."""
+    plan = tiny_plan(tmp_path, {"seed": 2})
+    again = tmp_path / "again.toml"
+    again.write_text(plan.text())
+    assert read_plan(again).study == plan.study
+    assert read_plan(again).digest == plan.digest
 
 
 def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:

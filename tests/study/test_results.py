@@ -12,7 +12,7 @@ import pytest
 from shipid.data.dataset import read_dataset
 from shipid.study import results as frames
 from shipid.study import store
-from shipid.study.plan import read_plan
+from shipid.study.plan import build_plan, read_plan
 from shipid.study.results import Results, read_results
 
 
@@ -129,3 +129,66 @@ def test_a_diverged_model_is_marked_and_left_out_of_curves(read: Results) -> Non
 def test_repairs_have_their_columns(read: Results) -> None:
     assert list(frames.repairs_frame(read).columns) == ["kind", "column", "count", "note"]
     assert isinstance(frames.repairs_frame(read), pd.DataFrame)
+
+
+def test_curves_and_paths_are_kept_for_three_amounts(read: Results) -> None:
+    many = pd.concat([read.cells.assign(N_D=10 * k) for k in range(1, 11)], ignore_index=True)
+    assert frames.shown_amounts(replace(read, cells=many)) == [10, 30, 100]
+    assert frames.shown_amounts(read) == [4, 6]
+    assert frames.shown_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
+    middle = pd.concat([read.cells.assign(N_D=amount) for amount in (4, 5, 6, 50)], ignore_index=True)
+    shown = replace(read, cells=middle)
+    for frame in (frames.horizon_frame(shown), frames.time_frame(shown)):
+        assert set(frame["N_D"]) == {0, 4, 6, 50}
+    assert {N_D for snapshot in frames.snapshots(shown) for *_, N_D in snapshot["paths"]} == {0, 4, 6, 50}
+
+
+def test_errors_by_axis_of_every_model(read: Results) -> None:
+    models = read.models.set_index("model")
+    assert models.loc["none", ["A_along", "A_across"]].isna().all()
+    physics = models.drop(index="none")
+    assert (physics[["A_along", "A_across"]].max(axis=1) <= physics["A"]).all()
+    assert (physics["A"] <= physics["A_along"] + physics["A_across"]).all()
+    error = np.abs(read.physics["wrong-1"] - read.test.future).mean(axis=(0, 1))
+    assert models.loc["wrong-1", ["A_along", "A_across"]].tolist() == pytest.approx(error.tolist())
+
+
+def test_factors_by_model_and_group(read: Results) -> None:
+    frame = frames.factors_frame(read)
+    assert set(frame["model"]) == {"wrong-1", "wrong-2"}
+    assert set(frame["group"]) == {"hull"}
+    assert frame["factor"].between(0.4, 1.6).all()
+    variant = next(model.variant for model in read.plan.models if model.name == "wrong-1")
+    assert variant is not None
+    mine = frame[frame["model"] == "wrong-1"].set_index("path")["factor"]
+    assert mine.to_dict() == pytest.approx(dict(variant.factors))
+
+
+def test_trials_know_the_chosen_one(read: Results) -> None:
+    frame = frames.trials_frame(read)
+    assert len(frame) == 8
+    assert frame["chosen"].all()
+    assert list(frame.columns[-1:]) == ["weight_decay"]
+    first = read.rows[0]
+    two = [{**first["trials"][0], "number": k, "value": value} for k, value in enumerate((2.0, 1.0))]
+    two.append({**two[0], "number": 2, "state": "diverged", "value": None})
+    frame = frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": two}])))
+    assert frame["chosen"].tolist() == [False, True, False]
+    assert frame["value"].tolist() == pytest.approx([2.0, 1.0, np.nan], nan_ok=True)
+    diverged = [{**trial, "state": "diverged", "value": None} for trial in two]
+    assert not frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": diverged}])))["chosen"].any()
+
+
+def test_published_envelope_in_the_same_units(read: Results) -> None:
+    envelope = {"u": [0.0, 2.3, 6.0], "r_deg": [-8.2, 0.0, 7.8], "n_rpm": [50, 125, 200], "alpha_deg": [-49, -2, 49]}
+    envelope |= {"delta_deg": [-1.0, 0.0, 1.0]}  # the study has no rudder
+    document = {**read.plan.document, "published": {"source": "a paper", "envelope": envelope}}
+    shown = replace(read, plan=build_plan(document, Path(read.plan.file), read.plan.vessels))
+    frame = frames.envelope_frame(shown).set_index(["set", "quantity"]).loc["published"]
+    assert list(frame.index) == ["u", "r", "port.n", "port.alpha"]
+    assert frame.loc["port.n", ["min", "mean", "max"]].tolist() == pytest.approx([50, 125, 200])
+    assert frame.loc["r", ["min", "mean", "max"]].tolist() == pytest.approx([-8.2, 0.0, 7.8])
+    assert frame["unit"].to_dict() == {"u": "m/s", "r": "deg/s", "port.n": "rpm", "port.alpha": "deg"}
+    assert "published" not in set(frames.envelope_frame(read)["set"])
+    assert frames.provenance_words(shown)["published envelope"] == "a paper"
+    assert {"world", "published envelope"}.isdisjoint(frames.provenance_words(read))

@@ -20,7 +20,7 @@ def test_every_parameter_has_a_unit_and_a_value(vessel: Vessel) -> None:
 
 def test_every_number_of_a_switched_on_block_is_a_parameter(bundled_vessel: Vessel) -> None:
     """No number of a bundled vessel is read over: what is no parameter is structure, a particular, or switched off."""
-    spare = ("particulars.", "constants.", "dof", "hull.crossflow.strips", "thruster.bow.")
+    spare = ("particulars.", "constants.", "dof", "hull.crossflow.strips", "thruster.bow.", "waves.")
     numbers = [path for path, value in leaves(bundled_vessel.document) if type(value) in (int, float)]
     assert [path for path in numbers if path not in bundled_vessel.parameters and not path.startswith(spare)] == []
 

@@ -9,7 +9,7 @@ from shipid.document import bundled
 from shipid.physics import ACTUATORS, SIGNALS, TERMS
 from shipid.physics.inertia import rigid_body
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import counts, kinds, parameters, signals, term_blocks, vessel_model
+from shipid.vessel.schema import kinds, parameters, signals, structural, term_blocks, vessel_model
 
 
 @pytest.mark.parametrize("key", list(TERMS))
@@ -17,8 +17,12 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
     """Positional arguments are signals or component arrays; keyword-only ones have a unit."""
     term = TERMS[key]
     given = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment}
-    if term.components is not None:
-        given |= set(term.components(**dict.fromkeys(counts(term), 3)))
+    source = term.components or term.drawn
+    if source is not None:
+        given |= set(source(**dict.fromkeys(structural(term), 3)))
+    if term.rates is not None:
+        assert term.states is not None
+        assert set(signals(term.rates)) <= given
     assert set(signals(term.function)) <= given
     known = {"return", *signals(term.function), *(p.name for p in parameters(term.function))}
     assert known == set(term.function.__annotations__)

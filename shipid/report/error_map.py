@@ -1,0 +1,325 @@
+"""The map H(A, N_D): what a manoeuvre and a metre of accuracy are worth, flat and as bars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
+from shipid.report.contours import contour, length, nice_levels
+from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line
+from shipid.report.gain import unplotted
+from shipid.report.palette import GRID, INK, MUTED, level
+from shipid.report.selection import families, trained
+from shipid.report.wording import counted, metres, number
+
+HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
+MARGIN = {"l": 52, "r": 12, "t": 12, "b": 44}
+MOST_LINES = 5
+TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
+SHORT = 12  # characters of a name at the axis
+CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
+# Triangles of a box whose corners 0-3 are the floor and 4-7 the top; the floor is never seen.
+FACES = [(4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7)]
+
+
+class Spot(NamedTuple):
+    """A model and an N_D: H and its range over seeds [m], whether it beats pure data-driven, and what hover says."""
+
+    model: str
+    row: int
+    size: int
+    H: float
+    worse: bool
+    words: str
+
+
+def error_map(content: ReportContent) -> Figure | None:
+    """H over A and N_D; None where there is a single N_D or fewer than two physics models."""
+    rows = _rows(content)
+    counts = sorted({int(size) for size in content.cells.N_D})
+    means = trained(content)
+    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+        return None
+    spots = _spots(content, means, rows)
+    span = (float(means.H.min()), float(means.H.max()))
+    pieces = _pieces(rows, counts, spots)
+    lined = " Lines of equal error are linear between neighbouring cells that gave a result, and none is drawn beside "
+    lined += "one that did not; pieces shorter than the distance of two N_D are left out."
+    return Figure(
+        id="map",
+        title="Physics and data: the map",
+        takeaway=_takeaway(rows, spots),
+        how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is H, mean over "
+        "seeds. Hatched: H is not below that of pure data-driven at the same N_D."
+        + (lined if pieces else "")
+        + " The bars show the same cells, models in the order of A; drag with the mouse to turn them."
+        + unplotted(content),
+        alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
+        "the table of cells.",
+        height=HEIGHT,
+        views={"0": [Panel(_flat(rows, counts, spots, span, pieces))], "1": [Panel(_bars(rows, counts, spots, span))]},
+        controls=[Control("View", ["map", "3-D bars"])],
+        chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [],
+        scale=Scale("position error, mean, H [m]", *span, "--heat"),
+    )
+
+
+def _rows(content: ReportContent) -> pd.DataFrame:
+    """Models of the cells by A, what has no A on top: model, family, A [m], y (square root of A, strips above)."""
+    frame = families(content)
+    frame = frame[frame.model.isin(content.cells.model)].reset_index(drop=True)
+    top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
+    without = frame.A.isna()
+    strips = top * (1.05 + 0.06 * without.cumsum())
+    return frame.assign(y=np.sqrt(frame.A).where(~without, strips))
+
+
+def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> list[Spot]:
+    found = {(str(model), int(size)): float(H) for model, size, H in zip(means.model, means.N_D, means.H, strict=True)}
+    pure = set(rows.model[rows.family == DATA_DRIVEN])
+    learned = {size: H for (model, size), H in found.items() if model in pure}
+    place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
+    spots = []
+    for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=True):
+        key = str(model), int(str(size))
+        H, floor = found.get(key, math.nan), learned.get(key[1], math.inf)
+        worse = key[0] not in pure and floor <= H
+        words = _words(cells, *key, float(accuracy[key[0]]), H, floor if worse else None)
+        spots.append(Spot(key[0], place[key[0]], key[1], H, worse, words))
+    return spots
+
+
+def _words(cells: pd.DataFrame, model: str, size: int, A: float, H: float, learned: float | None) -> str:
+    """Lines of the hover box of one model and N_D."""
+    good = cells[cells.status.eq("ok") & cells.H.notna()]
+    lines = [f"<b>{label(model)}</b>, " + (f"A {metres(A)}, " if math.isfinite(A) else "") + f"N_D = {size}"]
+    if good.empty:
+        first = cells.iloc[0]
+        return "<br>".join([*lines, label(f"{first.status}: {first.sentence}".rstrip(": "))])
+    lines.append(f"H {metres(H)}, H_90 {metres(float(good.H_90.mean()))}")
+    if len(cells) > 1:
+        lines.append(f"{number(good.H.min())} to {metres(good.H.max())} over {counted(len(good), 'seed')}")
+    if len(good) < len(cells):
+        lines.append(f"{len(cells) - len(good)} of {counted(len(cells), 'seed')} gave no result")
+    if learned is not None:
+        lines.append(f"no better than pure data-driven, {metres(learned)}")
+    best = good.sort_values("H").iloc[0]
+    return "<br>".join([*lines, label(str(best.hyperparameters))] if best.get("hyperparameters") else lines)
+
+
+def _widths(counts: Sequence[int]) -> dict[int, float]:
+    """Width of a cell [N_D]: most of the way to its nearer neighbour, but no cell much wider than another."""
+    gaps = np.diff(counts)
+    nearest = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
+    widths = 0.86 * np.minimum(nearest, 1.5 * gaps.min())
+    return {size: float(width) for size, width in zip(counts, widths, strict=True)}
+
+
+def _reaches(y: Floats, most: float) -> tuple[Floats, Floats]:
+    """How far the cells of each row reach down and up: half way to the next row, but not farther than `most`."""
+    half = np.minimum(np.diff(y) / 2, most)
+    ends = [min(most, float(half[0])) if len(half) else most, min(most, float(half[-1])) if len(half) else most]
+    return np.insert(half, 0, ends[0]), np.append(half, ends[1])
+
+
+def _pieces(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot]) -> list[tuple[float, Floats]]:
+    """Lines of equal H through the physics models: level [m] and points (N_D, y)."""
+    physics = rows[rows.A.notna() & rows.family.ne(DATA_DRIVEN)]
+    values = np.full((len(rows), len(counts)), np.nan)
+    for spot in spots:
+        values[spot.row, list(counts).index(spot.size)] = spot.H
+    values = values[physics.index.to_numpy()]
+    x, y = np.asarray(counts, dtype=float), physics.y.to_numpy(dtype=float)
+    return [
+        (height, piece)
+        for height in nice_levels(values, MOST_LINES)
+        for piece in contour(x, y, values, height)
+        if np.ptp(piece[:, 0]) >= np.diff(x).min()
+    ]
+
+
+def _flat(
+    rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float], pieces: Any
+) -> go.Figure:
+    top, widths = float(rows.y.max()) * 1.04, _widths(counts)
+    most = THICK / 2 * top / (HEIGHT - MARGIN["t"] - MARGIN["b"])
+    y = rows.y.to_numpy(dtype=float)
+    low, high = _reaches(y, most)
+    good, bad = [s for s in spots if math.isfinite(s.H)], [s for s in spots if not math.isfinite(s.H)]
+    cells = go.Bar(
+        x=[spot.size for spot in good],
+        y=[round(low[spot.row] + high[spot.row], 4) for spot in good],
+        base=[round(y[spot.row] - low[spot.row], 4) for spot in good],
+        width=[widths[spot.size] for spot in good],
+        marker={
+            "color": [f"var(--heat-{level(spot.H, span)})" for spot in good],
+            "line": {"width": 0.5, "color": MUTED},
+        },
+        customdata=[spot.words for spot in good],
+        hovertemplate="%{customdata}<extra></extra>",
+    )
+    worse = [spot for spot in good if spot.worse]
+    hatched = go.Bar(
+        x=[spot.size for spot in worse],
+        y=[round(low[spot.row] + high[spot.row], 4) for spot in worse],
+        base=[round(y[spot.row] - low[spot.row], 4) for spot in worse],
+        width=[widths[spot.size] for spot in worse],
+        marker={"color": "rgba(0,0,0,0)", "line": {"width": 1.2, "color": INK}},
+        marker_pattern={"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16},
+        hoverinfo="skip",
+    )
+    failed = go.Scatter(
+        x=[spot.size for spot in bad],
+        y=[y[spot.row] for spot in bad],
+        mode="markers",
+        marker={"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}},
+        customdata=[spot.words for spot in bad],
+        hovertemplate="%{customdata}<extra></extra>",
+    )
+    lines, names = _isolines(pieces)
+    ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
+    x = axis("manoeuvres, N_D [1]", tickvals=list(counts), range=ends, showgrid=False)
+    up = axis("error of the physics alone, A [m]", range=[0, top], automargin=True, **_ticks(rows))
+    plot = layout(x, up, hovermode="closest", barmode="overlay", annotations=names, margin=MARGIN)
+    strips = rows[rows.A.isna()]
+    if len(strips):
+        edge = float(np.mean([rows.y[rows.A.notna()].max(), strips.y.min()]))
+        rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
+        plot["shapes"] = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}]
+    return go.Figure([cells, hatched, failed, *lines], plot)
+
+
+def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
+    """Ticks of A where the rows are, far enough apart to read; a strip is named."""
+    known = rows[rows.A.notna()]
+    room, values = 0.06 * float(rows.y.max()), [0.0]
+    for tick in TICKS:
+        if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
+            values.append(float(tick))
+    strips = rows[rows.A.isna()]
+    names = ["no model" if row.family == DATA_DRIVEN else _shortened(str(row.model)) for row in strips.itertuples()]
+    return {
+        "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
+        "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
+    }
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= SHORT else name[: SHORT - 1] + "…"
+
+
+def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[go.Scatter], list[dict[str, Any]]]:
+    """Ink lines on a pale rim, and the level written once, on the longest piece."""
+    traces, names = [], []
+    longest: dict[float, Floats] = {}
+    for ink in ({"color": "var(--page)", "width": 4}, {"color": INK, "width": 1.5}):
+        for height, piece in pieces:
+            traces.append(line(metres(height), piece[:, 0], piece[:, 1], ["iso"], line=ink, hoverinfo="skip"))
+            traces[-1].hovertemplate = None
+    for height, piece in pieces:
+        if height not in longest or length(piece) > length(longest[height]):
+            longest[height] = piece
+    for height, piece in longest.items():
+        x, y = piece[len(piece) // 2]
+        names.append(
+            {"x": float(x), "y": float(y), "text": f"{height:g} m", "showarrow": False}
+            | {"font": {"size": 11, "color": INK}, "bgcolor": "var(--page)", "borderpad": 1}
+        )
+    return traces, names
+
+
+def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float]) -> go.Figure:
+    """One box per model and N_D, as in the paper's Fig. 8."""
+    good = [spot for spot in spots if math.isfinite(spot.H)]
+    depth = {size: len(counts) - 1 - i for i, size in enumerate(counts)}
+    boxes = [_box(spot.row, depth[spot.size], spot.H) for spot in good]
+    corners = np.concatenate(boxes)
+    faces = np.concatenate([np.array(FACES) + 8 * i for i in range(len(boxes))])
+    mesh = go.Mesh3d(
+        **dict(zip("xyz", corners.T.astype(np.float32), strict=True)),
+        **dict(zip("ijk", faces.T, strict=True)),
+        facecolor=[f"var(--heat-{level(spot.H, span)})" for spot in good for _ in FACES],
+        flatshading=True,
+        lighting={"ambient": 0.85, "diffuse": 0.35, "specular": 0.0, "roughness": 1.0},
+        hovertext=[f"{label(s.model)}, N_D = {s.size}: H {metres(s.H)}" for s in good for _ in range(8)],
+        hoverinfo="text",
+    )
+    bad = [spot for spot in spots if not math.isfinite(spot.H)]
+    failed = go.Scatter3d(
+        x=[spot.row for spot in bad],
+        y=[depth[spot.size] for spot in bad],
+        z=[0] * len(bad),
+        mode="markers",
+        marker={"symbol": "x", "size": 3, "color": "var(--bad)"},
+        hovertext=[spot.words for spot in bad],
+        hoverinfo="text",
+    )
+    return go.Figure([mesh, failed], _stage(rows, counts, span))
+
+
+def _box(row: int, column: int, height: float) -> Floats:
+    """Corners (8, 3) of a bar: the floor, then the top."""
+    floor = [(row + 0.7 * (a - 0.5), column + 0.7 * (b - 0.5)) for a, b in CORNERS]
+    return np.array([(*point, z) for z in (0.0, height) for point in floor])
+
+
+def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float]) -> dict[str, Any]:
+    """Lay out the bars: the largest N_D in front, since H falls with N_D and short bars hide nothing."""
+    shown = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), 8)).round().astype(int))
+    by_model = {
+        "tickvals": shown.tolist(),
+        "ticktext": [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]],
+        "range": [-0.7, len(rows) - 0.3],
+    }
+    some = np.unique(np.linspace(0, len(counts) - 1, min(len(counts), 4)).round().astype(int))
+    by_size = {
+        "tickvals": (len(counts) - 1 - some).tolist(),
+        "ticktext": [str(counts[i]) for i in some],
+        "range": [-0.7, len(counts) - 0.3],
+    }
+    scene = {
+        "xaxis": _side("models by A [m]", **by_model),
+        "yaxis": _side("N_D [1]", **by_size),
+        "zaxis": _side("H [m]", range=[0, 1.02 * span[1]], nticks=6),
+        "aspectmode": "manual",
+        "aspectratio": {"x": 1.9, "y": 1.25, "z": 0.9},
+        "camera": {
+            "eye": {"x": -0.5, "y": -1.95, "z": 1.25},
+            "center": {"x": -0.04, "y": 0, "z": -0.1},
+            "projection": {"type": "orthographic"},
+        },
+    }
+    plot = layout({}, {}, margin={"l": 0, "r": 0, "t": 0, "b": 0}, scene=scene)
+    return {key: value for key, value in plot.items() if key not in ("xaxis", "yaxis")}
+
+
+def _side(title: str, **options: Any) -> dict[str, Any]:
+    base = {"gridcolor": GRID, "color": INK, "backgroundcolor": "rgba(0,0,0,0)", "showspikes": False, "zeroline": False}
+    return {**base, "title": {"text": title, "font": {"size": 12}}, "tickfont": {"size": 11}, **options}
+
+
+def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
+    """Where H is lowest and highest, and up to which A physics helped at every N_D."""
+    pure = set(rows.model[rows.family == DATA_DRIVEN])
+    accuracy = dict(zip(rows.model, rows.A, strict=True))
+    good = [spot for spot in spots if math.isfinite(spot.H)]
+    best, worst = min(good, key=lambda s: s.H), max(good, key=lambda s: s.H)
+    text = f"H runs from {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
+    text += f"N_D = {worst.size})"
+    judged = {spot.size for spot in good if spot.model in pure}
+    physics = [spot for spot in good if spot.model not in pure and spot.size in judged]
+    worse = [spot for spot in physics if spot.worse]
+    if not physics:
+        return f"{text}."
+    if not worse:
+        return f"{text}; physics helps in all {counted(len(physics), 'cell')}."
+    limit = float(np.nanmin([accuracy[spot.model] for spot in worse] + [math.inf]))
+    text += f"; in {len(worse)} of {counted(len(physics), 'cell')} physics does not help"
+    below = sum(float(accuracy[spot.model]) < limit for spot in physics)
+    return text + (f", none of them below A = {metres(limit)}." if below else ".")

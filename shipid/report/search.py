@@ -1,0 +1,200 @@
+"""The search: what was tried in the cells, what was stopped, what was chosen and what it cost."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import TRIAL, Floats, ReportContent
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
+from shipid.report.palette import INK, MUTED, category
+from shipid.report.selection import sizes
+from shipid.report.tables import Cell, Table, duration, figure, text
+from shipid.report.wording import counted, number
+
+MOST_DOTS = 1200  # in one panel: more hide each other
+MOST_CHOSEN = 200
+BINS = 8  # of the middle line
+WIDE = 10.0  # largest / smallest value from which an axis is logarithmic
+CEILING = 4.0  # times the best of the cell: farther off is drawn here
+FAILED = CEILING * 1.25  # where diverged trials lie
+
+
+def search(content: ReportContent) -> Figure | None:
+    """Error of the trials over each searched hyperparameter; None without trials or without any."""
+    names, frame = searched(content), _relative(content.trials)
+    if not names or frame.empty:
+        return None
+    counts = sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
+    parts = [frame, *(frame[frame.N_D.eq(size)] for size in counts)]
+    views = {
+        str(i) if counts else "": [Panel(_panel(part, name, frame[name]), _caption(part, name)) for name in names]
+        for i, part in enumerate(parts)
+    }
+    return Figure(
+        id="search",
+        title="What the search tried",
+        takeaway=_takeaway(frame, names),
+        how="Each dot is a trial: the root of its validation error over the best of its cell; "
+        f"{_thinned(frame)}those beyond {CEILING:g} times lie at the upper edge, those that diverged above it. The "
+        "line joins the medians of all that ended. Rank correlation (Spearman) is taken within each cell, then "
+        "averaged over cells: it sees what rises or falls throughout, not an optimum in the middle.",
+        alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
+        height=270,
+        views=views,
+        controls=[Control("Manoeuvres, N_D", ["all", *map(str, counts)])] if counts else [],
+        chips=[
+            Chip("state:complete", "trial", MUTED, "none", symbol="circle"),
+            Chip("state:stopped", "stopped early", category(4), "none", symbol="triangle-up"),
+            Chip("state:diverged", "diverged", "var(--bad)", "none", symbol="x"),
+            Chip("chosen", "chosen", category(0), "none", symbol="diamond"),
+            Chip("median", "median", INK),
+        ],
+    )
+
+
+def table(content: ReportContent) -> Table | None:
+    """Sum the trials up by N_D; None without trials."""
+    frame, names = content.trials, searched(content)
+    if frame.empty:
+        return None
+    rows = [_row(int(str(size)), mine, names) for size, mine in frame.groupby("N_D", sort=True)]
+    chosen = [f"chosen {name} [1]" for name in names]
+    headings = ["N_D [1]", "cells [1]", "trials [1]", "stopped [1]", "diverged [1]", "epochs [1]", "time [s]"]
+    headings += ["time per cell [s]", *chosen]
+    return Table("search-table", "The search by N_D", _counts(frame), headings, [True] * len(headings), rows)
+
+
+def searched(content: ReportContent) -> list[str]:
+    """Names of the searched hyperparameters: further columns of the trials that take more than one value."""
+    frame = content.trials
+    return [str(name) for name in frame.columns if name not in TRIAL and frame[name].nunique() > 1]
+
+
+def importance(frame: pd.DataFrame, name: str) -> float:
+    """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
+    found = []
+    for _, mine in frame[frame.value.notna() & frame[name].notna()].groupby("cell"):
+        if mine[name].nunique() > 1 and mine.value.nunique() > 1 and len(mine) > 2:
+            found.append(float(np.corrcoef(mine[name].rank(), mine.value.rank())[0, 1]))
+    return float(np.mean(found)) if found else math.nan
+
+
+def _relative(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials with `ratio` [1]: the root of the value over the best of the cell."""
+    good = trials.value.where(trials.state.ne("diverged")).astype(float)
+    return trials.assign(value=good, ratio=np.sqrt(good / good.groupby(trials.cell).transform("min")))
+
+
+def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
+    """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
+    traces = []
+    looks = {
+        "complete": {"symbol": "circle", "size": 4, "color": MUTED, "opacity": 0.45},
+        "stopped": {"symbol": "triangle-up", "size": 5, "color": category(4), "opacity": 0.6},
+        "diverged": {"symbol": "x", "size": 6, "color": "var(--bad)", "opacity": 0.7},
+    }
+    chosen = frame.chosen.astype(bool)
+    others, best = _some(frame[~chosen], MOST_DOTS), _some(frame[chosen], MOST_CHOSEN)
+    for state, marker in looks.items():
+        traces.append(_dots(others[others.state == state], name, state, [f"state:{state}"], marker))
+    diamond = {"symbol": "diamond", "size": 7, "color": category(0), "opacity": 0.8}
+    middle = _medians(frame[frame.ratio.notna()], name)
+    if len(middle):
+        traces.append(
+            line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line={"color": INK, "width": 2.5})
+        )
+    traces.append(_dots(best, name, "chosen", ["chosen"], diamond))
+    return go.Figure(traces, _frame(name, every))
+
+
+def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dict[str, Any]) -> go.Scatter:
+    y = mine.ratio.clip(upper=CEILING).fillna(FAILED).to_numpy(dtype=float)
+    trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
+    known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
+    trace.hovertemplate = f"{label(what)}: {label(name)} %{{x:.3g}}{known}<extra></extra>"
+    return trace
+
+
+def _some(frame: pd.DataFrame, most: int) -> pd.DataFrame:
+    """At most so many trials, at even distances."""
+    return frame.iloc[np.linspace(0, len(frame) - 1, min(len(frame), most)).round().astype(int)]
+
+
+def _thinned(frame: pd.DataFrame) -> str:
+    most = MOST_DOTS + MOST_CHOSEN
+    return f"of many, at most {most:,} are drawn in a panel; " if len(frame) > most else ""
+
+
+def _medians(frame: pd.DataFrame, name: str) -> Floats:
+    """Median ratio per value of a hyperparameter, or per eighth of its values where there are many: (n, 2)."""
+    values = frame[name].astype(float)
+    if frame.empty or values.nunique() < 2:
+        return np.empty((0, 2))
+    groups = values if values.nunique() <= BINS else values.rank(pct=True).mul(BINS).apply(np.ceil)
+    found = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
+    points: Floats = np.minimum(found.to_numpy(dtype=float), [np.inf, CEILING])
+    return points
+
+
+def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
+    low, high = float(every.min()), float(every.max())
+    title = f"{label(name)} [1]"
+    room = 0.04
+    if low > 0 and high / low > WIDE:
+        ends = np.log10([low, high])
+        span = [float(ends[0] - room * np.ptp(ends)), float(ends[1] + room * np.ptp(ends))]
+        x = logarithmic(title, (1,) if np.ptp(ends) > 1.5 else (1, 2, 5), range=span)
+    else:
+        x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
+    ticks: dict[str, Any] = {
+        "tickvals": [1, 1.5, 2, 3, CEILING, FAILED],
+        "ticktext": ["1", "1.5", "2", "3", f"≥{CEILING:g}", "div."],
+    }
+    y = logarithmic("error / best of cell [1]", range=[-0.02, math.log10(FAILED) + 0.04], **ticks)
+    return layout(x, y, hovermode="closest")
+
+
+def _caption(frame: pd.DataFrame, name: str) -> str:
+    found = importance(frame, name)
+    return f"rank correlation {number(round(found, 2) + 0.0)}" if math.isfinite(found) else "no rank correlation"
+
+
+def _counts(frame: pd.DataFrame) -> str:
+    states = {name: int(frame.state.eq(name).sum()) for name in ("stopped", "diverged")}
+    said = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {states['stopped']:,} stopped "
+    said += f"early, {states['diverged']:,} diverged"
+    return f"{said}; {duration(float(frame.seconds.sum()))} of training."
+
+
+def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
+    """What a usual trial loses against the best, and which hyperparameter goes with it."""
+    if frame.ratio.isna().all():
+        return f"None of {counted(len(frame), 'trial')} ended with a value."
+    text = f"The middle trial errs by {number(float(frame.ratio.median()))} times the best of its cell"
+    found = {name: importance(frame, name) for name in names}
+    found = {name: value for name, value in found.items() if math.isfinite(value)}
+    if found:
+        most = max(found, key=lambda name: abs(found[name]))
+        text += f"; {most} goes with it most, rank correlation {number(found[most])}"
+    return f"{text}."
+
+
+def _row(size: int, mine: pd.DataFrame, names: list[str]) -> list[Cell]:
+    counts = [mine.cell.nunique(), len(mine), int(mine.state.eq("stopped").sum()), int(mine.state.eq("diverged").sum())]
+    seconds = float(mine.seconds.sum())
+    numbers = [size, *counts, int(mine.epochs.sum()), seconds, seconds / counts[0]]
+    chosen = mine[mine.chosen.astype(bool)]
+    return [figure(value, 0) for value in numbers] + [_range(chosen[name].astype(float).dropna()) for name in names]
+
+
+def _range(values: pd.Series[float]) -> Cell:
+    """Smallest, middle and largest chosen value."""
+    if values.empty:
+        return text(None)
+    low, middle, high = (float(value) for value in values.quantile([0.0, 0.5, 1.0]))
+    return Cell(" / ".join(f"{value:.2g}" for value in (low, middle, high)), middle)

@@ -1,0 +1,178 @@
+"""Before a manoeuvre: which commands drive and turn a ship, its steady speed, and how azimuth units share a load.
+
+All is found by asking the equations, so that it holds for any vessel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import DocumentError, ShipidError
+from shipid.physics.helm import Unit, steers
+from shipid.simulation.integrate import Method
+from shipid.simulation.rollout import Engine, rollout
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+
+PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = 1.0, 1.0, 0.1  # m/s, rev/s, rad: where commands are asked what they do
+NOTHING = 1e-12  # m/s^2, rad/s^2
+CHUNK, LONGEST = 30.0, 3600.0  # s: an approach is looked at so often, and given up
+SETTLED = 1e-3  # m/s: greatest change of speed over a chunk of a steady approach
+WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
+
+
+@dataclass(frozen=True)
+class Controls:
+    """What the commands of a vessel do.
+
+    drives : shaft speeds that push it ahead.
+    helm : angle command -> +1 or -1, its sign that turns the ship to starboard; those that turn nothing are left out.
+    """
+
+    vessel: Vessel
+    commands: tuple[str, ...]
+    drives: tuple[str, ...]
+    helm: Mapping[str, float]
+
+    @classmethod
+    def of(cls, vessel: Vessel) -> Controls:
+        """Ask the equations; DocumentError for a vessel that nothing drives ahead or turns."""
+        commands = dynamics(vessel).commands
+        idle = acceleration(vessel, PROBE_SPEED, {})
+        ahead = {name: acceleration(vessel, PROBE_SPEED, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
+        drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
+        running = dict.fromkeys(drives, PROBE_SHAFT)
+        straight = acceleration(vessel, PROBE_SPEED, running)
+        turned = {
+            name: acceleration(vessel, PROBE_SPEED, {**running, name: PROBE_HELM})[2] - straight[2]
+            for name in commands
+            if steers(name)
+        }
+        helm = {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
+        if not drives or not helm:
+            message = f"no command {'turns' if drives else 'drives'} {vessel.name}: a manoeuvre needs `n` and an angle"
+            raise DocumentError(message, file=vessel.file, path="thruster")
+        return cls(vessel, commands, drives, helm)
+
+    def orders(self, n: Array, helm: Array) -> dict[str, Array]:
+        """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""
+        still = np.zeros(len(n))
+        angles = {name: sign * helm for name, sign in self.helm.items()}
+        return {name: angles.get(name, n if name in self.drives else still) for name in self.commands}
+
+
+def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
+    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others 0."""
+    model = dynamics(vessel)
+    state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
+    memory, orders = ([commands.get(name, 0.0) for name in names] for names in (model.memory, model.commands))
+    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
+    rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
+    return rates[[model.state.index(name) for name in ("u", "v", "r")]]
+
+
+def helm_effect(controls: Controls, n: float, u: float) -> float:
+    """Yaw acceleration per helm angle [1/s^2] at shaft speed n [rev/s] and speed u [m/s]."""
+    found = [
+        acceleration(controls.vessel, u, {name: float(order[0]) for name, order in controls.orders(*given).items()})[2]
+        for given in ((np.full(1, n), np.full(1, angle)) for angle in (0.0, PROBE_HELM))
+    ]
+    return float(found[1] - found[0]) / PROBE_HELM
+
+
+def steady(
+    controls: Controls, n: Array, *, step: float, method: Method, engine: Engine
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
+
+    From rest until the speed changes by less than 0.001 m/s in 30 s; position and time then begin anew.
+
+    Raises
+    ------
+    ShipidError : it diverges, or is not steady after an hour.
+    """
+    vessel, model = controls.vessel, dynamics(controls.vessel)
+    names = (*model.state, *model.hidden)
+    state = {name: np.zeros(len(n)) for name in names}
+    orders, memory = controls.orders(n, np.zeros(len(n))), None
+    calm = {name: np.zeros(len(n)) for name in model.environment}
+    num_steps = max(round(CHUNK / step), 1)
+    for _ in range(int(LONGEST / CHUNK)):
+        path = rollout(
+            vessel,
+            state,
+            orders,
+            calm,
+            step=step,
+            num_steps=num_steps,
+            every=num_steps,
+            method=method,
+            memory=memory,
+            engine=engine,
+        )
+        if path.diverged.any():
+            raise ShipidError(
+                f"the approach of {vessel.name} at {_rpm(n, path.diverged[0])} rpm diverges: "
+                f"take a smaller step than {step:g} s"
+            )
+        before = state
+        state = {name: path[name][-1, 0] for name in names}
+        memory = {name: path[f"actual.{name}"][-1, 0] for name in model.memory}
+        moving = np.max([np.abs(state[name] - before[name]) for name in ("u", "v")], axis=0) >= SETTLED
+        if not moving.any():
+            return state | {name: np.zeros(len(n)) for name in ("north", "east")}, memory
+    raise ShipidError(
+        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n, moving)} rpm: "
+        'start from rest (approach = "rest")'
+    )
+
+
+def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:
+    return f"{60 * n[int(np.argmax(faulty))]:g}"
+
+
+def thrust_sharing(vessel: Vessel) -> tuple[Unit, ...]:
+    """How the azimuth units share an acceleration asked for: least sum of n^4, exact at rest.
+
+    Raises
+    ------
+    DocumentError : the vessel has no two azimuth units that can push it ahead, aside and round.
+    """
+    commands = dynamics(vessel).commands
+    names = [name.removesuffix(".alpha") for name in commands if name.endswith(".alpha")]
+    names = [name for name in names if f"{name}.n" in commands]
+    idle = acceleration(vessel, 0.0, {})
+    effects = [
+        acceleration(vessel, 0.0, {f"{name}.n": PROBE_SHAFT, f"{name}.alpha": alpha}) - idle
+        for name in names
+        for alpha in (0.0, np.pi / 2)
+    ]
+    matrix = np.array(effects).reshape(-1, 3).T / PROBE_SHAFT**2  # (3, 2 x units)
+    if len(names) < 2 or np.linalg.cond(matrix) > WORST_CONDITION:
+        message = f"station keeping needs two azimuth units that push ahead, aside and round; {vessel.name} has "
+        raise DocumentError(message + (", ".join(names) or "none"), file=vessel.file, path="thruster")
+    shares = np.linalg.pinv(matrix)  # (2 x units, 3)
+    bias = _against_each_other(vessel, names, np.eye(len(shares)) - shares @ matrix)
+    return tuple(
+        Unit(name, _triple(shares[2 * i]), _triple(shares[2 * i + 1]), (float(bias[i, 0]), float(bias[i, 1])))
+        for i, name in enumerate(names)
+    )
+
+
+def _triple(row: Array) -> tuple[float, float, float]:
+    a, b, c = row.tolist()
+    return a, b, c
+
+
+def _against_each_other(vessel: Vessel, names: list[str], without_effect: Array) -> Array:
+    """Directions (units, 2) in which the units push inwards without moving the ship: their wash then goes outwards."""
+    blocks = vessel.document["thruster"]
+    place = np.array([[blocks[name]["x"], blocks[name]["y"]] for name in names], dtype=float)
+    pushed = (without_effect @ (place.mean(axis=0) - place).ravel()).reshape(-1, 2)
+    return np.asarray(pushed / max(np.linalg.norm(pushed, axis=1).max(), NOTHING))

@@ -1,0 +1,183 @@
+"""Excitation: command series that move a ship in many ways, for identification.
+
+Series are plain arrays about zero, or between limits, in the unit of the command; the caller adds the trim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import DocumentError
+from shipid.vessel.perturb import uniform
+
+Array = NDArray[np.float64]
+Phases = Literal["schroeder", "optimised"]
+
+STARTS, ROUNDS = 24, 400  # of the search for phases: 0.1 s; eight times the starts gain 2 % at most
+SAMPLES = 32  # per period of the highest harmonic where a peak is sought
+STRATA = 8  # parts of the range of levels that are visited in turn
+
+
+def multisine(
+    time: Array,
+    *,
+    period: float,
+    harmonics: Sequence[int],
+    amplitude: float,
+    phases: Phases = "optimised",
+    key: tuple[object, ...] = (),
+) -> Array:
+    """Sum of equally strong sines at harmonics / period [Hz], within +- amplitude at all times, 0 at t = 0: (T,).
+
+    x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]; it repeats after `period` [s]. One amplitude
+    limit, more power: the lower the crest factor, the larger a (see `crest_factor`).
+
+    schroeder : phi_k = -pi k (k - 1) / K, k = 1..K (Schroeder 1970, IEEE Trans. Inf. Theory 16); crest factor near 1.9
+        for successive harmonics, up to 3 for sparse ones.
+    optimised : lower, and never higher: from Schroeder's and from random phases by `key`, clip the peaks, keep the
+        phases of what is left and restore the amplitudes, again and again (Van der Ouderaa, Schoukens and Renneboog
+        1988, IEEE Trans. Instrum. Meas. 37); the best is taken. Crest factor 1.4 for 10 to 40 harmonics of a wide
+        band; narrow (17..21) and sparse ones stay at 1.7 to 1.9.
+
+    Several commands at once get disjoint harmonics (`deal`), which makes them orthogonal over a period, and are shifted
+    in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
+
+    Raises
+    ------
+    DocumentError : harmonics that are not positive, distinct and slow enough for the steps of `time`; limits below 0.
+    """
+    _check_multisine(time, period, harmonics, amplitude)
+    h = np.array(harmonics, dtype=np.int64)
+    start = -np.pi * np.arange(len(h)) * np.arange(1, len(h) + 1) / len(h)
+    phi = start if phases == "schroeder" else _optimise(h, start, key)
+    phi = _begin_at_zero(h, phi)
+    shape = np.sin(2 * np.pi * np.outer(time, h) / period + phi).sum(axis=1)
+    return np.asarray(amplitude / _peak(h, phi) * shape)
+
+
+def deal(harmonics: Sequence[int], count: int) -> tuple[tuple[int, ...], ...]:
+    """Harmonics of `count` orthogonal multisines: dealt in turn, so that each command covers the whole band."""
+    if not 1 <= count <= len(harmonics):
+        raise DocumentError(f"{len(harmonics)} harmonics cannot be dealt to {count} commands", path="harmonics")
+    return tuple(tuple(sorted(harmonics)[first::count]) for first in range(count))
+
+
+def aprbs(time: Array, *, hold: tuple[float, float], levels: tuple[float, float], key: tuple[object, ...]) -> Array:
+    """Amplitude-modulated pseudo-random binary sequence: levels held for random times, at times (T,) [s]: (T,).
+
+    Hold times are uniform in `hold` [s], counted from time[0]; the end of `time` cuts the last. Of every eight
+    successive levels one lies, uniformly, in each eighth of `levels`, in random order, so that short series cover the
+    range too (Nelles 2001, Nonlinear System Identification, ch. 17). All by hash(key): a longer series begins with
+    the shorter one.
+
+    Raises
+    ------
+    DocumentError : limits that run backwards, or hold times that are not positive.
+    """
+    _check_ordered("hold", hold, "s")
+    _check_ordered("levels", levels, "")
+    if hold[0] <= 0:
+        raise DocumentError(f"hold times must be positive, found {hold[0]:g} s", path="hold")
+    most = int((time[-1] - time[0]) / hold[0]) + 1
+    draws = np.array([uniform(*key, "hold", number) for number in range(most)])
+    ends = time[0] + np.cumsum(hold[0] + (hold[1] - hold[0]) * draws)
+    slack = 1e-9 * max(1.0, float(np.abs(time).max()))  # a level ends at 3 * 0.1 where it should at 0.3
+    number = np.searchsorted(ends, time + slack, side="right")
+    return np.asarray(levels[0] + (levels[1] - levels[0]) * _spread(int(number[-1]) + 1, key)[number])
+
+
+def limit_rate(series: Array, step: float, rate: float) -> Array:
+    """Nearest series (T,) or (T, S) to an ordered one that changes by no more than rate [1/s] * step [s] a sample.
+
+    It follows the order at full rate until it has caught up, from the order's first value on, as an actuator with
+    a rate limit does. A multisine that it changes has more than its own harmonics.
+    """
+    if step <= 0 or rate <= 0:
+        raise DocumentError(f"step and rate must be positive, found {step:g} s and {rate:g} 1/s", path="rate")
+    result = np.array(series, dtype=np.float64)
+    for now in range(1, len(result)):
+        result[now] = result[now - 1] + np.clip(result[now] - result[now - 1], -rate * step, rate * step)
+    return result
+
+
+def crest_factor(series: Array) -> Array:
+    """Greatest |x| over the root mean square of a series (T,) or of each column of (T, S): shape () or (S,).
+
+    1 for a square wave, sqrt(2) for a sine; over sqrt(2) it is Morelli's relative peak factor, if peaks are symmetric.
+    """
+    return np.asarray(np.abs(series).max(axis=0) / np.sqrt(np.mean(np.square(series), axis=0)))
+
+
+def _check_multisine(time: Array, period: float, harmonics: Sequence[int], amplitude: float) -> None:
+    if period <= 0 or amplitude < 0:
+        message = f"period must be positive and amplitude not negative, found {period:g} s and {amplitude:g}"
+        raise DocumentError(message, path="period")
+    if not harmonics or min(harmonics) < 1 or len(set(harmonics)) < len(harmonics):
+        raise DocumentError(
+            f"harmonics must be distinct whole numbers from 1 on, found {list(harmonics)}", path="harmonics"
+        )
+    fastest, step = max(harmonics), float(np.diff(time).max()) if len(time) > 1 else 0.0
+    if 2 * fastest * step >= period:
+        message = f"harmonic {fastest} of {period:g} s is too fast for steps of {step:g} s: less than two a cycle"
+        raise DocumentError(message, path="harmonics")
+
+
+def _check_ordered(name: str, limits: tuple[float, float], unit: str) -> None:
+    if limits[0] > limits[1]:
+        found = f"[{limits[0]:g}, {limits[1]:g}] {unit}".rstrip()
+        raise DocumentError(f"runs backwards: give [low, high], found {found}", path=name)
+
+
+def _wave(harmonics: NDArray[np.int64], phi: Array) -> Array:
+    """One period of the sum of unit sines with phases (..., K): (..., SAMPLES * greatest harmonic)."""
+    count = SAMPLES * int(harmonics.max())
+    lines = np.zeros((*phi.shape[:-1], count // 2 + 1), dtype=complex)
+    lines[..., harmonics] = -0.5j * count * np.exp(1j * phi)
+    return np.fft.irfft(lines, count)
+
+
+def _peak(harmonics: NDArray[np.int64], phi: Array) -> float:
+    """Bound on the greatest |x| between the samples too: theirs over cos(pi / SAMPLES) (Ehlich and Zeller 1964)."""
+    return float(np.abs(_wave(harmonics, phi)).max() / np.cos(np.pi / SAMPLES))
+
+
+def _optimise(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object, ...]) -> Array:
+    """Phases (K,) of the lowest peak met in STARTS searches of ROUNDS rounds."""
+    drawn = [[uniform(*key, "phase", start, int(harmonic)) for harmonic in harmonics] for start in range(1, STARTS)]
+    phi = np.vstack([schroeder, 2 * np.pi * np.array(drawn).reshape(STARTS - 1, len(harmonics))])
+    best, lowest = schroeder, np.inf
+    for level in np.linspace(0.75, 0.995, ROUNDS):
+        wave = _wave(harmonics, phi)
+        peaks = np.abs(wave).max(axis=1)
+        if peaks.min() < lowest:
+            best, lowest = phi[int(np.argmin(peaks))], float(peaks.min())
+        limit = level * peaks[:, None]
+        phi = np.angle(1j * np.fft.rfft(np.clip(wave, -limit, limit))[:, harmonics])
+    return best
+
+
+def _begin_at_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
+    """Phases of the same wave shifted in time so that it rises through 0 at t = 0."""
+
+    def at(angle: float) -> float:
+        return float(np.sin(harmonics * angle + phi).sum())
+
+    wave = _wave(harmonics, phi)
+    rising = int(np.flatnonzero((wave <= 0) & (np.roll(wave, -1) > 0))[0])
+    low, high = 2 * np.pi * rising / len(wave), 2 * np.pi * (rising + 1) / len(wave)
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if at(middle) <= 0 else (low, middle)
+    return phi + harmonics * low
+
+
+def _spread(count: int, key: tuple[object, ...]) -> Array:
+    """Numbers (count,) in [0, 1): every STRATA of them hold one in each of as many equal parts, in random order."""
+    blocks = range(-(-count // STRATA))
+    order = np.array([[uniform(*key, "order", block, part) for part in range(STRATA)] for block in blocks])
+    within = np.array([[uniform(*key, "level", block, part) for part in range(STRATA)] for block in blocks])
+    return np.asarray(((np.argsort(order, axis=1) + within) / STRATA).ravel()[:count])

@@ -1,0 +1,136 @@
+"""Wind gusts: a stationary Gaussian series with a given spectrum, to be added to the mean wind speed.
+
+One point, along the mean wind: the direction stays constant, and a ship that moves does not meet the gusts sooner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from shipid.errors import DocumentError
+from shipid.vessel.perturb import uniform
+
+Array = NDArray[np.float64]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+class Gusts(BaseModel):
+    """A `gusts` block: which spectrum, at which height, over which frequencies.
+
+    `npd` depends on wind speed and height alone; `kaimal` takes its turbulence intensity (sigma / mean speed) from here
+    and its length scale too, where that of IEC 61400-1 is not wanted.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    kind: Literal["npd", "kaimal"]
+    height: Annotated[Positive, Field(description="m above the sea")] = 10.0
+    turbulence_intensity: Annotated[FiniteFloat, Field(gt=0, le=1, description="kaimal: sigma / mean")] | None = None
+    length_scale: Annotated[Positive, Field(description="m, kaimal: 5.67 min(height, 60) if absent")] | None = None
+    frequencies: Annotated[
+        tuple[Positive, Positive], Field(description="Hz; what is slower belongs to the mean, what is faster is lost")
+    ] = (1 / 600, 0.5)
+    harmonics: Annotated[int, Field(ge=2, le=10000)] = 100
+
+    @model_validator(mode="after")
+    def _fits(self) -> Gusts:
+        low, high = self.frequencies
+        if low >= high:
+            raise ValueError(f"frequencies must be [low, high], found [{low:g}, {high:g}] Hz")
+        if self.kind == "kaimal" and self.turbulence_intensity is None:
+            raise ValueError("kaimal needs turbulence_intensity, such as 0.1")
+        if self.kind == "npd" and (self.turbulence_intensity, self.length_scale) != (None, None):
+            raise ValueError("npd has neither turbulence_intensity nor length_scale: remove them or take kaimal")
+        return self
+
+
+def series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:
+    """Gust speed (T, S) [m/s] at times (T,) [s], for mean speeds (S,) [m/s]; mean + gust is never negative.
+
+    x(t) = sum_k a_k cos(2 pi f_k t + phi_k): the band is cut into bins of equal width in ln f, f_k is uniform in ln f
+    within its bin, so that nothing repeats, and a_k^2 / 2 is the spectrum's integral over the bin, so that the variance
+    is that of the band whatever is drawn. Where a gust would turn the wind round it is cut: total speed 0. That is
+    1 / intensity standard deviations from the mean, so it matters for intensities above 0.3 and never for `npd`.
+
+    Parameters
+    ----------
+    keys : for each of the S series what its draws depend on, such as (seed, "manoeuvre", number), and nothing else.
+
+    Raises
+    ------
+    DocumentError : a mean speed is negative.
+    """
+    if np.any(mean_speed < 0):
+        raise DocumentError(f"mean wind speed must be at least 0 m/s, found {np.min(mean_speed):g}", path="gusts")
+    amplitudes = np.sqrt(2 * _bin_variances(gusts, mean_speed))
+    result = np.empty((len(time), len(mean_speed)))
+    # one by one: no series may depend on its company, not even in the last bit
+    for column, key, amplitude in zip(result.T, keys, amplitudes, strict=True):
+        frequencies, phases = _draw(gusts, key)
+        column[:] = np.cos(2 * np.pi * np.outer(time, frequencies) + phases) @ amplitude
+    return np.maximum(result, -mean_speed)
+
+
+def variance(gusts: Gusts, mean_speed: Array) -> Array:
+    """Variance (S,) [m^2/s^2] of the gusts for mean speeds (S,) [m/s]: the spectrum's integral over the band."""
+    return np.asarray(_bin_variances(gusts, mean_speed).sum(axis=1))
+
+
+def spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
+    """One-sided spectral density [m^2/s^2/Hz] at frequencies [Hz], for mean speeds [m/s] (shapes that broadcast).
+
+    `npd`: S = 320 (U/10)^2 (z/10)^0.45 (1 + x^n)^(-5/(3n)), x = 172 f (z/10)^(2/3) (U/10)^(-3/4), n = 0.468, with the
+    hourly mean U at 10 m; ISO 19901-1, DNV-RP-C205 (Froya model), Fossen (2021) ch. 10. Measured in strong wind over
+    open sea in neutral stability; light wind is an extrapolation.
+
+    `kaimal`: S = 4 sigma^2 (L/U) (1 + 6 f L/U)^(-5/3), with the mean U at the height z, sigma = intensity U and
+    L = 8.1 * 0.7 min(z, 60 m); IEC 61400-1 (ed. 3) annex B, longitudinal component. Its integral over all f is sigma^2.
+    """
+    speed = np.asarray(mean_speed, dtype=np.float64)
+    blows = speed > 0
+    U = np.where(blows, speed, 1.0)
+    density = _npd(gusts, U, frequency) if gusts.kind == "npd" else _kaimal(gusts, U, frequency)
+    return np.asarray(np.where(blows, density, 0.0))
+
+
+def _npd(gusts: Gusts, U: Array, frequency: Array) -> Array:
+    n, z = 0.468, gusts.height / 10
+    x = 172 * frequency * z ** (2 / 3) * (U / 10) ** -0.75
+    return np.asarray(320 * (U / 10) ** 2 * z**0.45 * (1 + x**n) ** (-5 / (3 * n)))
+
+
+def _kaimal(gusts: Gusts, U: Array, frequency: Array) -> Array:
+    assert gusts.turbulence_intensity is not None
+    passing = (gusts.length_scale or 8.1 * 0.7 * min(gusts.height, 60.0)) / U  # s: an eddy passes by
+    return np.asarray(4 * (gusts.turbulence_intensity * U) ** 2 * passing * (1 + 6 * frequency * passing) ** (-5 / 3))
+
+
+def _edges(gusts: Gusts) -> Array:
+    """Natural logarithm of the limits (K + 1,) of the bins in Hz."""
+    low, high = np.log(gusts.frequencies)
+    return np.linspace(low, high, gusts.harmonics + 1)
+
+
+def _bin_variances(gusts: Gusts, mean_speed: Array) -> Array:
+    """Integral of the spectrum over each bin (S, K) [m^2/s^2], by Gauss's rule in ln f."""
+    edges = _edges(gusts)
+    half = np.diff(edges)[:, None] / 2
+    frequency = np.exp(edges[:-1, None] + half * (1 + NODES))
+    density = spectrum(gusts, np.asarray(mean_speed)[:, None, None], frequency)
+    return np.asarray((density * frequency * half * WEIGHTS).sum(axis=2))
+
+
+def _draw(gusts: Gusts, key: tuple[object, ...]) -> tuple[Array, Array]:
+    """Frequencies [Hz] and phases [rad] of the harmonics, (K,) each."""
+    place, turn = (
+        np.array([uniform(*key, "gust", quantity, k) for k in range(gusts.harmonics)])
+        for quantity in ("frequency", "phase")
+    )
+    edges = _edges(gusts)
+    return np.exp(edges[:-1] + np.diff(edges) * place), 2 * np.pi * turn

@@ -1,0 +1,152 @@
+"""Irregular seas: a spectrum as wave components, drawn for each sample, and their loads from a vessel's tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, PositiveInt
+
+from shipid.vessel.load import Vessel
+from shipid.vessel.perturb import uniform
+from shipid.vessel.schema import term_blocks
+
+Array = np.ndarray
+GRAVITY = 9.81  # m/s^2: dispersion in deep water, k = omega^2 / g
+LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.5 % of the energy of a JONSWAP spectrum lies between
+SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # even or odd in the relative heading
+
+
+class Sea(BaseModel):
+    """`[truth.waves]`: an irregular sea with a JONSWAP spectrum, long-crested unless `spreading` is given."""
+
+    model_config = ConfigDict(extra="forbid")
+    H_s: Annotated[FiniteFloat, Field(ge=0, description="m, significant wave height")]
+    T_p: Annotated[PositiveFloat, Field(description="s, peak period")]
+    gamma: Annotated[FiniteFloat, Field(ge=1, le=10, description="peak enhancement; 1 is Pierson-Moskowitz")] = 3.3
+    components: Annotated[PositiveInt, Field(le=2000)] = 60
+    spreading: Annotated[PositiveInt, Field(le=100)] | None = Field(
+        default=None, description="s of the cos^2s law of directions about the mean; long-crested if not given"
+    )
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and greatest frequency of the components [rad/s]."""
+        peak = 2 * np.pi / self.T_p
+        return LOWEST * peak, HIGHEST * peak
+
+
+def jonswap(omega: Array, sea: Sea) -> Array:
+    """S(omega) [m^2 s] with m_0 = H_s^2 / 16 (Hasselmann et al. 1973; normalised numerically over its whole range)."""
+    peak = 2 * np.pi / sea.T_p
+
+    def shape(w: Array) -> Array:
+        width = np.where(w <= peak, 0.07, 0.09)
+        bell = np.exp(-((w / peak - 1) ** 2) / (2 * width**2))
+        result: Array = w**-5.0 * np.exp(-1.25 * (peak / w) ** 4) * sea.gamma**bell
+        return result
+
+    whole = peak * np.linspace(0.2, 12.0, 20000)
+    return np.asarray(sea.H_s**2 / 16 * shape(omega) / np.trapezoid(shape(whole), whole))
+
+
+def draw_components(sea: Sea, direction: Array, names: Sequence[Any]) -> dict[str, Array]:
+    """Components of each sample, (S, num_components): omega [rad/s], amplitude [m], epsilon and chi [rad].
+
+    Equal bins of frequency, one component in each: its energy is that of the bin, its frequency drawn within it, so
+    that the sea does not repeat. `direction` (S,) [rad, towards]; a sample's draws depend on its own name alone.
+    """
+    edges = np.linspace(*sea.range, sea.components + 1)
+    fine = np.linspace(edges[:-1], edges[1:], 33)
+    energy = np.trapezoid(jonswap(fine, sea), fine, axis=0)
+    rows = [np.random.default_rng(int(uniform("sea", name) * 2**53)).random((3, sea.components)) for name in names]
+    jitter, phase, turn = np.array(rows).reshape(-1, 3, sea.components).transpose(1, 0, 2)
+    spread = np.zeros_like(turn) if sea.spreading is None else spread_angles(sea.spreading, turn)
+    return {
+        "omega": edges[:-1] + jitter * np.diff(edges),
+        "amplitude": np.broadcast_to(np.sqrt(2 * energy), jitter.shape),
+        "epsilon": 2 * np.pi * phase,
+        "chi": np.asarray(direction)[:, None] + spread,
+    }
+
+
+def spread_angles(s: int, share: Array) -> Array:
+    """Angles [rad] from the mean direction by the inverse of the cumulative cos^2s law within +-90 deg."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 2001)
+    density = np.cos(angle) ** (2 * s)
+    cumulative = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
+    return np.asarray(np.interp(share, cumulative / cumulative[-1], angle))
+
+
+def wave_loads(vessel: Vessel, drawn: Mapping[str, Array]) -> dict[str, Array]:
+    """What a rollout takes as `components` of a vessel: path of each wave term -> (S, num_components, num_entries)."""
+    found = {}
+    for path, key, block in term_blocks(vessel.document):
+        if key == "waves.first_order":
+            found[path] = _first_order(block, drawn)
+        elif key == "waves.drift":
+            found[path] = _drift(block, drawn)
+    return found
+
+
+def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
+    columns = {name: np.asarray(values) for name, values in block["table"].items()}
+    series = [
+        fourier(columns, columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"], SIDE[axis], block["harmonics"])
+        for axis in SIDE
+    ]
+    omega, grid = drawn["omega"], np.unique(columns["omega"])
+    own = [interpolate(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
+    coefficients = np.concatenate(own, axis=-1)
+    head = (omega, omega**2 / GRAVITY, np.cos(drawn["chi"]), np.sin(drawn["chi"]), drawn["epsilon"])
+    return np.concatenate([np.stack(head, axis=-1), coefficients.real, coefficients.imag], axis=-1)
+
+
+def _drift(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
+    """Mean drift: components of one direction are summed beforehand."""
+    columns = {name: np.asarray(values) for name, values in block["table"].items()}
+    grid = np.unique(columns["omega"])
+    own = [
+        interpolate(drawn["omega"], grid, fourier(columns, columns[f"{axis}_drift"], SIDE[axis], block["harmonics"]))
+        for axis in ("X", "Y", "N")
+    ]
+    series = np.concatenate(own, axis=-1) * drawn["amplitude"][..., None] ** 2
+    chi = drawn["chi"]
+    if np.ptp(chi, axis=1).max() == 0:
+        series, chi = series.sum(axis=1, keepdims=True), chi[:, :1]
+    return np.concatenate([np.cos(chi)[..., None], np.sin(chi)[..., None], series], axis=-1)
+
+
+def fourier(columns: Mapping[str, Array], values: Array, side: int, harmonics: int) -> Array:
+    """Coefficients (num_omega, harmonics + 1) of a cosine (side 1) or sine (side -1) series in the relative heading.
+
+    The table must hold, for each frequency, the same equally spaced headings from 0 to 180 deg.
+    """
+    grid, headings = np.unique(columns["omega"]), np.unique(columns["beta_deg"])
+    order = np.lexsort((columns["beta_deg"], columns["omega"]))
+    half = values[order].reshape(len(grid), len(headings))
+    whole = np.concatenate([half, side * half[:, -2:0:-1]], axis=1)
+    spectrum = np.fft.fft(whole, axis=1) / whole.shape[1]
+    nyquist = whole.shape[1] // 2
+    kept = min(harmonics, nyquist)
+    result = np.zeros((len(grid), harmonics + 1), dtype=spectrum.dtype)
+    result[:, : kept + 1] = (2 if side > 0 else 2j) * spectrum[:, : kept + 1]
+    if side > 0:
+        result[:, 0] /= 2
+    if kept == nyquist:
+        result[:, nyquist] /= 2
+    return result if np.iscomplexobj(values) else result.real
+
+
+def interpolate(x: Array, grid: Array, values: Array) -> Array:
+    """Four-point Lagrange interpolation of values (len(grid), n) at x (...); zero above the grid, held below it."""
+    first = np.clip(np.searchsorted(grid, x) - 2, 0, len(grid) - 4)
+    places = first[..., None] + np.arange(4)
+    inside, nodes = np.clip(x, grid[0], grid[-1]), grid[places]
+    result = np.zeros((*x.shape, values.shape[1]), dtype=values.dtype)
+    for k in range(4):
+        others = [m for m in range(4) if m != k]
+        weight = np.prod([(inside - nodes[..., m]) / (nodes[..., k] - nodes[..., m]) for m in others], axis=0)
+        result += weight[..., None] * values[places[..., k]]
+    return np.where((x > grid[-1])[..., None], 0, result)

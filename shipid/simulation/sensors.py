@@ -1,0 +1,119 @@
+"""Sensors: what a ship would have logged of a true record, with noise, bias, latency, sampling and quantisation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from shipid.errors import DocumentError, choices
+from shipid.vessel.perturb import uniform
+
+Array = NDArray[np.float64]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+
+UNMEASURED = ("run", "t", "flags")
+WRAPPING = ("psi", "beta_w")
+"""Columns that may jump by 2 pi; measured, they are continuous as in a dataset."""
+
+SAME = 1e-6  # of a step of the record: instants that close are the same
+
+
+class Sensor(BaseModel):
+    """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    noise: Annotated[NotNegative, Field(description="standard deviation of the white noise on each sample")] = 0.0
+    bias: Annotated[
+        NotNegative, Field(description="standard deviation, over runs, of an offset that a run keeps throughout")
+    ] = 0.0
+    latency: Annotated[NotNegative, Field(description="s by which a sample is old when it is taken")] = 0.0
+    interval: Annotated[
+        Annotated[FiniteFloat, Field(gt=0)] | None, Field(description="s between samples; absent: one per logged row")
+    ] = None
+    quantum: Annotated[NotNegative, Field(description="samples are rounded to its multiples; 0: not rounded")] = 0.0
+
+
+def measure(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+    """Log a true record every `interval` [s]: a frame with its columns, from the first row of each run on.
+
+    A sample is the true value `latency` ago (linear between rows; before the run's start, the value at its start), plus
+    bias and noise, rounded. It is taken every `Sensor.interval`, first with the first row, and held until the next.
+    Bias and noise are normal, drawn by hash(seed, run, column): no other run or column, and no more rows, change them.
+    A column without a sensor is logged as it stands in the row of that instant.
+
+    Parameters
+    ----------
+    fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
+
+    Raises
+    ------
+    DocumentError : a sensor has no column, or `interval` is no multiple of the record's step.
+    """
+    _check_columns(sensors, [str(name) for name in fine.columns])
+    logs = [_log(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
+    return pd.concat(logs, ignore_index=True)
+
+
+def _check_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
+    valid = [name for name in columns if name not in UNMEASURED]
+    for name in sensors:
+        if name not in valid:
+            raise DocumentError(f"no column {name!r} to measure: {choices(name, valid)}", path="sensors")
+
+
+def _log(run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+    """Logged rows of one run."""
+    step = _step(run, rows["t"].to_numpy())
+    stride = round(interval / step)
+    if stride < 1 or abs(interval / step - stride) > SAME * stride:
+        message = f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s"
+        raise DocumentError(message, path="interval")
+    log = rows.iloc[::stride].copy()
+    for name, sensor in sensors.items():
+        truth = rows[name].to_numpy(dtype=np.float64)
+        truth = np.unwrap(truth) if name in WRAPPING else truth
+        log[name] = _samples(sensor, truth, step, stride, (seed, run, name))
+    return log
+
+
+def _step(run: str, t: Array) -> float:
+    """Step [s] of the clock t (N,) of one run."""
+    step = float(t[-1] - t[0]) / max(len(t) - 1, 1)
+    if len(t) < 2 or np.abs(np.diff(t) - step).max() > 1e-3 * step:
+        raise DocumentError(f"run {run!r} must have two rows or more, in equal steps of time", path="t")
+    return step
+
+
+def _samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
+    """Sensor's output in every `stride`-th row of the true values (N,)."""
+    logged = np.arange(0, len(truth), stride)  # all clocks below count rows of the record from the run's first
+    period = stride if sensor.interval is None else sensor.interval / step
+    latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
+    taken, which = np.unique(latest, return_inverse=True)  # the others leave no trace
+    values = _at(truth, taken * period - sensor.latency / step)
+    values = values + sensor.bias * _normal(1, *key, "bias") + sensor.noise * _normal(len(taken), *key, "noise")
+    if sensor.quantum > 0:
+        values = sensor.quantum * np.rint(values / sensor.quantum)
+    return np.asarray(values[which])
+
+
+def _at(truth: Array, place: Array) -> Array:
+    """Values (N,) at fractional row numbers, linear between rows, the first value before them; exact in a row."""
+    nearest = np.rint(place)
+    place = np.where(np.abs(place - nearest) < SAME, nearest, place)
+    return np.interp(place, np.arange(len(truth)), truth)
+
+
+def _normal(count: int, *key: Any) -> Array:
+    """Standard normal draws (count,) that depend on the key alone; more of them begin with the same.
+
+    Box and Muller's transform of PCG64's raw output, which NumPy keeps from version to version; its normals it may not.
+    """
+    raw = np.random.PCG64(int(uniform(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
+    first, second = ((raw >> np.uint64(11)) / 2.0**53).T
+    return np.asarray(np.sqrt(-2 * np.log1p(-first)) * np.cos(2 * np.pi * second))

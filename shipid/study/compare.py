@@ -1,0 +1,69 @@
+"""The same study in several worlds: finished folders that differ in their top-level seed alone, side by side."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from shipid.errors import ResultError, ShipidError
+from shipid.study.findings import findings
+from shipid.study.plan import NO_MODEL
+from shipid.study.results import Results, read_results
+from shipid.study.store import stored_plan
+
+
+def read_worlds(folders: Sequence[Path]) -> list[Results]:
+    """Read finished runs of one study in different worlds; ResultError where they are not."""
+    if len(folders) < 2:
+        raise ShipidError("name two folders or more: runs of one study with another `--set seed=` each")
+    plans = {folder: stored_plan(folder) for folder in folders}
+    first, known = plans[folders[0]], dict[int, Path]()
+    for folder, plan in plans.items():
+        if plan.digest_in_any_world != first.digest_in_any_world:
+            raise ResultError(f"holds another study than {folders[0]}: only `seed` may differ", file=folder)
+        seed = plan.study.seed
+        if seed in known:
+            raise ResultError(f"has seed = {seed}, as {known[seed]} has: nothing is repeated", file=folder, path="seed")
+        known[seed] = folder
+    if len(plans) < len(folders):
+        raise ShipidError("a folder is named twice")
+    worlds = [read_results(folder) for folder in folders]
+    for results in worlds:
+        if not results.complete:
+            message = f"is not finished: continue with `shipid study resume {results.folder}`"
+            raise ResultError(message, file=results.folder)
+    return worlds
+
+
+def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
+    """One row per finding and key number: id, claim, verdicts, number, mean, low, high over the worlds that have it."""
+    found = [findings(results) for results in worlds]
+    rows = []
+    for same in zip(*found, strict=True):
+        counts = Counter(one["verdict"] for one in same)
+        verdicts = ", ".join(f"{count} {word}" for word, count in counts.most_common())
+        names = dict.fromkeys(name for one in same for name in one["numbers"])
+        for name in names or [""]:
+            values = pd.Series([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
+            row = {"id": same[0]["id"], "claim": same[0]["claim"], "verdicts": verdicts, "number": name}
+            rows.append({**row, "mean": values.mean(), "low": values.min(), "high": values.max()})
+    return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
+
+
+def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
+    """H [m] per family and N_D, mean over members and seeds, then mean, low and high over worlds; N_D = 0 is A.
+
+    Failed cells are left out; `worlds` says how many have a result.
+    """
+    parts = []
+    for world, results in enumerate(worlds):
+        good = results.cells[results.cells["status"] == "ok"]
+        alone = good[good["kind"] != NO_MODEL].drop_duplicates("model").assign(N_D=0, H=lambda rows: rows["A"])
+        means = pd.concat([alone, good]).groupby(["kind", "N_D"], sort=False)["H"].mean()
+        parts.append(means.reset_index().assign(world=world))
+    grouped = pd.concat(parts).groupby(["kind", "N_D"], sort=False)["H"]
+    frame = grouped.agg(mean="mean", low="min", high="max", worlds="size").reset_index()
+    return frame.rename(columns={"kind": "family"})

@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipid.report.contours import contour, length, nice_levels
+
+X, Y = np.array([10.0, 20.0, 50.0, 100.0]), np.array([0.0, 1.0, 3.0])
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(0.05, 0.95))
+def test_the_level_of_a_plane_is_where_the_plane_has_it(a, b, share):
+    values = a * X + 30 * b * Y[:, None]
+    level = values.min() + share * np.ptp(values)
+    for piece in contour(X, Y, values, level):
+        np.testing.assert_allclose(a * piece[:, 0] + 30 * b * piece[:, 1], level, atol=1e-6 * max(1, np.ptp(values)))
+
+
+def test_a_straight_level_is_one_piece_from_side_to_side():
+    (piece,) = contour(X, Y, np.tile(Y[:, None], 4), 2.0)
+    assert sorted(piece[[0, -1], 0]) == [10, 100]
+    assert length(piece) == pytest.approx(90)
+
+
+def test_a_hill_is_closed():
+    values = np.zeros((3, 3))
+    values[1, 1] = 1.0
+    (piece,) = contour(np.arange(3.0), np.arange(3.0), values, 0.5)
+    np.testing.assert_allclose(piece[0], piece[-1])
+
+
+def test_nothing_is_drawn_beside_a_hole():
+    values = np.tile(Y[:, None], 4)
+    values[1, 1] = np.nan
+    pieces = contour(X, Y, values, 0.5) + contour(X, Y, values, 2.0)
+    assert pieces
+    inside = np.concatenate(pieces)
+    # The triangles that touch the hole at (20, 1): no point of a line lies strictly inside their star.
+    assert not (
+        (inside[:, 0] > 10) & (inside[:, 0] < 20) & (inside[:, 1] < 1) & (inside[:, 1] > inside[:, 0] / 10 - 1)
+    ).any()
+    assert not ((inside[:, 0] == 20) & (inside[:, 1] > 0) & (inside[:, 1] < 3)).any()
+
+
+def test_levels_are_round_and_inside():
+    levels = nice_levels(np.geomspace(0.4, 12, 50), 5)
+    assert levels == sorted(levels)
+    assert len(levels) == 5
+    assert min(levels) > 0.4
+    assert max(levels) < 12
+    assert {float(f"{level:.2g}") for level in levels} == set(levels)
+    assert nice_levels(np.array([np.nan, 1.0, 2.0]), 5) == []

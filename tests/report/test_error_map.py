@@ -1,0 +1,140 @@
+import itertools
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.report.error_map import error_map
+
+
+@pytest.fixture(scope="module")
+def failing(simulation):
+    """The simulation with one cell without result and one seed without."""
+    cells = simulation.cells.copy()
+    gone = cells.model.eq("high-2") & (cells.N_D.eq(10) | (cells.N_D.eq(30) & cells.seed.eq(1)))
+    cells.loc[gone, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[gone, ["status", "sentence"]] = "diverged", "4 % of the <windows> diverged"
+    return replace(simulation, cells=cells)
+
+
+def flat(content):
+    return error_map(content).views["0"][0].figure
+
+
+def test_every_cell_lies_at_its_accuracy_and_size(simulation):
+    bars = flat(simulation).data[0]
+    assert len(bars.x) == 7 * 3
+    where = {}
+    for x, y, base, words in zip(bars.x, bars.y, bars.base, bars.customdata, strict=True):
+        where[re.match(r"<b>(.*?)</b>", words)[1], x] = (base, base + y, words)
+    for row in simulation.models.itertuples():
+        for size in (10, 30, 100):
+            low, high, words = where[row.model, size]
+            if np.isfinite(row.A):
+                assert low < np.sqrt(row.A) < high
+            cells = simulation.cells[simulation.cells.model.eq(row.model) & simulation.cells.N_D.eq(size)]
+            assert f"H {cells.H.mean():.2f} m, H_90 {cells.H_90.mean():.2f} m" in words
+            assert f"{cells.H.min():.2f} to {cells.H.max():.2f} m over 2 seeds" in words
+            assert "2 layers of 120" in words
+    assert min(low for (name, _), (low, _, _) in where.items() if name == "no model") > np.sqrt(13.0)
+    assert list(flat(simulation).layout.yaxis.ticktext)[-1] == "no model"
+    assert flat(simulation).layout.yaxis.range[0] == 0
+
+
+def test_rows_do_not_cover_each_other(simulation):
+    bars = flat(simulation).data[0]
+    edges = sorted({(base, base + y) for y, base in zip(bars.y, bars.base, strict=True)})
+    assert all(below[1] <= above[0] + 1e-3 for below, above in itertools.pairwise(edges))
+
+
+def test_what_is_no_better_than_data_driven_is_hatched(simulation):
+    means = simulation.cells.groupby(["model", "N_D"]).H.mean().unstack()
+    worse = (means.drop("no model") >= means.loc["no model"]).sum().sum()
+    hatched = flat(simulation).data[1]
+    assert worse > 0
+    assert len(hatched.x) == worse
+    assert hatched.marker.pattern.shape == "/"
+    assert f"in {worse} of 18 cells physics does not help, none of them below A = " in error_map(simulation).takeaway
+
+
+def test_colour_rises_with_the_error(simulation):
+    bars = flat(simulation).data[0]
+    H = [float(re.search(r"H ([\d.]+) m", words)[1]) for words in bars.customdata]
+    shades = [int(re.search(r"\d+", colour)[0]) for colour in bars.marker.color]
+    order = np.argsort(H)
+    assert (np.diff(np.array(shades)[order]) >= 0).all()
+    assert (min(shades), max(shades)) == (0, 23)
+
+
+def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
+    figure = flat(failing)
+    bars, _, crosses = figure.data[:3]
+    assert list(crosses.x) == [10]
+    assert crosses.customdata[0].endswith("diverged: 4 % of the &lt;windows&gt; diverged")
+    assert len(bars.x) == 20
+    (words,) = (w for w in bars.customdata if "high-2" in w and "N_D = 30" in w)
+    assert "1 of 2 seeds gave no result" in words
+    # Between high-1 and high-2 the triangle at N_D = 10 has a corner without value.
+    low, high = np.sqrt([7.5, 13.0])
+    for line in figure.data[3:]:
+        x, y = np.asarray(line.x), np.asarray(line.y)
+        assert not ((x < 30) & (y > low + (high - low) * (x - 10) / 20 + 1e-4)).any()
+    assert "high-2 at N_D = 10 (diverged)" in error_map(failing).how
+
+
+def test_lines_carry_their_level_in_metres(simulation):
+    figure = flat(simulation)
+    texts = [note.text for note in figure.layout.annotations]
+    assert texts
+    assert all(re.fullmatch(r"[\d.]+ m", text) for text in texts)
+    assert len(set(texts)) == len(texts)
+
+
+def test_bars_stand_as_high_as_the_error(failing):
+    mesh, crosses = error_map(failing).views["1"][0].figure.data
+    means = failing.cells.groupby(["model", "N_D"]).H.mean().dropna()
+    assert len(mesh.x) == 8 * len(means)
+    assert len(mesh.facecolor) == len(mesh.i)
+    tops = np.asarray(mesh.z).reshape(-1, 8).max(axis=1)
+    np.testing.assert_allclose(np.sort(tops), np.sort(means), rtol=1e-5)
+    x = np.asarray(mesh.x).reshape(-1, 8).mean(axis=1)
+    names = [text.split(",")[0] for text in mesh.hovertext[::8]]
+    order = list(dict.fromkeys(np.array(names)[np.argsort(x, kind="stable")]))
+    assert order == ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2", "no model"]
+    assert len(crosses.x) == 1
+
+
+def test_sides_of_the_bars_have_units(simulation):
+    scene = error_map(simulation).views["1"][0].figure.layout.scene
+    assert [scene[f"{side}axis"].title.text for side in "xyz"] == ["models by A [m]", "N_D [1]", "H [m]"]
+    assert scene.zaxis.range[0] == 0
+
+
+def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
+    assert error_map(full_scale) is None
+    names = ["nominal", "no model"]
+    one = replace(
+        simulation,
+        cells=simulation.cells[simulation.cells.model.isin(names)],
+        models=simulation.models[simulation.models.model.isin(names)],
+    )
+    assert error_map(one) is None
+    assert error_map(replace(simulation, cells=simulation.cells.assign(H=np.nan, status="failed"))) is None
+
+
+def test_without_data_driven_nothing_is_compared(simulation):
+    kept = simulation.cells.model.ne("no model")
+    figure = error_map(
+        replace(simulation, cells=simulation.cells[kept], models=simulation.models[simulation.models.family != "none"])
+    )
+    assert "does not help" not in figure.takeaway
+    assert len(figure.views["0"][0].figure.data[1].x) == 0
+
+
+def test_a_model_without_accuracy_has_a_strip_of_its_own(simulation):
+    lost = simulation.models.A.where(simulation.models.model != "high-2")
+    cells = simulation.cells.assign(A=simulation.cells.A.where(simulation.cells.model != "high-2"))
+    figure = flat(replace(simulation, models=simulation.models.assign(A=lost), cells=cells))
+    assert set(figure.layout.yaxis.ticktext) >= {"no model", "high-2"}
+    assert len(figure.data[0].x) == 21

@@ -1,0 +1,52 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.report.factors import factors
+
+
+def test_one_dot_per_number_at_its_factor(simulation):
+    figure = factors(simulation)
+    plot = figure.views[""][0].figure
+    assert [trace.name for trace in plot.data] == ["hull", "inertia", "added mass", "thruster"]
+    assert [chip.label for chip in figure.chips] == [trace.name for trace in plot.data]
+    rows = ["moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
+    for trace in plot.data:
+        mine = simulation.factors[simulation.factors.group == trace.name]
+        np.testing.assert_allclose(np.exp(trace.x), mine.factor, rtol=1e-5)
+        assert [rows[int(y)] for y in np.asarray(trace.y)] == list(mine.model)
+        assert trace.customdata[0] == f"{mine.model.iloc[0]}: {mine.path.iloc[0]} × {mine.factor.iloc[0]:.3g}"
+    low, high = plot.layout.xaxis.range
+    assert low < np.log(simulation.factors.factor.min())
+    assert high > np.log(simulation.factors.factor.max())
+    assert "Not perturbed: nominal and no model." in figure.how
+
+
+def test_the_row_tells_where_the_error_comes_from(simulation):
+    texts = [note.text for note in factors(simulation).views[""][0].figure.layout.annotations]
+    assert texts[1] == "<b>moderate-2</b>  A 3.10 m: 2.17 along, 1.86 across"
+    bare = replace(simulation, models=simulation.models.drop(columns=["A_along", "A_across"]))
+    assert factors(bare).views[""][0].figure.layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
+
+
+def test_takeaway_counts_and_finds_the_farthest(simulation):
+    squared = np.log(simulation.factors.factor) ** 2
+    away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))
+    text = factors(simulation).takeaway
+    assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times factors from ")
+    assert f"{away.idxmax()} is farthest from its base, by a factor of {away.max():.2f}" in text
+
+
+@pytest.mark.parametrize(("factor", "word"), [(0.0, "0"), (-0.5, "≤ 0")])
+def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
+    figure = factors(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
+    plot = figure.views[""][0].figure
+    assert plot.layout.xaxis.ticktext[0] == word
+    assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[0])
+    assert plot.layout.xaxis.range[0] < plot.data[0].x[0] < np.log(0.8)
+    assert "0 removes the term" in figure.how
+
+
+def test_no_rows_no_figure(simulation):
+    assert factors(replace(simulation, factors=simulation.factors.iloc[:0])) is None

@@ -1,0 +1,94 @@
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.report.search import CEILING, FAILED, importance, search, searched, table
+
+
+def panels(content, view="0"):
+    return {panel.figure.layout.xaxis.title.text.split(" [")[0]: panel for panel in search(content).views[view]}
+
+
+def dots(panel):
+    return {trace.name: trace for trace in panel.figure.data}
+
+
+def test_a_panel_per_hyperparameter_that_varies(simulation):
+    fixed = replace(simulation, trials=simulation.trials.assign(units=64.0))
+    assert searched(simulation) == ["learning_rate", "weight_decay", "units"]
+    assert list(panels(fixed)) == ["learning_rate", "weight_decay"]
+    assert panels(simulation)["learning_rate"].figure.layout.xaxis.type == "log"
+    assert panels(simulation)["units"].figure.layout.xaxis.type is None
+
+
+def test_dots_are_relative_to_the_best_of_their_cell(simulation):
+    trials = simulation.trials
+    drawn = dots(panels(simulation)["learning_rate"])
+    assert sum(len(drawn[name].x) for name in ("complete", "stopped", "diverged", "chosen")) == len(trials)
+    assert (np.asarray(drawn["diverged"].y) == np.float32(FAILED)).all()
+    assert len(drawn["diverged"].x) == trials.state.eq("diverged").sum()
+    best = np.sqrt(trials.value / trials.groupby("cell").value.transform("min"))
+    stopped = trials.state.eq("stopped")
+    np.testing.assert_allclose(drawn["stopped"].y, best[stopped].clip(upper=CEILING), atol=1e-3)
+    np.testing.assert_allclose(drawn["chosen"].x, trials.learning_rate[trials.chosen], rtol=1e-5)
+
+
+def test_views_hold_their_size(simulation):
+    drawn = dots(panels(simulation, "2")["units"])
+    mine = simulation.trials[simulation.trials.N_D.eq(30) & simulation.trials.chosen]
+    np.testing.assert_allclose(drawn["chosen"].x, mine.units)
+    ranges = {tuple(panels(simulation, view)["units"].figure.layout.xaxis.range) for view in ("0", "1", "2", "3")}
+    assert len(ranges) == 1
+
+
+def test_of_many_trials_some_are_drawn(simulation):
+    many = pd.concat([simulation.trials] * 5, ignore_index=True)
+    content = replace(simulation, trials=many)
+    drawn = dots(panels(content)["weight_decay"])
+    assert sum(len(trace.x) for name, trace in drawn.items() if name not in ("median", "chosen")) == 1200
+    assert "at most 1,400 are drawn" in search(content).how
+    assert "are drawn" not in search(simulation).how
+
+
+def test_the_rank_correlation_is_within_cells():
+    cell = np.repeat(["a", "b"], 5)
+    rate = np.tile([1.0, 2, 3, 4, 5], 2)
+    # Within a cell the error falls; between cells it would seem to rise.
+    trials = pd.DataFrame({"cell": cell, "rate": rate + 10 * (cell == "b"), "value": 9 - rate + 20 * (cell == "b")})
+    assert importance(trials, "rate") == pytest.approx(-1)
+    assert importance(trials.assign(value=[5, 1, 4, 2, 3] * 2), "rate") == pytest.approx(-0.3)
+    assert np.isnan(importance(trials.assign(value=np.nan), "rate"))
+
+
+def test_takeaway_names_what_goes_with_the_error(simulation):
+    found = importance(simulation.trials, "learning_rate")
+    text = f"learning_rate goes with it most, rank correlation {found:.2f}.".replace("-", "−")
+    assert text in search(simulation).takeaway
+
+
+def test_the_table_sums_up_by_size(simulation):
+    rows = {int(row[0].key): dict(zip(table(simulation).columns, row, strict=True)) for row in table(simulation).rows}
+    mine = simulation.trials[simulation.trials.N_D == 30]
+    assert list(rows) == [10, 30, 100]
+    assert rows[30]["cells [1]"].key == 14
+    assert rows[30]["trials [1]"].key == len(mine)
+    assert rows[30]["diverged [1]"].key == mine.state.eq("diverged").sum()
+    assert rows[30]["time per cell [s]"].key == pytest.approx(mine.seconds.sum() / 14)
+    chosen = mine.units[mine.chosen]
+    assert rows[30]["chosen units [1]"].text == f"{chosen.min():.2g} / {chosen.median():.2g} / {chosen.max():.2g}"
+
+
+def test_trials_that_all_diverged_stand(simulation):
+    lost = simulation.trials.assign(state="diverged", value=np.nan, chosen=False)
+    content = replace(simulation, trials=lost)
+    assert "–" in table(content).rows[0][-1].text
+    assert search(content).takeaway.startswith("None of 504 trials ended")
+
+
+def test_no_trials_no_search(simulation):
+    none = replace(simulation, trials=simulation.trials.iloc[:0])
+    assert search(none) is None
+    assert table(none) is None
+    assert search(replace(simulation, trials=simulation.trials[["cell", "N_D", "state", "value", "chosen"]])) is None

@@ -1,0 +1,168 @@
+"""Excitation: limits kept, energy only where declared, peaks low, holds and levels in their ranges."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.simulation.excitation import aprbs, crest_factor, deal, limit_rate, multisine
+
+PERIOD = 100.0
+TIME = np.arange(2000) * 0.05  # one period
+BANDS = {
+    "successive": tuple(range(1, 13)),
+    "sparse": (2, 3, 7, 11, 13, 21, 34),
+    "narrow": (17, 18, 19, 20, 21),
+    "dealt": deal(range(2, 30), 3)[1],
+    "many": tuple(range(3, 43)),
+}
+REACHED = {"successive": 1.45, "sparse": 1.96, "narrow": 1.75, "dealt": 1.45, "many": 1.45}  # crest factors
+every_band = pytest.mark.parametrize("harmonics", BANDS.values(), ids=BANDS.keys())
+
+
+def sines(harmonics: tuple[int, ...], time: np.ndarray = TIME, **changes: Any) -> np.ndarray:
+    return multisine(time, **{"period": PERIOD, "harmonics": harmonics, "amplitude": 0.4, **changes})
+
+
+@every_band
+@pytest.mark.parametrize("phases", ["schroeder", "optimised"])
+def test_amplitude_limit_is_kept_and_used(harmonics: tuple[int, ...], phases: str) -> None:
+    fine = np.abs(sines(harmonics, np.linspace(0, PERIOD, 50001), phases=phases)).max()
+    assert 0.4 * 0.99 < fine <= 0.4
+
+
+@every_band
+def test_spectrum_lies_on_the_harmonics_alone_and_is_flat(harmonics: tuple[int, ...]) -> None:
+    lines = np.abs(np.fft.rfft(sines(harmonics))) / len(TIME) * 2
+    declared = np.isin(np.arange(len(lines)), harmonics)
+    assert lines[~declared].max() < 1e-12
+    np.testing.assert_allclose(lines[declared], lines[declared][0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", BANDS)
+def test_optimised_peaks_are_below_schroeders(name: str) -> None:
+    harmonics = BANDS[name]
+    by_formula, searched = (crest_factor(sines(harmonics, phases=phases)) for phases in ("schroeder", "optimised"))
+    assert searched < 0.95 * by_formula
+    assert searched < REACHED[name]
+    weaker, stronger = (np.std(sines(harmonics, phases=phases)) for phases in ("schroeder", "optimised"))
+    assert stronger > weaker  # that is what it is for: more power within one limit
+
+
+@every_band
+@pytest.mark.parametrize("phases", ["schroeder", "optimised"])
+def test_it_begins_and_ends_at_zero(harmonics: tuple[int, ...], phases: str) -> None:
+    first, after, last = (sines(harmonics, np.array([t]), phases=phases)[0] for t in (0.0, 1e-3, PERIOD))
+    assert abs(first) < 1e-9
+    assert abs(last) < 1e-9
+    assert after > 0
+
+
+def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
+    parts = deal(range(2, 30), 3)
+    assert sorted(harmonic for part in parts for harmonic in part) == list(range(2, 30))
+    assert all(min(part) < 5 and max(part) > 26 for part in parts)
+    commands = np.stack([sines(part) for part in parts], axis=1)
+    products = commands.T @ commands / len(TIME)
+    off_diagonal = products - np.diag(np.diag(products))
+    assert np.abs(off_diagonal).max() < 1e-12
+
+
+def test_one_sine_has_the_crest_factor_of_a_sine() -> None:
+    one = sines((4,))
+    assert crest_factor(one) == pytest.approx(np.sqrt(2), rel=1e-4)
+    both = crest_factor(np.stack([one, np.sign(np.sin(TIME + 0.01))], axis=1))
+    np.testing.assert_allclose(both, [np.sqrt(2), 1.0], rtol=1e-4)
+
+
+def test_phases_depend_on_the_key_alone() -> None:
+    harmonics = BANDS["successive"]
+    np.testing.assert_array_equal(sines(harmonics, key=(1, "a")), sines(harmonics, key=(1, "a")))
+    assert np.abs(sines(harmonics, key=(1, "a")) - sines(harmonics, key=(1, "b"))).max() > 0.01
+
+
+def steps(**changes: Any) -> np.ndarray:
+    return aprbs(np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes})
+
+
+def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
+    """Hold times [s] of all levels but the last, which the end cuts."""
+    changes = np.flatnonzero(np.diff(series) != 0) + 1
+    return np.diff(np.concatenate([[0], changes])) * step
+
+
+def test_hold_times_fill_their_range() -> None:
+    """Within one sample, as changes show in the next row; uniform: mean within 4 standard errors."""
+    times = held(steps())
+    assert len(times) > 180
+    assert times.min() > 4.0 - 0.1 - 1e-9
+    assert times.max() < 15.0 + 0.1 + 1e-9
+    assert times.mean() == pytest.approx(9.5, abs=4 * 11 / np.sqrt(12 * len(times)))
+    assert times.min() < 4.5
+    assert times.max() > 14.5
+
+
+def test_a_fixed_hold_is_exact() -> None:
+    np.testing.assert_allclose(held(steps(hold=(0.3, 0.3))), 0.3)
+
+
+def test_levels_fill_their_range_evenly() -> None:
+    series = steps()
+    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
+    assert levels.min() >= -0.5
+    assert levels.max() < 0.3
+    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
+    for first in range(0, len(levels) - 8, 8):
+        assert sorted(eighth[first : first + 8]) == list(range(8))
+    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time
+
+
+def test_a_longer_series_begins_with_the_shorter() -> None:
+    time = np.arange(5001) * 0.1
+    short = aprbs(time[:1001], hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))
+    np.testing.assert_array_equal(aprbs(time, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    np.testing.assert_array_equal(aprbs(time + 40.0, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    assert not np.isin(short, steps(key=(7, 2))).any()
+
+
+def test_rate_limit_is_respected_and_caught_up_with() -> None:
+    ordered = np.stack([steps(), steps(key=(7, 2))], axis=1)
+    executed = limit_rate(ordered, 0.1, 0.5)
+    assert np.abs(np.diff(executed, axis=0)).max() <= 0.05 * (1 + 1e-9)
+    np.testing.assert_array_equal(limit_rate(ordered[:, 0], 0.1, 0.5), executed[:, 0])
+    assert executed.min() >= ordered.min()
+    assert executed.max() <= ordered.max()
+    assert np.mean(np.isclose(executed, ordered)) > 0.8  # 0.8 units at most take 1.6 s of holds of 4 s and more
+    ends = np.flatnonzero(np.diff(ordered[:, 0]) != 0)
+    np.testing.assert_allclose(executed[ends, 0], ordered[ends, 0])
+
+
+def test_a_slow_order_passes_the_rate_limit_unchanged() -> None:
+    slow = sines(BANDS["successive"])
+    fastest = np.abs(np.diff(slow)).max() / 0.05
+    np.testing.assert_allclose(limit_rate(slow, 0.05, 1.01 * fastest), slow, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sines((0, 1)), "distinct whole numbers from 1 on"),
+        (lambda: sines((3, 3)), "distinct whole numbers from 1 on"),
+        (lambda: sines(()), "distinct whole numbers from 1 on"),
+        (lambda: sines((1000,)), "too fast for steps of 0.05 s"),
+        (lambda: sines((1,), period=0.0), "period must be positive"),
+        (lambda: sines((1,), amplitude=-1.0), "amplitude not negative"),
+        (lambda: deal((1, 2), 3), "cannot be dealt to 3"),
+        (lambda: steps(hold=(0.0, 1.0)), "hold times must be positive"),
+        (lambda: steps(hold=(2.0, 1.0)), r"found \[2, 1\] s"),
+        (lambda: steps(levels=(2.0, 1.0)), r"found \[2, 1\]"),
+        (lambda: limit_rate(TIME, 0.05, 0.0), "must be positive"),
+    ],
+)
+def test_wrong_orders_are_refused(call: Any, message: str) -> None:
+    with pytest.raises(DocumentError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,116 @@
+"""One study in several worlds: what is the same study, and how numbers of worlds become an interval."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.errors import ResultError, ShipidError
+from shipid.study import compare, store
+from shipid.study.compare import compare_errors, compare_findings, read_worlds
+from tests.study.byhand import grid
+from tests.study.tiny import run_here, tiny_plan
+
+
+@pytest.fixture(scope="module")
+def other_world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("world")
+    run_here(tiny_plan(folder, {"seed": 1}), folder / "run")
+    return folder / "run"
+
+
+def test_worlds_of_one_study(tiny_run: Path, other_world: Path) -> None:
+    """Another world has another truth, other members, other test runs, and cells of the same name but for the seed."""
+    here, there = read_worlds([tiny_run, other_world])
+    assert not (here.cells["H"].to_numpy() == there.cells["H"].to_numpy()).any()
+    known = here.models["family"] == "right"
+    assert (here.models["A"][known].to_numpy() != there.models["A"][known].to_numpy()).all()
+    assert set(there.cells["seed"]) == {1000}
+    assert set(here.test.spans) != set(there.test.spans)
+    assert not here.dataset.frame["u"].equals(there.dataset.frame["u"])
+    frame = compare_errors([here, there]).set_index(["family", "N_D"])
+    assert set(frame.index) == {
+        ("right", 0),
+        ("wrong", 0),
+        *((f, N) for f in ("right", "wrong", "none") for N in (4, 6)),
+    }
+    own = [results.cells.query("kind == 'wrong' and N_D == 4")["H"].mean() for results in (here, there)]
+    assert frame.loc[("wrong", 4), ["mean", "low", "high"]].tolist() == pytest.approx(
+        [sum(own) / 2, min(own), max(own)]
+    )
+    alone = [results.models.query("family == 'wrong'")["A"].mean() for results in (here, there)]
+    assert frame.loc[("wrong", 0), "mean"] == pytest.approx(sum(alone) / 2)
+    assert compare_findings([here, there]).empty
+
+
+def test_what_is_not_one_study_is_refused(tmp_path: Path, tiny_run: Path, other_world: Path) -> None:
+    with pytest.raises(ShipidError, match="two folders or more"):
+        read_worlds([tiny_run])
+    with pytest.raises(ShipidError, match="named twice"):
+        read_worlds([tiny_run, other_world, tiny_run])
+    run_here(tiny_plan(tmp_path, {"seed": 2, "recipe.epochs": 4, "grid.N_D": [4]}), tmp_path / "run")
+    with pytest.raises(ResultError, match=r"holds another study than .*: only `seed` may differ") as caught:
+        read_worlds([tiny_run, tmp_path / "run"])
+    assert caught.value.file == str(tmp_path / "run")
+
+
+def test_a_world_twice_or_half_is_refused(tmp_path: Path, tiny_run: Path) -> None:
+    run_here(tiny_plan(tmp_path, {"seed": 0}), tmp_path / "same")
+    with pytest.raises(ResultError, match=r"has seed = 0, as .* has: nothing is repeated"):
+        read_worlds([tiny_run, tmp_path / "same"])
+    run_here(tiny_plan(tmp_path, {"seed": 5}), tmp_path / "half")
+    next((tmp_path / "half" / "batches").glob("*.json")).unlink()
+    with pytest.raises(ResultError, match="is not finished: continue with `shipid study resume"):
+        read_worlds([tiny_run, tmp_path / "half"])
+    assert store.stored_plan(tmp_path / "half").study.seed == 5
+
+
+def test_verdicts_are_counted_and_numbers_have_an_interval(made: Any) -> None:
+    H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
+    worlds = [made(grid({**H, "bad": (bad,)}, (30,))) for bad in (2.0, 2.1, 3.1)]
+    frame = compare_findings(worlds).set_index(["id", "number"])
+    row = frame.loc[("R2", "H inaccurate / A accurate")]
+    assert row["verdicts"] == "2 confirmed, 1 refuted"
+    assert row[["mean", "low", "high"]].tolist() == pytest.approx([1.2, 1.0, 1.55])
+    assert frame.loc[("R3", "gap after [m]"), "mean"] == pytest.approx(1.4)
+
+
+def test_a_world_that_cannot_tell_is_counted(made: Any) -> None:
+    H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
+    frame = compare_findings([made(grid(H, (30,))), made(grid({**H, "bad": (None,)}, (30,)))])
+    row = frame[frame["number"] == "H inaccurate / A accurate"].iloc[0]
+    assert row["verdicts"] == "1 confirmed, 1 undecided"
+    assert row["low"] == row["high"] == pytest.approx(1.05)
+
+
+def test_failed_cells_are_left_out(made: Any) -> None:
+    H = {"good": (1.0,), "bad": (2.0,), "none": (9.0,)}
+    one, other = made(grid(H, (30,))), made(grid({**H, "bad": (None,)}, (30,)))
+    frame = compare_errors([one, replace(other)]).set_index(["family", "N_D"])
+    assert frame.loc[("bad", 30), ["mean", "worlds"]].tolist() == [2.0, 1]
+    assert frame.loc[("good", 30), "worlds"] == 2
+
+
+def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
+    worlds = [made(grid({**H, "good": (good,)}, (30,))) for good in (1.0, 1.5)]
+    monkeypatch.setattr(compare, "read_worlds", lambda _: worlds)
+    result = CliRunner().invoke(app, ["study", "compare", "one", "other"])
+    assert result.exit_code == 0, result.output
+    lines = [" ".join(line.split()) for line in result.output.splitlines()]
+    assert "finding in 2 worlds number mean [least, greatest]" in lines
+    assert "R1 2 confirmed H / A, accurate 0.625 [0.5, 0.75]" in lines
+    assert "H [m] N_D = 0 N_D = 30" in lines
+    assert "good 2.00 [2.00, 2.00] 1.25 [1.00, 1.50]" in lines
+    assert "none - 9.00 [9.00, 9.00]" in lines
+
+
+def test_the_command_wants_one_study_and_says_so_in_one_line(tmp_path: Path, tiny_run: Path) -> None:
+    result = CliRunner().invoke(app, ["study", "compare", str(tiny_run), str(tmp_path)])
+    assert isinstance(result.exception, ResultError)
+    assert str(result.exception) == f"{tmp_path}: is not the folder of a run: it holds no study.toml"

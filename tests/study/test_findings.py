@@ -1,0 +1,95 @@
+"""Verdicts R1 to R4 on tables made by hand, and which findings a study gets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from shipid.study.findings import CLAIMS, findings
+from shipid.study.results import Results
+from tests.study.byhand import RIVALS, grid
+
+
+def verdicts(results: Results) -> dict[str, str]:
+    found = findings(results)
+    assert [finding["id"] for finding in found] == list(CLAIMS)
+    assert all(finding["claim"] == CLAIMS[finding["id"]] for finding in found)
+    return {finding["id"]: finding["verdict"] for finding in found}
+
+
+def one(good: float, bad: float, none: float) -> dict[Any, float | None]:
+    return grid({"good": (good,), "bad": (bad,), "none": (none,)}, (30,))
+
+
+def test_all_confirmed(made: Any) -> None:
+    assert verdicts(made(one(1.0, 2.1, 9.0))) == dict.fromkeys(CLAIMS, "confirmed")
+
+
+@pytest.mark.parametrize(
+    ("H", "refuted"),
+    [
+        ((2.1, 2.0, 9.0), {"R1"}),  # compensation worsens `good`
+        ((1.0, 2.3, 9.0), {"R2"}),  # 15 % above what accurate physics does alone
+        ((1.0, 5.5, 9.0), {"R2", "R3"}),  # gap 4.0 m before, 4.5 m after
+        ((1.0, 2.0, 3.0), {"R4"}),  # `bad` alone is worse than pure data-driven
+    ],
+)
+def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
+    found = verdicts(made(one(*H)))
+    assert {key for key, verdict in found.items() if verdict == "refuted"} == refuted
+    assert {verdict for key, verdict in found.items() if key not in refuted} == {"confirmed"}
+
+
+def test_undecided_where_seeds_disagree(made: Any) -> None:
+    """Each holds on average over two seeds and not for one of them."""
+
+    def seeds(good: tuple[float, float], bad: tuple[float, float]) -> dict[Any, float | None]:
+        cells = {("good", 30, k): good[k] for k in (0, 1)} | {("bad", 30, k): bad[k] for k in (0, 1)}
+        return {**cells, **{("none", 30, k): 9.0 for k in (0, 1)}}
+
+    assert verdicts(made(seeds((1.0, 2.5), (2.0, 2.0))))["R1"] == "undecided"
+    assert verdicts(made(seeds((1.0, 1.0), (1.5, 2.5))))["R2"] == "undecided"
+    assert verdicts(made(seeds((0.5, 0.5), (0.6, 5.0))))["R3"] == "undecided"
+
+
+def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
+    curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
+    results = made(one(1.0, 2.1, 7.0), curves=curves)
+    assert verdicts(results)["R4"] == "undecided"
+    assert "worst at 75% of the steps" in findings(results)[3]["evidence"]
+    results = made(one(1.0, 2.1, 3.0))
+    assert "worst at 0% of the steps" in findings(results)[3]["evidence"]
+    assert "most often worst: bad alone" in findings(results)[3]["evidence"]
+
+
+def test_evidence_names_the_numbers(made: Any) -> None:
+    evidence = {finding["id"]: finding["evidence"] for finding in findings(made(one(1.0, 2.1, 9.0)))}
+    assert evidence["R1"] == "good 2.00 m -> 1.00 m; bad 6.00 m -> 2.10 m"
+    assert evidence["R2"] == "inaccurate and compensated 2.10 m, accurate alone 2.00 m"
+    assert evidence["R3"] == "gap 4.00 m before, 1.10 m after"
+
+
+def test_a_missing_cell_leaves_all_undecided(made: Any) -> None:
+    results = made(grid({"good": (1.0,), "bad": (None,), "none": (9.0,)}, (30,)))
+    assert set(verdicts(results).values()) == {"undecided"}
+
+
+def test_no_claims_no_findings(made: Any) -> None:
+    assert findings(made(one(1.0, 2.0, 9.0), claims=None)) == []
+    assert findings(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (30,)))) == []
+    assert findings(made(one(1.0, 2.0, 9.0), claims={"nominal": "good"})) == []
+
+
+def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
+    cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
+    found = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}))
+    assert [finding["id"] for finding in found] == [*CLAIMS, *(f"S{k}" for k in range(1, 8))]
+
+
+def test_numbers_are_those_of_the_evidence(made: Any) -> None:
+    numbers = {finding["id"]: finding["numbers"] for finding in findings(made(one(1.0, 2.1, 9.0)))}
+    assert numbers["R1"] == {"H / A, accurate": pytest.approx(0.5), "H / A, inaccurate": pytest.approx(0.35)}
+    assert numbers["R2"] == {"H inaccurate / A accurate": pytest.approx(1.05)}
+    assert numbers["R3"] == {"gap before [m]": pytest.approx(4.0), "gap after [m]": pytest.approx(1.1)}
+    assert numbers["R4"] == {"share of steps where it is worst": 1.0}
