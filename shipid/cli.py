@@ -108,6 +108,41 @@ def vessel_show(
     _print(_table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
 
 
+@app.command("simulate")
+def simulate(
+    study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
+    out: Annotated[Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet beside you")] = None,
+    changes: Changes = None,
+) -> None:
+    """Simulate the truth of a study into a dataset, and show its envelope beside the published one."""
+    from shipid.data.dataset import write_dataset
+    from shipid.study.envelope import envelope, envelope_table
+    from shipid.study.plan import read_plan
+    from shipid.study.prepare import obtain, partition
+
+    if out is not None and out.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    plan = read_plan(study, _parsed(changes))
+    if plan.truth is None:
+        raise DocumentError("has no [truth]: its runs are recorded", file=plan.file)
+    dataset = obtain(plan)
+    pool, test, _ = partition(plan, dataset)
+    found = envelope_table(envelope(plan, pool, test, dataset.commands), plan.study.published)
+    units = dict(zip(found["quantity"], found["unit"], strict=True))
+    rows = [
+        [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]
+        for name, part in found.groupby("set", sort=False)
+    ]
+    file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
+    typer.echo(f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> {file}")
+    typer.echo("least / mean / greatest at the instants of prediction:")
+    _print(_table(["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())], rows))
+
+
+def _limits(row: Any) -> str:
+    return " / ".join(f"{row[name].iloc[0]:.1f}" for name in ("min", "mean", "max")) if len(row) else ""
+
+
 @data_app.command("fetch")
 def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""

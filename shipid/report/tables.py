@@ -125,24 +125,25 @@ def repairs(content: ReportContent) -> Table | None:
 
 
 def envelope(content: ReportContent) -> Table | None:
-    """Smallest, mean and largest value of every input, a column per set; None without rows."""
+    """Smallest, mean and largest value of every input, a row per set; None without rows."""
     frame = content.envelope
     if frame.empty:
         return None
+    units = dict(zip(frame["quantity"], frame["unit"], strict=True))
     sets = sorted((str(name) for name in pd.unique(frame["set"])), key=lambda name: name == PUBLISHED)
     rows = []
-    for (quantity, unit), mine in frame.groupby(["quantity", "unit"], sort=False):
-        by_set = mine.set_index("set")
-        row = [text(quantity), text(unit)]
-        for name in sets:
-            if name not in by_set.index:
-                row.append(text(None))
-                continue
-            values = [float(str(by_set.loc[name, column])) for column in ("min", "mean", "max")]
-            row.append(Cell(" / ".join(number(value) for value in values), values[1]))
-        rows.append(row)
-    numeric = [False, False, *[True] * len(sets)]
-    return Table("envelope-table", "Minimum / mean / maximum", "", ["input", "unit", *sets], numeric, rows)
+    for name in sets:
+        mine = frame[frame["set"].eq(name)].set_index("quantity")
+        rows.append([text(name), *(_range(mine, quantity) for quantity in units)])
+    headings = ["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())]
+    return Table("envelope-table", "Minimum / mean / maximum", "", headings, [False, *[True] * len(units)], rows)
+
+
+def _range(mine: pd.DataFrame, quantity: str) -> Cell:
+    if quantity not in mine.index:
+        return text(None)
+    values = [float(str(mine.loc[quantity, column])) for column in ("min", "mean", "max")]
+    return Cell(" / ".join(number(value) for value in values), values[1])
 
 
 def _table(

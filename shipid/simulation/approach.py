@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = 1.0, 1.0, 0.1  # m/s, rev/s, rad: where commands are asked what they do
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: an approach is looked at so often, and given up
-SETTLED = 1e-3  # m/s: greatest change of speed over a chunk of a steady approach
+SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
@@ -91,11 +91,11 @@ def steady(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
 
-    From rest until the speed changes by less than 0.001 m/s in 30 s; position and time then begin anew.
+    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s; position and heading then begin anew.
 
     Raises
     ------
-    ShipidError : it diverges, or is not steady after an hour.
+    ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships.
     """
     vessel, model = controls.vessel, dynamics(controls.vessel)
     names = (*model.state, *model.hidden)
@@ -124,13 +124,24 @@ def steady(
         before = state
         state = {name: path[name][-1, 0] for name in names}
         memory = {name: path[f"actual.{name}"][-1, 0] for name in model.memory}
-        moving = np.max([np.abs(state[name] - before[name]) for name in ("u", "v")], axis=0) >= SETTLED
+        changed = [np.abs(state[name] - before[name]) for name in model.state[model.num_dof :]]
+        moving = np.max(changed, axis=0) >= SETTLED
         if not moving.any():
-            return state | {name: np.zeros(len(n)) for name in ("north", "east")}, memory
+            _check_straight(vessel, n, state["r"])
+            return state | {name: np.zeros(len(n)) for name in ("north", "east", "psi")}, memory
     raise ShipidError(
         f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n, moving)} rpm: "
         'start from rest (approach = "rest")'
     )
+
+
+def _check_straight(vessel: Vessel, n: Array, r: Array) -> None:
+    turning = np.abs(r) >= SETTLED
+    if turning.any():
+        raise ShipidError(
+            f"{vessel.name} turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach: "
+            'start from rest (approach = "rest")'
+        )
 
 
 def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:

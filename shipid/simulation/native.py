@@ -25,7 +25,7 @@ import numpy as np
 
 from shipid.errors import ShipidError
 from shipid.simulation.integrate import Array, Batch, Method, integrate
-from shipid.simulation.lowering import STAGES, Dialect, Printed, print_function
+from shipid.simulation.printing import STAGES, Dialect, Printed, print_function
 from shipid.vessel.dynamics import Dynamics
 
 _CALLS = {

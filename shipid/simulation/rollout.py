@@ -178,6 +178,8 @@ def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, n
         return np.asarray(
             _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel)[0]
         )
+    if model.helmsman is None:
+        return np.asarray(batch.commands[0, [model.commands.index(name) for name in model.memory]])
     unknown = np.zeros((len(model.memory) - len(helm), num_samples))
     known = np.concatenate([np.array(list(helm.values())).reshape(-1, num_samples), unknown])
     inputs = (batch.state, known, batch.commands[0], batch.environment[0], batch.parameters[:1].T)

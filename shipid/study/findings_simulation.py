@@ -227,7 +227,7 @@ def _S3(grid: Grid) -> Finding:
     rises, slopes = trends(grid.mean)
     first, last = grid.amounts[0], grid.amounts[-1]
     each = np.array([trends({m: H[:, k] for m, H in grid.H.items()})[1] for k in range(len(grid.seeds))])
-    ends = [f"{slopes[k]:.3f}{interval(*_ends(each[:, k]), len(each))}" for k in (0, -1)]
+    ends = [f"{each[:, k].mean():.2f}{interval(*_ends(each[:, k]), len(each))}" for k in (0, -1)]
     evidence = (
         f"rank correlation of H and A {rises.min():.2f} to {rises.max():.2f} over N_D ({len(A)} models); median slope "
         f"of H over A [m/m] {ends[0]} at N_D = {first}, {ends[1]} at {last}; steepest at "
@@ -235,8 +235,8 @@ def _S3(grid: Grid) -> Finding:
     )
     numbers = {
         "least rank correlation of H and A": float(rises.min()),
-        f"slope at N_D = {first} [m/m]": float(slopes[0]),
-        f"slope at N_D = {last} [m/m]": float(slopes[-1]),
+        f"slope at N_D = {first} [m/m]": float(each[:, 0].mean()),
+        f"slope at N_D = {last} [m/m]": float(each[:, -1].mean()),
     }
     return _finding("S3", grid.judge(holds, holds_weakly), evidence, **numbers)
 

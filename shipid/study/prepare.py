@@ -17,7 +17,6 @@ from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
 from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, split_folds, split_runs
 from shipid.errors import DataError, DocumentError, choices
-from shipid.estimation.compensator import choose_features, feature_table
 from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
 from shipid.simulation.scan import memory_along
@@ -60,7 +59,7 @@ class Prepared:
 
     def runs(self, plan: Plan, batch: Batch) -> tuple[str, ...]:
         """Training and validation runs of a batch: nested over N_D for one seed."""
-        return nested_runs(self.pool.spans, plan.study.grid.N_D, batch.seed)[batch.N_D]
+        return nested(plan, self.pool, batch)
 
     def folds(self, plan: Plan, batch: Batch, windows: Windows) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment."""
@@ -88,10 +87,10 @@ def obtain(plan: Plan) -> Dataset:
     return import_log(read_mapping(source), log, without=study.data.without)
 
 
-def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
-    """Cut windows, set the test runs aside, and roll every model out on all of them.
+def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]]:
+    """Cut windows and set the test runs aside: windows that may train, those of the test, and what was left out.
 
-    A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
+    Raises DocumentError where the runs do not suffice.
     """
     prediction = plan.study.prediction
     try:
@@ -120,6 +119,15 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         raise DocumentError(
             f"{max(plan.study.grid.N_D)}: only {available} runs are left for training", file=plan.file, path="grid.N_D"
         )
+    return rest, test, notes
+
+
+def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
+    """Cut windows, set the test runs aside, and roll every model out on all of them.
+
+    A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
+    """
+    rest, test, notes = partition(plan, dataset)
     both = [rest, test]
     for model in plan.models:
         if model.vessel is not None:
@@ -137,6 +145,11 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:
+    """Training and validation runs of a batch: nested over N_D for one seed."""
+    return nested_runs(pool.spans, plan.study.grid.N_D, batch.seed)[batch.N_D]
 
 
 def _place_in_run(windows: Windows) -> Array:
@@ -279,22 +292,6 @@ def constant_motion(windows: Windows) -> Array:
     along, across = chord * np.cos(half), chord * np.sin(half)
     path: Array = np.stack([u * along - v * across, u * across + v * along], axis=-1)
     return path
-
-
-def envelope(plan: Plan, prepared: Prepared) -> list[dict[str, Any]]:
-    """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test (paper's Table 1)."""
-    seed = min(plan.study.grid.seeds)
-    sets = {"test": prepared.test}
-    for batch in reversed([batch for batch in plan.batches if batch.seed == seed]):
-        sets[f"D_{batch.N_D}"] = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-    whole = feature_table(prepared.pool.columns, prepared.commands)
-    alike = choose_features(whole) | {name: (name,) for name, values in whole.items() if np.ptp(values) == 0}
-    return [
-        {"set": name, "quantity": quantity, "min": values.min(), "mean": values.mean(), "max": values.max()}
-        for name, windows in sets.items()
-        for quantity, values in feature_table(windows.columns, prepared.commands).items()
-        if quantity in alike  # equal commands are one input: the first stands for all
-    ]
 
 
 def limits(windows: Windows, commands: Sequence[str]) -> dict[str, tuple[float, float]]:

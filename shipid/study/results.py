@@ -17,14 +17,13 @@ from shipid.data.windows import Windows
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.plan import NO_MODEL, PUBLISHED, Plan
+from shipid.study.envelope import SAILORS, envelope_table
+from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.prepare import constant_motion
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 INSTANTS = 7  # windows of a test run in the browser
-RPM, DEGREE = 60.0, 180.0 / np.pi
-SAILORS = {"n": ("shaft", "rpm", RPM), "alpha": ("azimuth", "deg", DEGREE), "delta": ("rudder", "deg", DEGREE)}
 
 
 @dataclass(frozen=True)
@@ -255,33 +254,7 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    rows = []
-    for row in store.read_json(results.folder / store.ENVELOPE):
-        unit, factor = _sailors_unit(row["quantity"])
-        rows.append({**row, "unit": unit, **{name: row[name] * factor for name in ("min", "mean", "max")}})
-    return pd.DataFrame([*rows, *_published(results, [row["quantity"] for row in rows])])
-
-
-def _published(results: Results, quantities: list[str]) -> list[dict[str, Any]]:
-    """Rows of the published envelope, set "published", for those quantities that the study has."""
-    if results.plan.study.published is None:
-        return []
-    known = {PUBLISHED[key]: limits for key, limits in results.plan.study.published.envelope.items()}
-    rows = []
-    for quantity in dict.fromkeys(quantities):
-        unit, factor = _sailors_unit(quantity)
-        for (signal, to_SI), limits in known.items():
-            if signal == quantity.rpartition(".")[2]:
-                values = dict(zip(("min", "mean", "max"), (to_SI * factor * limit for limit in limits), strict=True))
-                rows.append({"set": "published", "quantity": quantity, "unit": unit, **values})
-    return rows
-
-
-def _sailors_unit(quantity: str) -> tuple[str, float]:
-    """Unit in which sailors read a quantity, and the factor to it from SI."""
-    if "." in quantity:
-        return SAILORS[quantity.rpartition(".")[2]][1:]
-    return ("deg/s", DEGREE) if quantity == "r" else ("m/s", 1.0)
+    return envelope_table(store.read_json(results.folder / store.ENVELOPE), results.plan.study.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:

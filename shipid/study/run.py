@@ -25,8 +25,9 @@ from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.simulation.scan import uninterrupted
 from shipid.study import store
+from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
-from shipid.study.prepare import Prepared, describe, envelope, limits, obtain, own_vessel, prepare
+from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, prepare
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
@@ -75,7 +76,7 @@ def run_study(
     yield Event("note", "rolling out the models")
     prepared = prepare(plan, dataset, device)
     store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
-    store.write_json(folder / store.ENVELOPE, envelope(plan, prepared))
+    store.write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
     store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(prepared, m)} for m in prepared.models])
     for note in prepared.notes:
         yield Event("note", note)

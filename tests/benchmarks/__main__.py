@@ -8,9 +8,9 @@ from pathlib import Path
 
 from shipid.estimation.training import use_threads
 from shipid.study.run import machine
-from tests.benchmarks import cells, commands, rollouts
+from tests.benchmarks import cells, commands, rollouts, truth
 
-BENCHMARKS = {"rollouts": rollouts, "commands": commands, "cells": cells}
+BENCHMARKS = {"rollouts": rollouts, "truth": truth, "commands": commands, "cells": cells}
 
 
 def main(wanted: list[str]) -> None:

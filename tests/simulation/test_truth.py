@@ -128,3 +128,78 @@ def test_diverging_truth_is_told() -> None:
 def test_impossible_truths_are_refused(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         truth(**changes)
+
+
+SIX = load_vessel("gunnerus-28.9-6dof")
+SEA = {"H_s": 1.0, "T_p": 5.0, "components": 20}
+
+
+def test_waves_move_the_ship_and_are_its_own() -> None:
+    """A sea heaves and rolls her; calm water does not; another manoeuvre has another sea."""
+    calm, rough = simulate(truth(duration=20.0), SIX), simulate(truth(duration=20.0, waves=SEA), SIX)
+    late = calm["t"] > 5.0
+    assert calm.loc[late, "z"].abs().max() < 0.1 < rough.loc[late, "z"].std()
+    heave = rough.pivot(index="t", columns="run", values="z").to_numpy()
+    assert np.abs(np.corrcoef(heave.T) - np.eye(6)).max() < 0.9
+    flat = simulate(truth(duration=20.0, waves={**SEA, "H_s": 0.0}), SIX)
+    pd.testing.assert_frame_equal(flat, calm, rtol=1e-9, atol=1e-9)
+
+
+def test_the_log_of_a_rolling_ship_obeys_planar_kinematics() -> None:
+    """u, v and r of the log are those of the horizontal plane, though the ship rolls, pitches and heaves."""
+    frame = simulate(truth(duration=20.0, interval=0.1, waves={**SEA, "H_s": 2.0}), SIX)
+    assert frame["phi"].abs().max() > 0.05
+    for _, run in frame.groupby("run"):
+        t, psi, u, v = (run[name].to_numpy() for name in ("t", "psi", "u", "v"))
+        for name, rate in (
+            ("north", u * np.cos(psi) - v * np.sin(psi)),
+            ("east", u * np.sin(psi) + v * np.cos(psi)),
+            ("psi", run["r"].to_numpy()),
+        ):
+            moved = np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
+            np.testing.assert_allclose(run[name].to_numpy()[1:] - run[name].iloc[0], moved, atol=3e-3)
+
+
+def test_gusts_are_logged_and_felt() -> None:
+    steady = simulate(truth(duration=20.0, wind_speed=(5.0, 6.0)), SHIP)
+    gusty = simulate(truth(duration=20.0, wind_speed=(5.0, 6.0), gusts={"kind": "npd"}), SHIP)
+    assert (gusty.groupby("run")["V_w"].nunique() == 21).all()
+    assert 0.05 < (gusty["V_w"] - steady["V_w"]).std() < 1.5
+    assert np.abs(gusty["v"] - steady["v"]).max() > 1e-3
+
+
+def test_a_current_carries_every_ship_its_own_way() -> None:
+    ship = SHIP.with_values({"current.kind": "uniform", "wind.off": True})
+    still = simulate(truth(duration=10.0), ship)
+    carried = simulate(truth(duration=10.0, current_speed=(0.5, 0.5)), ship)
+    moved = carried[["north", "east"]].to_numpy() - still[["north", "east"]].to_numpy()
+    last = (carried["t"] == 10.0).to_numpy()
+    assert (np.hypot(*moved[last].T) > 0.3).all()
+    assert "V_c" not in carried
+
+
+def test_sensors_disturb_what_they_measure_and_nothing_else() -> None:
+    exact = simulate(truth(duration=10.0), SHIP)
+    sensors = {"u": {"noise": 0.1}, "psi": {"bias": 0.02}, "north": {"latency": 0.5}}
+    found = simulate(truth(duration=10.0, sensors=sensors), SHIP)
+    assert 0.05 < (found["u"] - exact["u"]).std() < 0.2
+    per_run = (found["psi"] - exact["psi"]).groupby(found["run"])
+    assert per_run.std().max() < 1e-9 < per_run.mean().abs().max()
+    fine = simulate(truth(duration=10.0, interval=0.5), SHIP)
+    late = fine.loc[np.isclose(fine["t"] % 1.0, 0.5), "north"].to_numpy()
+    np.testing.assert_allclose(found.loc[found["t"] > 0, "north"], late, atol=1e-9)
+    for name in ("east", "v", "r", "V_w", "port.n"):
+        np.testing.assert_allclose(found[name], exact[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "said"),
+    [
+        ({"waves": SEA}, "truth.waves", "has no [waves]"),
+        ({"current_speed": (0.0, 1.0)}, "truth.current_speed", "has no [current]"),
+    ],
+)
+def test_what_a_vessel_cannot_feel_is_refused(changes: dict[str, Any], path: str, said: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        simulate(truth(**changes), SHIP)
+    assert (caught.value.path, said in str(caught.value)) == (path, True)

@@ -17,8 +17,9 @@ from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DocumentError
 from shipid.predictor import Predictor
 from shipid.simulation.rollout import rollout
+from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, build_plan, read_plan
-from shipid.study.prepare import Prepared, constant_motion, envelope, limits, obtain, own_vessel, prepare, window_memory
+from shipid.study.prepare import Prepared, constant_motion, limits, obtain, own_vessel, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import draw, resolve
@@ -332,7 +333,9 @@ def test_a_mapping_is_looked_for_beside_the_study(
 def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     """Per D_4, D_6 and test, from the windows that each sees."""
     plan, _, prepared = tiny
-    rows = {(row["set"], row["quantity"]): row for row in envelope(plan, prepared)}
+    rows = {
+        (row["set"], row["quantity"]): row for row in envelope(plan, prepared.pool, prepared.test, prepared.commands)
+    }
     batches = {f"D_{batch.N_D}": batch for batch in plan.batches if batch.seed == min(plan.study.grid.seeds)}
     assert {name for name, _ in rows} == {*batches, "test"}
     for name in ("test", *batches):

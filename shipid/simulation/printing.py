@@ -1,0 +1,129 @@
+"""A CasADi SX function as text in another language, one operation an instruction, so that whole batches go at once.
+
+The printer walks the instructions of the function. What depends on parameters alone, or on commands and weather, is
+printed into stages that run early; the rest goes over (variant, sample). Nothing of the physics is written twice:
+PyTorch (`lowering`) and C (`native`) are two dialects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+_TRUTH = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT}  # give booleans
+_TAKES_TRUTH = {ca.OP_NOT: 1, ca.OP_AND: 2, ca.OP_OR: 2, ca.OP_IF_ELSE_ZERO: 1}  # so many operands, from the first
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a language writes an operation, an assignment `a = ...`, a plain number, and a truth value as a number."""
+
+    operations: Mapping[int, str]
+    assignment: str
+    constant: Callable[[float], str]
+    number: str
+
+
+STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A function as text, in stages: what depends on early inputs alone is computed early, and once.
+
+    lines : of each stage, then of main; a value `a7` of an earlier stage is read as `s0[3]`.
+    saved : of each stage, what later ones read, in order.
+    outputs : text of each output entry, in order.
+    names, stage_of : the function's inputs in order, and the stage that takes each (main takes the last).
+    """
+
+    lines: tuple[tuple[str, ...], ...]
+    saved: tuple[tuple[str, ...], ...]
+    outputs: tuple[str, ...]
+    names: tuple[str, ...]
+    stage_of: tuple[int, ...]
+
+    def inputs(self, stage: int) -> list[str]:
+        """Names of the inputs that a stage takes."""
+        return [name for name, place in zip(self.names, self.stage_of, strict=True) if place == stage]
+
+
+def print_function(function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> Printed:
+    """Print an SX function of dense vectors with one output; ValueError for an instruction the dialect lacks."""
+    printer = _Printer(function, stages, dialect)
+    for k in range(function.n_instructions()):
+        printer.instruction(k)
+    return printer.finish()
+
+
+@dataclass(frozen=True)
+class _Value:
+    """What a work slot holds: its text, the stage that computes it (-1: a plain number), and if it is a boolean."""
+
+    text: str
+    stage: int
+    truth: bool = False
+
+
+class _Printer:
+    """Prints instructions as lines, each in the earliest stage that knows its operands."""
+
+    def __init__(self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> None:
+        self.function = function
+        self.dialect = dialect
+        self.names = [function.name_in(i) for i in range(function.n_in())]
+        early = {name: number for number, stage in enumerate(stages) for name in stage}
+        self.last = len(stages)
+        self.stage_of = [early.get(name, self.last) for name in self.names]
+        self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
+        self.saved: list[dict[str, int]] = [{} for _ in stages]
+        self.slot: dict[int, _Value] = {}
+        self.outputs: dict[int, _Value] = {}
+
+    def instruction(self, k: int) -> None:
+        """Print one instruction, or note a number, an input or an output."""
+        operation = self.function.instruction_id(k)
+        source, target = self.function.instruction_input(k), self.function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            self.slot[target[0]] = _Value(repr(float(self.function.instruction_constant(k))), -1)
+        elif operation == ca.OP_INPUT:
+            self.slot[target[0]] = _Value(f"{self.names[source[0]]}[{source[1]}]", self.stage_of[source[0]])
+        elif operation == ca.OP_OUTPUT:
+            self.outputs[target[1]] = self.slot[source[0]]
+        else:
+            self.slot[target[0]] = self.operation(k, operation, [self.slot[i] for i in source])
+
+    def operation(self, k: int, operation: int, operands: list[_Value]) -> _Value:
+        """Print an operation; one on numbers alone is done here and now."""
+        template = self.dialect.operations.get(operation)
+        if template is None:
+            raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no counterpart")
+        stage = max(operand.stage for operand in operands)
+        if stage < 0:
+            return _Value(repr(float(ca.evalf(_on_numbers(operation, [float(o.text) for o in operands])))), -1)
+        bare = _TAKES_TRUTH.get(operation, 0)
+        texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
+        self.lines[stage].append(self.dialect.assignment.format(f"a{k}", template.format(*texts)))
+        return _Value(f"a{k}", stage, operation in _TRUTH)
+
+    def use(self, value: _Value, stage: int, truth_is_fine: bool = False) -> str:
+        """Text of a value inside a stage; one of an earlier stage is saved there, as a number."""
+        if value.stage < 0:
+            return self.dialect.constant(float(value.text))
+        if value.stage == stage:
+            return self.dialect.number.format(value.text) if value.truth and not truth_is_fine else value.text
+        text = self.dialect.number.format(value.text) if value.truth else value.text
+        saved = self.saved[value.stage]
+        return f"s{value.stage}[{saved.setdefault(text, len(saved))}]"
+
+    def finish(self) -> Printed:
+        """Everything that was printed."""
+        outputs = tuple(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
+        lines = tuple(tuple(stage) for stage in self.lines)
+        return Printed(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))
+
+
+def _on_numbers(operation: int, values: Sequence[float]) -> ca.SX:
+    return ca.SX.unary(operation, values[0]) if len(values) == 1 else ca.SX.binary(operation, *values)

@@ -1,0 +1,64 @@
+"""The envelope of a study's inputs, as the paper's Tables 1 and 2: in the data, and beside what others published."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.windows import Windows
+from shipid.estimation.compensator import choose_features, feature_table
+from shipid.study.plan import PUBLISHED, Plan, Published
+from shipid.study.prepare import nested
+
+RPM, DEGREE = 60.0, 180.0 / np.pi
+SAILORS = {"n": ("shaft", "rpm", RPM), "alpha": ("azimuth", "deg", DEGREE), "delta": ("rudder", "deg", DEGREE)}
+LIMITS = ("min", "mean", "max")
+
+
+def envelope(plan: Plan, pool: Windows, test: Windows, commands: Sequence[str]) -> list[dict[str, Any]]:
+    """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test."""
+    seed = min(plan.study.grid.seeds)
+    tables = {"test": feature_table(test.columns, commands)}
+    for batch in reversed([batch for batch in plan.batches if batch.seed == seed]):
+        part = pool.select(np.isin(pool.run, nested(plan, pool, batch)))
+        tables[f"D_{batch.N_D}"] = feature_table(part.columns, commands)
+    whole = feature_table(pool.columns, commands)
+    alike = choose_features(whole) | {name: (name,) for name, values in whole.items() if np.ptp(values) == 0}
+    return [
+        {"set": name, "quantity": quantity, "min": values.min(), "mean": values.mean(), "max": values.max()}
+        for name, table in tables.items()
+        for quantity, values in table.items()
+        if quantity in alike  # equal commands are one input: the first stands for all
+    ]
+
+
+def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | None) -> pd.DataFrame:
+    """The envelope in degrees and rpm, a row per set and quantity; what is published is the set of that name."""
+    own = []
+    for row in rows:
+        unit, factor = sailors_unit(row["quantity"])
+        own.append({**row, "unit": unit, **{name: row[name] * factor for name in LIMITS}})
+    return pd.DataFrame([*own, *_published(published, [row["quantity"] for row in own])])
+
+
+def _published(published: Published | None, quantities: Sequence[str]) -> list[dict[str, Any]]:
+    """Rows of the published envelope for those quantities that the study has."""
+    rows = []
+    for key, limits in (published.envelope if published else {}).items():
+        signal, to_SI = PUBLISHED[key]
+        for quantity in dict.fromkeys(quantities):
+            if quantity.rpartition(".")[2] == signal:
+                unit, factor = sailors_unit(quantity)
+                values = dict(zip(LIMITS, (to_SI * factor * limit for limit in limits), strict=True))
+                rows.append({"set": "published", "quantity": quantity, "unit": unit, **values})
+    return rows
+
+
+def sailors_unit(quantity: str) -> tuple[str, float]:
+    """Unit in which sailors read a quantity, and the factor to it from SI."""
+    if "." in quantity:
+        return SAILORS[quantity.rpartition(".")[2]][1:]
+    return ("deg/s", DEGREE) if quantity == "r" else ("m/s", 1.0)

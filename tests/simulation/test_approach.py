@@ -1,0 +1,126 @@
+"""What commands do, found by asking the equations; the steady approach; how units share a load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.errors import DocumentError, ShipidError
+from shipid.simulation.approach import Controls, acceleration, helm_effect, steady, thrust_sharing
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import PATCHED
+
+SHIP = load_vessel("gunnerus-28.9")
+TUNNEL = SHIP.with_values(PATCHED["tunnel"][1])
+BOTH = {"port.alpha": -1.0, "starboard.alpha": -1.0}
+
+
+def moved(**places: float) -> Vessel:
+    return SHIP.with_values({f"thruster.{name.replace('_', '.')}": value for name, value in places.items()})
+
+
+def test_aft_azimuths_turn_against_their_angle_and_forward_ones_with_it() -> None:
+    for vessel in (SHIP, TUNNEL, load_vessel("gunnerus-28.9-6dof")):
+        controls = Controls.of(vessel)
+        assert controls.drives == ("port.n", "starboard.n")  # a tunnel unit drives nothing ahead
+        assert controls.helm == BOTH
+    tractor = Controls.of(moved(port_x=8.0))
+    assert tractor.helm == {"port.alpha": 1.0, "starboard.alpha": -1.0}
+
+
+def test_orders_name_every_command() -> None:
+    orders = Controls.of(TUNNEL).orders(np.array([2.0, 3.0]), np.array([0.1, -0.2]))
+    assert set(orders) == set(dynamics(TUNNEL).commands)
+    np.testing.assert_array_equal(orders["port.n"], [2.0, 3.0])
+    np.testing.assert_array_equal(orders["starboard.alpha"], [-0.1, 0.2])
+    np.testing.assert_array_equal(orders["bow.n"], [0.0, 0.0])
+
+
+def test_helm_effect_is_the_yaw_acceleration_to_starboard() -> None:
+    controls = Controls.of(SHIP)
+    slow, fast = helm_effect(controls, 1.0, 0.0), helm_effect(controls, 2.0, 0.0)
+    assert slow > 0
+    assert fast == pytest.approx(4 * slow)  # thrust goes with n^2 at rest
+
+
+def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
+    fixed = {f"thruster.{side}.off": True for side in ("port", "starboard")}
+    with pytest.raises(DocumentError, match="no command drives R/V Gunnerus") as caught:
+        Controls.of(TUNNEL.with_values(fixed))
+    assert caught.value.path == "thruster"
+    amidships = {"thruster.port.x": 0.0, "thruster.port.y": 0.0, "thruster.starboard.off": True}
+    balanced = SHIP.with_values(amidships | {"added_mass.Y_rdot": 0.0, "added_mass.N_vdot": 0.0})
+    with pytest.raises(DocumentError, match="no command turns R/V Gunnerus"):
+        Controls.of(balanced)
+
+
+def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
+    """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
+    n = np.array([75, 145, 200]) / 60
+    state, memory = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    np.testing.assert_allclose(state["u"], [2.27, 4.39, 6.06], atol=0.02)
+    assert memory == {}
+    for shaft, u in zip(n, state["u"], strict=True):
+        assert np.abs(acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
+    for name in ("north", "east", "psi", "v", "r"):
+        np.testing.assert_allclose(state[name], 0, atol=1e-9)
+
+
+def test_hidden_states_and_actuators_are_steady_too() -> None:
+    vessel = load_vessel("gunnerus-28.9-6dof")
+    state, memory = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
+    assert set(state) == {*dynamics(vessel).state, *dynamics(vessel).hidden}
+    assert memory == {name: pytest.approx(2.0 if name.endswith(".n") else 0.0) for name in dynamics(vessel).memory}
+    for name in ("p", "q"):
+        assert abs(state[name][0]) < 1e-3
+    assert state["w"][0] == pytest.approx(state["u"][0] * np.tan(state["theta"][0]), abs=1e-3)  # trimmed, not heaving
+
+
+def test_an_approach_that_never_settles_or_diverges_is_told() -> None:
+    gains = Controls.of(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
+    with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
+        steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+    ponderous = Controls.of(SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1}))
+    with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: start from rest"):
+        steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+
+
+def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() -> None:
+    lame = Controls.of(SHIP.with_values({"thruster.starboard.off": True}))
+    with pytest.raises(ShipidError, match="turns with the helm amidships at 120 rpm"):
+        steady(lame, np.array([2.0]), step=0.1, method="rk4", engine="casadi")
+
+
+def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:
+    units = thrust_sharing(SHIP)
+    effects = [
+        acceleration(SHIP, 0.0, {f"{unit.name}.n": 1.0, f"{unit.name}.alpha": alpha})
+        for unit in units
+        for alpha in (0.0, np.pi / 2)
+    ]
+    matrix = np.array(effects).T
+    shares = np.array([row for unit in units for row in (unit.along, unit.across)])
+    np.testing.assert_allclose(matrix @ shares, np.eye(3), atol=1e-5)
+    np.testing.assert_allclose(matrix @ np.array([unit.bias for unit in units]).ravel(), 0, atol=1e-5)
+    np.testing.assert_allclose([unit.bias for unit in units], [[0, 1], [0, -1]], atol=1e-5)  # inwards
+
+
+def test_units_in_line_push_along_the_line() -> None:
+    fore_and_aft = moved(port_y=0.0, port_x=10.0, starboard_y=0.0)
+    np.testing.assert_allclose([unit.bias for unit in thrust_sharing(fore_and_aft)], [[-1, 0], [1, 0]], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "has"),
+    [
+        ({"port.off": True}, "has starboard"),
+        ({"port.off": True, "starboard.off": True, "bow.off": False}, "has none"),
+        ({"port.x": -13.22, "port.y": 2.7}, "has port, starboard"),
+    ],
+)
+def test_a_vessel_that_cannot_hold_station_is_refused(changes: dict[str, float | bool], has: str) -> None:
+    """One unit, none, or two in one place."""
+    vessel = SHIP.with_values({f"thruster.{path}": value for path, value in changes.items()})
+    with pytest.raises(DocumentError, match=f"needs two azimuth units .* {has}"):
+        thrust_sharing(vessel)

@@ -1,0 +1,128 @@
+"""The native engine: operations, groups and remainders, its cache, and what it says where it cannot work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.simulation import native
+from shipid.simulation.integrate import Batch
+from shipid.simulation.native import Target, compiler, run_native, target
+from shipid.simulation.rollout import rollout
+from shipid.vessel import dynamics as module
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+SHIP = load_vessel("gunnerus-28.9")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    native._library.cache_clear()
+    yield tmp_path / "cache" / "shipid"
+    native._library.cache_clear()
+
+
+def operations() -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+    x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
+    a, b, k = x[0], x[1], p[0] / 4e5
+    unary = (ca.exp, ca.sin, ca.cos, ca.tan, ca.atan, ca.sinh, ca.cosh, ca.tanh, ca.fabs, ca.sign, ca.floor, ca.ceil)
+    values = [f(a) for f in unary] + [f(k) for f in unary]
+    values += [
+        ca.log(ca.fabs(a)),
+        ca.sqrt(ca.fabs(a)),
+        ca.asin(ca.tanh(a)),
+        ca.acos(ca.tanh(b)),
+        1 / a,
+        2 * a,
+        a**2,
+        -a,
+    ]
+    values += [a + b, a - b, a * b, a / b, ca.fabs(a) ** b, ca.fabs(a) ** 2.5, a**3, k**1.5, 2.5**a]
+    values += [ca.atan2(a, b), ca.atan2(a, 0.3), ca.atan2(0.3, b), ca.fmin(a, b), ca.fmax(a, b), ca.fmax(k, 0.1)]
+    values += [ca.fmin(a, 0.2), ca.fmax(0.2, b), ca.fmin(k, a), a < b, a <= b, a == b, a != b, (a > 0) + (b > 0)]
+    values += [ca.if_else(ca.logic_and(a > 0, b > 0), 1e-6, -3.3), ca.if_else(ca.logic_or(a > k, k > 2), b, 0)]
+    values += [(a > 0) - ca.logic_not(a > k), ca.if_else(a, b, k)]
+    return x, p, values
+
+
+@pytest.mark.parametrize("wanted", ["here", "one lane at a time"])
+def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step of 1 s from rates that are the operations; with vector functions, and without."""
+    if wanted != "here":
+        monkeypatch.setattr(native, "target", lambda: Target(2, (), ""))
+    x, p, values = operations()
+    model = dynamics(SHIP)
+    sizes = [("memory", 0), ("commands", 4), ("environment", 2)]
+    middle = [ca.SX.sym(name, size) for name, size in sizes]
+    tau = ca.SX.sym("tau_extra", 3)
+    names = [*module.INPUTS, "tau_extra"]
+    rng = np.random.default_rng(0)
+    start = rng.uniform(-2, 2, (6, 21))
+    start[0, :2] = start[1, :2]
+    parameters = np.array([list(SHIP.parameters.values())])
+    batch = Batch(
+        start, np.zeros((0, 21)), np.zeros((1, 4, 21)), np.zeros((1, 2, 21)), np.zeros((1, 3, 21)), parameters
+    )
+    for first in range(0, len(values), 6):
+        part = ca.vertcat(*(values[first : first + 6] + [ca.SX(0)] * 6)[:6])
+        rates = ca.Function("rates", [x, *middle, p, tau], [ca.densify(part)], names, ["rates"])
+        found, _ = run_native(replace(model, rates=rates), batch, 1.0, 1, "euler", 1, list(range(6)))
+        expected = np.hstack(
+            [np.array(rates(start[:, k], [], [0] * 4, [0] * 2, parameters[0], [0] * 3)) for k in range(21)]
+        )
+        np.testing.assert_allclose(found[1, 0].T - start, expected, rtol=1e-12, atol=1e-13, err_msg=str(first))
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
+def test_groups_and_remainders(count: int, draw_inputs: Callable[..., Any]) -> None:
+    """A sample's numbers do not depend on who shares its vector or its thread."""
+    given = draw_inputs(SHIP, 70)
+    options: dict[str, Any] = {"step": 1.0, "num_steps": 5, "engine": "native"}
+    whole = rollout(SHIP, **given, **options).states
+    part = {group: {name: values[:count] for name, values in columns.items()} for group, columns in given.items()}
+    np.testing.assert_array_equal(rollout(SHIP, **part, **options).states, whole[:, :, :count])
+
+
+def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]) -> None:
+    """Another variant, size or number of steps needs no compilation; another step or method does."""
+
+    def run(step: float, method: Any, count: int) -> None:
+        rollout(SHIP, **draw_inputs(SHIP, count), step=step, num_steps=4, method=method, engine="native")
+        native._library.cache_clear()  # as a new process would find it
+
+    run(1.0, "euler", 3)
+    (made,) = own_cache.iterdir()
+    before = made.stat().st_mtime_ns
+    run(1.0, "euler", 30)
+    assert [entry.stat().st_mtime_ns for entry in own_cache.iterdir()] == [before]
+    run(0.5, "euler", 3)
+    run(1.0, "rk4", 3)
+    assert len(list(own_cache.iterdir())) == 3
+
+
+def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
+    monkeypatch.setattr(native, "compiler", lambda: None)
+    with pytest.raises(ShipidError, match="install gcc, or use 'torch'"):
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
+
+
+def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
+    monkeypatch.setattr(native, "target", lambda: replace(target(), flags=("-mno-such-processor",)))
+    with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
+    assert "\n" not in str(caught.value)
+
+
+def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
+    with pytest.raises(ShipidError, match="runs on the CPU"):
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native", device="cuda")

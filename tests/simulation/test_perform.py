@@ -1,0 +1,161 @@
+"""The log of performed manoeuvres: columns, times, weather, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DocumentError, ShipidError
+from shipid.simulation.manoeuvre import (
+    DEGREE,
+    CrashStop,
+    Manoeuvre,
+    ReverseSpiral,
+    Spiral,
+    StationKeeping,
+    TurningCircle,
+    Zigzag,
+)
+from shipid.simulation.perform import perform
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import LAG
+
+SHIP = load_vessel("gunnerus-28.9")
+LAGGED = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
+CIRCLE = TurningCircle(n_rpm=120, duration=20)
+
+
+def test_log_is_a_dataset_without_what_the_actuators_reached() -> None:
+    frame = perform(LAGGED, [CIRCLE, Zigzag(n_rpm=120, duration=30)], step=0.1, interval=0.5)
+    reached = [name for name in frame if str(name).startswith("actual.")]
+    assert reached == ["actual.port.n", "actual.port.alpha", "actual.starboard.n", "actual.starboard.alpha"]
+    data = Dataset(frame.drop(columns=reached), {"clock": "run", "flags": []})
+    assert data.commands == ["port.n", "port.alpha", "starboard.n", "starboard.alpha"]
+    assert list(frame["run"].unique()) == ["M001", "M002"]
+    assert "V_w" in frame
+    assert not any(str(name).startswith("actual.") for name in perform(SHIP, [CIRCLE], step=0.1))
+
+
+def test_heave_is_logged_as_datasets_name_it() -> None:
+    six = perform(load_vessel("gunnerus-28.9-6dof"), [CIRCLE], step=0.05, interval=1.0)
+    assert {"z", "phi", "theta", "w", "p", "q"} <= set(six)
+    assert "down" not in six
+
+
+def test_each_run_is_as_long_as_its_manoeuvre() -> None:
+    chosen = [CIRCLE, CrashStop(n_rpm=120, astern_rpm=90, duration=7.3), Spiral(n_rpm=120, hold=4, angles_deg=(5, -5))]
+    frame = perform(SHIP, chosen, step=0.1, interval=0.5)
+    ends = frame.groupby("run")["t"].max()
+    assert ends.to_list() == pytest.approx([20.0, 7.0, 8.0])
+    for _, run in frame.groupby("run"):
+        np.testing.assert_allclose(np.diff(run["t"]), 0.5)
+
+
+def test_interval_only_thins_the_log() -> None:
+    zigzag = [Zigzag(n_rpm=145, duration=40)]
+    fine, coarse = perform(SHIP, zigzag, step=0.1), perform(SHIP, zigzag, step=0.1, interval=0.5)
+    thinned = fine.iloc[::5].reset_index(drop=True)
+    pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-10)
+
+
+def test_execute_waits_and_orders_are_those_in_force() -> None:
+    frame = perform(SHIP, [TurningCircle(n_rpm=120, duration=20, execute_at=5, angle_deg=10, side="port")], step=0.1)
+    before = frame["t"] < 4.95
+    assert (frame.loc[before, "port.alpha"] == 0).all()
+    np.testing.assert_allclose(frame.loc[~before, "port.alpha"], 10 * DEGREE)
+    at_rest = np.abs(frame["r"].to_numpy())
+    assert at_rest[50] < 1e-9 < at_rest[51]
+
+
+@pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
+def test_from_rest_and_from_a_steady_speed(vessel: Vessel) -> None:
+    """Steady: nothing changes until the execute. At rest: actuators too."""
+    chosen = [
+        TurningCircle(name=how, approach=how, n_rpm=145, execute_at=10, duration=20, course_deg=90)  # type: ignore[arg-type]
+        for how in ("steady", "rest")
+    ]
+    frame = perform(vessel, chosen, step=0.1)
+    steady, rest = (frame[frame["run"] == how].reset_index(drop=True) for how in ("steady", "rest"))
+    assert steady["u"].iloc[0] == pytest.approx(4.38, abs=0.02)
+    assert np.ptp(steady["u"].iloc[:100]) < 2e-3
+    assert rest["u"].iloc[0] == 0
+    assert rest["u"].iloc[100] > 0.3
+    for log in (steady, rest):
+        assert log.loc[0, ["north", "east"]].to_list() == pytest.approx([0, 0])
+        assert log["psi"].iloc[0] == pytest.approx(np.pi / 2)
+    if vessel is LAGGED:
+        assert steady["actual.port.n"].iloc[0] == pytest.approx(145 / 60)
+        assert rest["actual.port.n"].iloc[0] == 0
+
+
+def test_wind_is_one_for_all_or_one_for_each_and_none_before_the_start() -> None:
+    three = [CIRCLE.model_copy(update={"angle_deg": 1e-9})] * 3
+    still = perform(SHIP, three, step=0.1)
+    blown = perform(SHIP, three, step=0.1, environment={"V_w": np.array([0.0, 5.0, 10.0]), "beta_w": np.pi / 2})
+    starts = blown.groupby("run").first()
+    np.testing.assert_allclose(starts["u"], still.groupby("run").first()["u"])
+    assert (starts["V_w"] == [0, 5, 10]).all()
+    drift = blown.groupby("run")["v"].last().to_numpy()
+    assert abs(drift[0]) < 1e-6 < drift[1] < drift[2]
+
+
+def test_performing_twice_is_the_same() -> None:
+    chosen = [Zigzag(n_rpm=145, duration=20), StationKeeping(duration=20, east=1.0)]
+    pd.testing.assert_frame_equal(perform(SHIP, chosen, step=0.1), perform(SHIP, chosen, step=0.1))
+
+
+@pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
+def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
+    """CasADi sample by sample, PyTorch as a batch: the same numbers."""
+    short = {"n_rpm": 200, "approach": "rest"}
+    chosen = [
+        Zigzag(**short, angle_deg=35, execute_heading_deg=2, duration=15, side="port"),
+        Zigzag(**short, angle_deg=20, execute_heading_deg=1, duration=15),
+        ReverseSpiral(**short, rates_deg=(1, -2), hold=6),
+        StationKeeping(duration=12, north=1.0, heading_deg=10),
+    ]
+    each, batch = (perform(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
+    assert (each.groupby("run")["port.alpha"].nunique() > 1).all()
+    pd.testing.assert_frame_equal(each, batch, rtol=1e-9, atol=1e-9)
+
+
+def test_variants_keep_to_their_own_numbers() -> None:
+    """Vessels of one structure share the equations, not the outcome."""
+    heavy = SHIP.with_values({"inertia.m": 5e5})
+    logs = [perform(vessel, [Zigzag(n_rpm=145, duration=30)], step=0.1) for vessel in (SHIP, heavy, SHIP)]
+    pd.testing.assert_frame_equal(logs[0], logs[2])
+    assert np.abs(logs[0]["u"] - logs[1]["u"]).max() > 0.02
+
+
+@pytest.mark.parametrize(
+    ("manoeuvres", "how", "said"),
+    [
+        ([], {}, "there is no manoeuvre"),
+        ([CIRCLE], {"interval": 0.25}, "interval 0.25 s must be a multiple of step 0.1 s"),
+        ([CIRCLE], {"interval": 0.01}, "must be a multiple"),
+        ([CIRCLE.model_copy(update={"name": "a"})] * 2, {}, "two runs are named 'a'"),
+        ([CIRCLE], {"environment": {"V_c": 1.0}}, "feels no 'V_c'"),
+    ],
+)
+def test_what_cannot_be_performed_is_told(manoeuvres: list[Manoeuvre], how: dict[str, Any], said: str) -> None:
+    with pytest.raises(ShipidError, match=said):
+        perform(SHIP, manoeuvres, **{"step": 0.1, **how})
+
+
+def test_a_vessel_without_azimuths_keeps_no_station() -> None:
+    with pytest.raises(DocumentError, match="station keeping needs two azimuth units"):
+        perform(SHIP.with_values({"thruster.port.off": True}), [StationKeeping(duration=10)], step=0.1)
+
+
+def test_a_run_that_diverges_is_named() -> None:
+    wild = SHIP.with_values({"hull.derivatives.N_r|r|": 1e9, "hull.derivatives.N_rrr": 1e10})
+    chosen = [
+        CIRCLE.model_copy(update={"name": "straight", "angle_deg": 1e-9}),
+        CIRCLE.model_copy(update={"name": "wild"}),
+    ]
+    with pytest.raises(ShipidError, match="diverges in wild: take a smaller step"):
+        perform(wild, chosen, step=0.1)
