@@ -26,7 +26,7 @@ def bundled_folder(kind: str) -> Path:
 
 def bundled(kind: str) -> dict[str, Path]:
     """Name -> file of every bundled document of a kind, sorted by name."""
-    return {file.stem: file for file in sorted(bundled_folder(kind).glob("*.toml"))}
+    return {file.stem: file for file in sorted(bundled_folder(kind).glob("*.toml"), key=lambda file: file.stem)}
 
 
 def find(name: str, kind: str, relative_to: Path | None = None) -> Path:

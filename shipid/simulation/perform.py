@@ -30,7 +30,7 @@ def perform(
     interval: float | None = None,
     method: Method = "rk4",
     environment: Mapping[str, float | Array] | None = None,
-    engine: Engine = "casadi",
+    engine: Engine = "auto",
 ) -> pd.DataFrame:
     """Run manoeuvres and log them: all that one helmsman (or the clock) orders in one rollout.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, choices
 from shipid.simulation import gusts
 from shipid.simulation.gusts import Gusts
 from shipid.simulation.rollout import Trajectories, rollout
@@ -65,6 +65,24 @@ class Truth(BaseModel):
         return self
 
 
+def check_truth(truth: Truth, vessel: Vessel) -> None:
+    """Refuse what this vessel cannot do: waves, current or gusts that act on no term, sensors of no column."""
+    model = dynamics(vessel)
+    if truth.waves is not None and not model.drawn:
+        raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
+    if truth.current_speed != (0.0, 0.0) and "V_c" not in model.environment:
+        raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
+    if truth.gusts is not None and "V_w" not in model.environment:
+        raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
+    if truth.gusts is not None and truth.wind_speed[0] < 0:
+        raise DocumentError(f"{truth.wind_speed[0]:g} m/s: gusts need a mean of 0 or more", path="truth.wind_speed")
+    columns = [_column(name) for name in model.state]
+    columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment)]
+    unknown = next((name for name in truth.sensors if name not in columns), None)
+    if unknown is not None:
+        raise DocumentError(f"no column that is measured: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
+
+
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Run all manoeuvres in one batch and log them: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
@@ -72,11 +90,8 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     What is logged is that of the origin, the centre of gravity projected on the calm waterline: u and v horizontal,
     along and across the heading, and r = d(psi)/dt. Raises DocumentError if a manoeuvre diverges.
     """
+    check_truth(truth, vessel)
     model = dynamics(vessel)
-    if truth.waves is not None and not model.drawn:
-        raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
-    if truth.current_speed != (0.0, 0.0) and "V_c" not in model.environment:
-        raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
     start, commands, environment, chi = _draw(truth, model.commands, model.environment)
     rows = int(truth.duration / truth.interval + 1e-9)
     steps_a_row = round(truth.interval / truth.step)
@@ -130,11 +145,16 @@ def _logged(path: Trajectories, beside: dict[str, np.ndarray]) -> pd.DataFrame:
     time = np.arange(count) * path.interval
     columns: dict[str, np.ndarray] = {}
     for name in path.names:
-        columns["z" if name == "down" else name] = path[name][:, 0].T.ravel()
+        columns[_column(name)] = path[name][:, 0].T.ravel()
     columns |= _horizontal(columns)
     for name, values in beside.items():
         columns[name] = np.broadcast_to(values, (count, num_samples)).T.ravel()
     return pd.DataFrame({"run": np.repeat(names, count), "t": np.tile(time, num_samples), **columns})
+
+
+def _column(state: str) -> str:
+    """Name of a state in a log."""
+    return "z" if state == "down" else state
 
 
 def _horizontal(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

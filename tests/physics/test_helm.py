@@ -1,0 +1,121 @@
+"""Helmsmen's laws on their own: what they order and remember, number by number."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.physics.helm import Helmsman, Unit, station_keeping, steers, yaw_rate, zigzag
+
+COMMANDS = ("port.n", "port.alpha", "rudder.delta")
+
+
+def numbers(values: Any) -> dict[str, float]:
+    return {name: float(ca.DM(value)) for name, value in values.items()}
+
+
+def test_angles_steer_and_shafts_do_not() -> None:
+    assert [steers(name) for name in COMMANDS] == [False, True, True]
+
+
+@pytest.mark.parametrize("make", [zigzag, yaw_rate])
+def test_one_helmsman_per_set_of_commands(make: Any) -> None:
+    """One object, one compilation; he is told every command."""
+    assert make(COMMANDS) is make(COMMANDS)
+    assert make(COMMANDS) != make(COMMANDS[:2])
+    assert dict(list(make(COMMANDS).inputs.items())[:3]) == dict(zip(COMMANDS, ("rev/s", "rad", "rad"), strict=True))
+
+
+@pytest.mark.parametrize("first", [1, -1])
+@pytest.mark.parametrize(
+    ("turned", "side", "after"), [(0.1, 1, 1), (0.2, 1, -1), (0.3, 1, -1), (0.1, -1, -1), (-0.2, -1, 1)]
+)
+def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side: int, after: int) -> None:
+    """With execute heading 0.2 rad either side of a course of 1 rad; the mirror image does the mirror image."""
+    told = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "course": 1.0}
+    told["execute_heading"] = 0.2 * first
+    seen, memory = {"psi": 1.0 + turned * first * 1.0000001}, {"side": ca.DM(side)}
+    helmsman = zigzag(COMMANDS)
+    ordered = numbers(helmsman.orders(seen, told, memory))
+    assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
+    assert helmsman.advance is not None
+    assert numbers(helmsman.advance(seen, told, memory, 0.1)) == {"side": after}
+
+
+def test_yaw_rate_law() -> None:
+    told = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "rate": 0.03, "gain": 10.0, "reset": 4.0}
+    helmsman = yaw_rate(COMMANDS)
+    assert helmsman.advance is not None
+    ordered = numbers(helmsman.orders({"r": 0.01}, told, {"integral": 0.1}))
+    assert ordered == pytest.approx({"port.n": 2.0, "port.alpha": -0.5 * 0.3, "rudder.delta": 0.6 * 0.3})
+    after = numbers(helmsman.advance({"r": 0.01}, told, {"integral": 0.1}, 0.2))
+    assert after["integral"] == pytest.approx(0.1 + 10 / 4 * 0.02 * 0.2)
+    hard_over = numbers(helmsman.orders({"r": 1.0}, told, {"integral": 0.9}))
+    assert hard_over["port.alpha"] == 0.5
+    assert numbers(helmsman.advance({"r": 9.0}, told, {"integral": 0.9}, 9.0)) == {"integral": -1.0}
+
+
+UNITS = (
+    Unit("port", (50.0, 0.0, -40.0), (0.0, 50.0, 3.0), (0.0, 1.0)),
+    Unit("starboard", (50.0, 0.0, 40.0), (0.0, 50.0, 3.0), (0.0, -1.0)),
+)
+TOLD = {"north": 3.0, "east": 4.0, "heading": 0.5, "omega": 0.1, "n_bias": 1.0, "n_max": 3.0}
+
+
+def holding() -> Helmsman:
+    return station_keeping(UNITS, ("bow.n",))
+
+
+def thrusts(seen: dict[str, float], **told: float) -> np.ndarray:
+    """n^2 (cos, sin) of each unit, (units, 2)."""
+    found = numbers(holding().orders(seen, {**TOLD, **told}, dict.fromkeys(("north", "east", "heading"), 0.0)))
+    assert found.pop("bow.n") == 0.0
+    polar = [(found[f"{unit.name}.n"] ** 2, found[f"{unit.name}.alpha"]) for unit in UNITS]
+    return np.array([[square * np.cos(angle), square * np.sin(angle)] for square, angle in polar])
+
+
+def at(**changes: float) -> dict[str, float]:
+    return {"north": 3.0, "east": 4.0, "psi": 0.5, "u": 0.0, "v": 0.0, "r": 0.0} | changes
+
+
+def test_on_station_only_the_bias_remains() -> None:
+    np.testing.assert_allclose(thrusts(at()), [[0, 1], [0, -1]], atol=1e-6)
+
+
+def test_an_error_is_turned_into_body_axes_and_shared() -> None:
+    """2 m to the north of the ship, seen from heading 0.5 rad: ahead and to port."""
+    acceleration = 0.1**2 * 2 * np.array([np.cos(0.5), -np.sin(0.5)])
+    shared = 50 * acceleration + np.array([[0, 1], [0, -1]])
+    np.testing.assert_allclose(thrusts(at(north=1.0)), shared, atol=1e-6)
+
+
+def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
+    np.testing.assert_allclose(thrusts(at(u=0.2))[:, 0], [-50 * 2 * 0.1 * 0.2] * 2, atol=1e-6)
+    short = thrusts(at(psi=3.0), heading=-3.0)  # 0.28 rad to starboard: the port unit pushes less than its bias astern
+    np.testing.assert_allclose(short[0, 0], -40 * 0.1**2 * (2 * np.pi - 6.0), atol=1e-6)
+
+
+def test_a_unit_keeps_to_its_greatest_speed() -> None:
+    far = numbers(holding().orders(at(north=-1e4), TOLD, dict.fromkeys(("north", "east", "heading"), 0.0)))
+    assert far["port.n"] == far["starboard.n"] == 3.0
+
+
+def test_the_angle_is_continuous_through_zero_thrust_on_the_bias_side() -> None:
+    """From one side of the bias to the other; the jump lies opposite the bias."""
+    angles = [
+        numbers(holding().orders(at(u=u), TOLD, dict.fromkeys(("north", "east", "heading"), 0.0)))["port.alpha"]
+        for u in np.linspace(-1, 1, 201)
+    ]
+    assert np.abs(np.diff(angles)).max() < 0.2
+    assert min(angles) < 0.2
+    assert max(angles) > np.pi - 0.2
+
+
+def test_memory_integrates_the_error() -> None:
+    helmsman = holding()
+    assert helmsman.advance is not None
+    after = numbers(helmsman.advance(at(north=1.0), TOLD, {"north": 0.5, "east": 0.0, "heading": 0.0}, 0.1))
+    assert after == pytest.approx({"north": 0.7, "east": 0.0, "heading": 0.0})

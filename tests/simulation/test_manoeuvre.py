@@ -1,0 +1,281 @@
+"""Manoeuvres do what the field means by them, on a ship whose turns are known."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from shipid.errors import DocumentError
+from shipid.simulation.manoeuvre import (
+    DEGREE,
+    AnyManoeuvre,
+    CrashStop,
+    Excitation,
+    Manoeuvre,
+    PullOut,
+    ReverseSpiral,
+    Spiral,
+    StationKeeping,
+    Turning,
+    TurningCircle,
+    Zigzag,
+)
+from shipid.simulation.perform import perform
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import LAG
+
+SHIP = load_vessel("gunnerus-28.9")
+LAGGED = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
+PAIRS = [(10, 10), (20, 20), (20, 10), (10, 20)]
+MIRRORED = {"east": -1, "psi": -1, "v": -1, "r": -1, "port.alpha": -1, "starboard.alpha": -1}
+
+
+def runs(frame: pd.DataFrame) -> list[pd.DataFrame]:
+    return [run.reset_index(drop=True) for _, run in frame.groupby("run", sort=False)]
+
+
+def one(vessel: Vessel, manoeuvre: Manoeuvre, **how: Any) -> pd.DataFrame:
+    return perform(vessel, [manoeuvre], **{"step": 0.1, **how})
+
+
+def held(log: pd.DataFrame, hold: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Helm [deg, > 0 to starboard: the azimuths turn the other way] and yaw rate [deg/s] at the end of each level."""
+    last = np.isclose(log["t"] % hold, hold - step)
+    return -log["port.alpha"].to_numpy()[last] / DEGREE, log["r"].to_numpy()[last] / DEGREE
+
+
+@cache
+def zigzags() -> pd.DataFrame:
+    """Every pair to either side, at two speeds."""
+    chosen = [
+        Zigzag(n_rpm=n, angle_deg=angle, execute_heading_deg=heading, side=side, duration=90, course_deg=30)
+        for n in (110, 160)
+        for angle, heading in PAIRS
+        for side in ("starboard", "port")
+    ]
+    return perform(SHIP, chosen, step=0.1)
+
+
+def test_zigzag_reverses_at_the_execute_heading_within_one_step() -> None:
+    """At each reversal the ship has just come to the execute heading: not before, at most one step's turning ago."""
+    logs = runs(zigzags())
+    assert len(logs) == 16
+    for log, (_, heading) in zip(logs, [pair for pair in PAIRS * 2 for _ in range(2)], strict=True):
+        turned, order = log["psi"].to_numpy() / DEGREE - 30, log["port.alpha"].to_numpy()
+        reversals = np.flatnonzero(np.diff(order)) + 1
+        assert len(reversals) >= 2
+        sides = np.sign(order[reversals - 1])
+        np.testing.assert_array_equal(np.sign(order[reversals]), -sides)
+        beyond = -sides * turned[reversals] - heading
+        one_step = 0.1 * np.abs(log["r"]).max() / DEGREE
+        assert (beyond >= -1e-9).all()
+        assert (beyond <= one_step).all()
+
+
+def test_zigzag_takes_the_ordered_helm_and_side_first() -> None:
+    for number, log in enumerate(runs(zigzags())):
+        angle, to_starboard = PAIRS[number // 2 % 4][0], number % 2 == 0
+        np.testing.assert_allclose(np.abs(log["port.alpha"]), angle * DEGREE)
+        assert (log["r"].iloc[20] > 0) == to_starboard
+        np.testing.assert_array_equal(log["port.alpha"], log["starboard.alpha"])
+
+
+def test_zigzag_to_the_other_side_is_the_mirror_image() -> None:
+    logs = runs(zigzags())
+    for starboard, port in zip(logs[::2], logs[1::2], strict=True):
+        turn = starboard.assign(psi=starboard["psi"] - 30 * DEGREE), port.assign(psi=port["psi"] - 30 * DEGREE)
+        for name in ("u", "v", "r", "psi", "port.alpha", "port.n"):
+            np.testing.assert_allclose(turn[1][name], MIRRORED.get(name, 1) * turn[0][name], atol=1e-9)
+
+
+def test_overshoot_converges_with_the_step() -> None:
+    """A reversal comes at most a step late, so the overshoot is known to a step's turning."""
+    finest = 0.0125
+
+    def overshoot(step: float) -> tuple[float, float]:
+        log = one(SHIP, Zigzag(n_rpm=145, duration=30), step=step)
+        return np.abs(log["psi"].max()) / DEGREE - 20, np.abs(log["r"]).max() / DEGREE
+
+    limit, fastest = overshoot(finest)
+    assert limit > 0.9
+    for step in (0.4, 0.1, 0.025):
+        assert abs(overshoot(step)[0] - limit) < (step + finest) * fastest
+    assert abs(overshoot(0.025)[0] - limit) < 0.05
+
+
+def test_together_is_one_at_a_time() -> None:
+    """Kinds, speeds, sides and starts mixed: each run is what it is alone, in the order given."""
+    mixed = [
+        Zigzag(name="zigzag 20/20", n_rpm=145, duration=40),
+        TurningCircle(name="circle", n_rpm=120, duration=30, side="port"),
+        Zigzag(name="zigzag 10/10", n_rpm=110, angle_deg=10, execute_heading_deg=10, duration=60, approach="rest"),
+        ReverseSpiral(name="reverse", n_rpm=145, rates_deg=(1, -1), hold=20),
+        StationKeeping(name="station", duration=20, north=2.0),
+        CrashStop(name="stop", n_rpm=120, astern_rpm=100, duration=20, execute_at=5),
+    ]
+    wind = {"V_w": np.arange(6.0), "beta_w": np.full(6, 0.4)}
+    together = perform(LAGGED, mixed, step=0.1, environment=wind)
+    assert list(together["run"].unique()) == [own.name for own in mixed]
+    for number, own in enumerate(mixed):
+        alone = one(LAGGED, own, environment={name: float(values[number]) for name, values in wind.items()})
+        log = together[together["run"] == own.name].reset_index(drop=True)
+        pd.testing.assert_frame_equal(log, alone, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("n_rpm", "u", "v", "r"), [(145, 2.76, 0.60, 3.54), (200, 3.81, 0.72, 4.95)])
+def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: float, r: float) -> None:
+    """Steady turns at 35 deg of the 2015 derivatives, integrated on their own in NumPy [m/s, m/s, deg/s]."""
+    to_either = [TurningCircle(n_rpm=n_rpm, duration=200, side=side) for side in ("starboard", "port")]
+    for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
+        end = log.iloc[-1]
+        assert end["u"] == pytest.approx(u, abs=0.01)
+        assert end["v"] == pytest.approx(-sense * v, abs=0.01)
+        assert end["r"] / DEGREE == pytest.approx(sense * r, abs=0.02)
+
+
+def test_turning_takes_commands_as_the_vessel_does() -> None:
+    log = one(SHIP, Turning(n_rpm=120, approach="rest", orders={"port.alpha": 0.3, "starboard.n": 1.5}, duration=20))
+    assert (log["port.alpha"] == 0.3).all()
+    assert (log["starboard.alpha"] == 0).all()
+    assert (log["starboard.n"] == 1.5).all()
+    assert (log["port.n"] == 2.0).all()
+    assert log["u"].iloc[0] == 0.0
+    with pytest.raises(DocumentError, match=r"'port.delta' is no command: did you mean 'port"):
+        one(SHIP, Turning(n_rpm=120, orders={"port.delta": 0.3}, duration=20))
+
+
+def test_pull_out_of_a_stable_ship_ends_straight() -> None:
+    to_either = [PullOut(n_rpm=145, turn=60, duration=160, side=side) for side in ("starboard", "port")]
+    for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
+        rate, order = sense * log["r"].to_numpy() / DEGREE, log["port.alpha"].to_numpy()
+        assert (order[:600] == -sense * 20 * DEGREE).all()
+        assert (order[600:] == 0).all()
+        assert rate[600] > 2
+        assert abs(rate[-1]) < 1e-2
+
+
+def test_direct_and_reverse_spiral_find_one_curve() -> None:
+    """A stable ship: the helm by which the reverse spiral holds a rate gives that rate, whichever way one comes."""
+    rates = (2.5, 1.5, 0.7, 0.2, 0, -0.2, -0.7, -1.5, -2.5)
+    helm, r = held(one(SHIP, ReverseSpiral(n_rpm=145, hold=100, rates_deg=rates), step=0.2), 100, 0.2)
+    np.testing.assert_allclose(r, rates, atol=5e-3)
+    assert (np.diff(helm) < -1).all()
+    there_and_back = (*helm, *helm[-2::-1])
+    helm_again, direct = held(one(SHIP, Spiral(n_rpm=145, hold=100, angles_deg=there_and_back), step=0.2), 100, 0.2)
+    np.testing.assert_allclose(helm_again, there_and_back)
+    np.testing.assert_allclose(direct, (*r, *r[-2::-1]), atol=5e-3)
+
+
+def test_reverse_spiral_finds_the_loop_of_an_unstable_ship() -> None:
+    """The direct spiral jumps across the loop; the helm that holds a slow turn is over to the other side."""
+    changes = {"N_uv": 0.0, "N_ur": 3e6, "N_uur": 0.0}  # yaw damping turned round
+    unstable = SHIP.with_values({f"hull.derivatives.{name}": value for name, value in changes.items()})
+    direct = Spiral(n_rpm=145, hold=100, angles_deg=(10, 0, -10, 0, 10))
+    reverse = ReverseSpiral(n_rpm=145, hold=100, rates_deg=(3, 1, 0.5, -0.5, -1, -3))
+    logs = runs(perform(unstable, [direct, reverse], step=0.2))
+    _, jumped = held(logs[0], 100, 0.2)
+    assert jumped[1] > 5
+    assert jumped[3] < -5
+    helm, r = held(logs[1], 100, 0.2)
+    np.testing.assert_allclose(r, reverse.rates_deg, atol=5e-3)
+    assert (helm * r < 0).all()
+
+
+@pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
+def test_crash_stop_reverses_the_thrust_and_stops(vessel: Vessel) -> None:
+    log = one(vessel, CrashStop(n_rpm=145, astern_rpm=120, execute_at=3, duration=63))
+    t, u = log["t"].to_numpy(), log["u"].to_numpy()
+    np.testing.assert_allclose(log["port.n"][t < 2.95], 145 / 60)
+    np.testing.assert_allclose(log["port.n"][t > 2.95], -120 / 60)
+    np.testing.assert_allclose(u[t < 2.95], u[0], atol=2e-3)  # still the approach
+    stopped = np.flatnonzero(u <= 0)[0]
+    assert 5 < t[stopped] - 3 < 60
+    assert (np.diff(u[(t > 3.5) & (t < t[stopped])]) < 0).all()
+    assert np.abs(log["r"]).max() < 1e-12
+
+
+def test_actuators_limit_what_is_ordered() -> None:
+    """The order jumps, what is reached does not change faster than the actuator can."""
+    log = one(LAGGED, Zigzag(n_rpm=145, duration=60), step=0.05)
+    order, actual = log["port.alpha"].to_numpy(), log["actual.port.alpha"].to_numpy()
+    assert np.abs(np.diff(order)).max() == pytest.approx(40 * DEGREE)
+    fastest = np.abs(np.diff(actual)).max() / 0.05
+    assert fastest == pytest.approx(LAG["alpha"]["rate"], rel=1e-6)
+    assert np.abs(order - actual).max() > 20 * DEGREE
+    assert actual[0] == 0  # the approach was straight
+    stop = one(LAGGED, CrashStop(n_rpm=145, astern_rpm=120, duration=60), step=0.05)
+    assert np.abs(np.diff(stop["actual.port.n"])).max() / 0.05 == pytest.approx(LAG["n"]["rate"], rel=1e-6)
+
+
+@pytest.mark.parametrize("signal", ["multisine", "aprbs"])
+def test_excitation_moves_within_its_limits(signal: Any) -> None:
+    asked = {"angle_deg": 15, "amplitude_rpm": 30, "angle_rate_deg": 4, "shaft_rate_rpm": 8, "execute_at": 10}
+    excitation = Excitation(signal=signal, n_rpm=130, duration=310, seed=4, **asked)
+    log = one(SHIP, excitation)
+    helm, shaft = log["port.alpha"].to_numpy() / DEGREE, log["port.n"].to_numpy() * 60 - 130
+    for series, most, rate in ((helm, 15, 4), (shaft, 30, 8)):
+        assert (np.abs(series[:100]) < 1e-9).all()
+        assert 0.7 * most < np.abs(series).max() <= most * 1.0000001
+        assert np.abs(np.diff(series)).max() <= rate * 0.1 * 1.0000001
+        assert series.std() > 0.25 * most
+    assert abs(np.corrcoef(helm, shaft)[0, 1]) < 0.3
+    pd.testing.assert_frame_equal(log, one(SHIP, excitation))
+    other = one(SHIP, excitation.model_copy(update={"seed": 5}))
+    assert np.abs(other["port.alpha"] - log["port.alpha"]).max() > 1 * DEGREE
+
+
+def test_excitation_of_one_command_leaves_the_other() -> None:
+    log = one(SHIP, Excitation(signal="multisine", n_rpm=130, angle_deg=10, duration=50))
+    assert (log["port.n"] == 130 / 60).all()
+
+
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "gunnerus-33.9", "gunnerus-28.9-6dof"])
+def test_station_keeping_holds_in_wind(name: str) -> None:
+    """5 m/s from all sides: never a metre or 3 deg off, in the end centimetres."""
+    courses = (0, 45, 90, 150, 180, 270)
+    chosen = [StationKeeping(duration=400, course_deg=course) for course in courses]
+    frame = perform(load_vessel(name), chosen, step=0.1, interval=1.0, environment={"V_w": 5.0, "beta_w": 0.3})
+    for log, course in zip(runs(frame), courses, strict=True):
+        off = np.hypot(log["north"], log["east"])
+        turned = np.abs(log["psi"] - course * DEGREE) / DEGREE
+        assert off.max() < 1
+        assert turned.max() < 3
+        assert off.iloc[-1] < 0.05
+        assert turned.iloc[-1] < 0.1
+        assert log[["port.n", "starboard.n"]].max().max() * 60 <= 200
+
+
+def test_station_keeping_goes_where_it_is_told() -> None:
+    log = one(SHIP, StationKeeping(duration=400, north=5, east=-3, heading_deg=-170, course_deg=170), step=0.2)
+    end = log.iloc[-1]
+    assert end["north"] == pytest.approx(5, abs=0.05)
+    assert end["east"] == pytest.approx(-3, abs=0.05)
+    assert end["psi"] / DEGREE == pytest.approx(190, abs=0.1)  # 20 deg to starboard, not 340 to port
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        {"kind": "zigzag", "n_rpm": 145, "duration": 60, "angle": 20},
+        {"kind": "zigzag", "n_rpm": 145},
+        {"kind": "turning_circle", "n_rpm": 145, "duration": 60, "angle_deg": -35},
+        {"kind": "spiral", "n_rpm": 145, "hold": 60, "angles_deg": []},
+        {"kind": "excitation", "n_rpm": 145, "duration": 60, "signal": "noise"},
+        {"kind": "circle", "n_rpm": 145, "duration": 60},
+    ],
+)
+def test_impossible_blocks_are_refused(block: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        TypeAdapter(AnyManoeuvre).validate_python(block)
+
+
+def test_a_block_is_a_manoeuvre() -> None:
+    block = {"kind": "zigzag", "n_rpm": 145, "angle_deg": 20, "execute_heading_deg": 10, "side": "port", "duration": 60}
+    assert TypeAdapter(AnyManoeuvre).validate_python(block) == Zigzag(
+        n_rpm=145, angle_deg=20, execute_heading_deg=10, side="port", duration=60
+    )
