@@ -18,7 +18,7 @@ SMALL = 1e-9  # (rev/s)^4: below it a thrust has no direction
 Named = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # one helmsman, one compilation
 class Helmsman:
     """A law that turns what it is told (per sample) and what it sees (the ship's state) into orders.
 
@@ -34,14 +34,6 @@ class Helmsman:
     memory: Mapping[str, float] = field(default_factory=dict)
     orders: Callable[[Named, Named, Named], Named] = field(kw_only=True)
     advance: Callable[[Named, Named, Named, Any], Named] | None = field(default=None, kw_only=True)
-
-    def __hash__(self) -> int:
-        """One helmsman, one compilation."""
-        return id(self)
-
-    def __eq__(self, other: object) -> bool:
-        """Same object."""
-        return self is other
 
 
 def steers(command: str) -> bool:

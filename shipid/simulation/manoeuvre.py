@@ -24,37 +24,8 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 RPM = 1 / 60
 DEGREE = np.pi / 180
-SPIRAL = (
-    25,
-    20,
-    15,
-    10,
-    5,
-    3,
-    1,
-    0,
-    -1,
-    -3,
-    -5,
-    -10,
-    -15,
-    -20,
-    -25,
-    -20,
-    -15,
-    -10,
-    -5,
-    -3,
-    -1,
-    0,
-    1,
-    3,
-    5,
-    10,
-    15,
-    20,
-    25,
-)
+HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
+SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 

@@ -105,7 +105,7 @@ def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
 def _with_tables(document: Document, file: Path) -> Document:
     """Named tables as columns: what a document says does not change with a file that it names."""
     found = {}
-    for path, key, block in term_blocks(document):
+    for path, key, block in (*term_blocks(document), *term_blocks(document, off=True)):
         if key in TERMS and isinstance(block.get(TABLE), str):
             found[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
     return documents.replace(document, found) if found else dict(document)
@@ -175,13 +175,15 @@ def check_vessel(document: Document, file: str) -> Vessel:
     documents.parse(vessel_model(), document, file)
     vessel = Vessel(document, file, documents.digest(document))
     paths: dict[str, str] = {}
-    for path, _, block in term_blocks(document):
+    for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]
         if name in paths:
             message = f"{paths[name]} has the same last name, by which commands go: choose another"
             raise DocumentError(message, file=file, path=path)
         paths[name] = path
         _check_lists(path, block, file)
+        if TABLE in block:
+            _check_wave_table(f"{path}.{TABLE}", block[TABLE], TABLES[key], file)
     _check_units(vessel)
     _check_inertia(vessel)
     _check_sense(vessel)
@@ -222,14 +224,34 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
 
 
 def _check_lists(path: str, block: Mapping[str, Any], file: str) -> None:
+    _check_lengths(path, block, file)
+    for key, value in block.items():
+        if isinstance(value, list) and key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
+            raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
+
+
+def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
     lists = {key: value for key, value in block.items() if isinstance(value, list)}
-    lengths = {len(value) for value in lists.values()}
-    if len(lengths) > 1:
+    if len({len(value) for value in lists.values()}) > 1:
         found = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
         raise DocumentError(f"the columns of a table must be equally long, found {found}", file=file, path=path)
-    for key, value in lists.items():
-        if key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
-            raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
+
+
+def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tuple[str, ...], file: str) -> None:
+    """Refuse a table that is no grid of frequencies and equally spaced headings over the half circle."""
+    missing = next((name for name in columns if name not in table), None)
+    if missing is not None:
+        raise DocumentError(f"has no column {missing!r}: {choices(missing, table)}", file=file, path=path)
+    _check_lengths(path, table, file)
+    omega, beta = (np.unique(table[name]) for name in ("omega", "beta_deg"))
+    pairs = set(zip(table["omega"], table["beta_deg"], strict=True))
+    whole = len(pairs) == len(table["omega"]) == len(omega) * len(beta)
+    even = len(beta) > 1 and np.allclose(beta, np.linspace(0, 180, len(beta)), atol=1e-6)
+    if not whole or not even or len(omega) < 4:
+        message = (
+            "is no grid: give four frequencies or more, each at the same equally spaced headings from 0 to 180 deg"
+        )
+        raise DocumentError(message, file=file, path=path)
 
 
 def _check_units(vessel: Vessel) -> None:
