@@ -14,7 +14,7 @@ from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
 GRAVITY = 9.81  # m/s^2: dispersion in deep water, k = omega^2 / g
-LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.5 % of the energy of a JONSWAP spectrum lies between
+LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
 SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # even or odd in the relative heading
 
 

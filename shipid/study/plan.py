@@ -17,7 +17,7 @@ from shipid.data.mapping import read_mapping
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.estimation.tuning import Recipe
-from shipid.simulation.truth import Truth
+from shipid.simulation.truth import Truth, check_truth
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -284,6 +284,10 @@ def build_plan(
     if study.truth is not None:
         _check_amounts(study, study.truth, file)
         truth = _truth_vessel(study.truth, file, known)
+        try:
+            check_truth(study.truth, truth)
+        except DocumentError as error:
+            raise DocumentError(error.message, file=file, path=error.path) from None
     found = _sources(study.data, file) if sources is None and study.data is not None else sources
     return Plan(
         file.stem, str(file), document, study, models, recipe, batches, truth, known, found or {}, changes or {}

@@ -58,6 +58,27 @@ BROKEN = {
     "patch-with-unknown-key": ("sets", "did you mean 'set'?"),
     "patch-with-nested-values": ("set.inertia", "valid number"),
     "patch-that-breaks-the-base": ("inertia.m", "greater than 0"),
+    "extends-missing-file": ("extends", "'./gone.toml': no such file"),
+    "extends-unknown-name": ("extends", "did you mean 'gunnerus-28.9'?"),
+    "extends-itself": ("extends", "name a vessel that does not"),
+    "extends-a-patch": ("extends", "extend a vessel"),
+    "extends-and-base": ("extends", "valid: base, base_digest"),
+    "waves-without-table": ("waves.first_order.table", "missing"),
+    "waves-table-missing": ("waves.first_order.table", "gone.csv: no such file, looked for beside the vessel"),
+    "waves-table-empty": ("waves.first_order.table", "words.csv: not a CSV table with a header"),
+    "waves-table-without-a-column": ("waves.first_order.table", "has no column 'K_imag'"),
+    "waves-with-columns-missing": ("waves.drift.table", "has no column 'X_drift'"),
+    "waves-table-with-a-word": ("waves.first_order.table", "row 5 has no number in 'Z_real'"),
+    "waves-table-with-a-gap": ("waves.first_order.table", "is no grid"),
+    "waves-table-of-uneven-headings": ("waves.first_order.table", "equally spaced headings from 0 to 180 deg"),
+    "waves-table-of-three-frequencies": ("waves.first_order.table", "four frequencies or more"),
+    "waves-of-no-harmonics": ("waves.first_order.harmonics", "greater than or equal to 1"),
+    "radiation-of-unequal-modes": ("radiation.roll", "sigma 2, omega 2, K44_cos 3, K44_sin 2"),
+    "radiation-that-grows": ("radiation.roll.sigma.1", "-0.6: Input should be greater than 0"),
+    "radiation-without-damping": ("radiation.heave_pitch.sigma.1", "0.0: Input should be greater than 0"),
+    "unknown-radiation": ("radiation.sway", "valid: heave_pitch, roll"),
+    "restoring-without-waterplane": ("restoring.hydrostatic.A_wp", "missing"),
+    "restoring-without-gravity": ("constants.g", "a term needs g"),
 }
 
 
@@ -106,3 +127,11 @@ def test_fault_in_the_base_names_the_base(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="missing") as caught:
         load_vessel(str(patch))
     assert caught.value.file == str(broken)
+
+
+def test_table_that_is_switched_off_is_read_all_the_same(tmp_path: Path) -> None:
+    text = (FOLDER / "waves-table-missing.toml").read_text().replace("./plain.toml", (FOLDER / "plain.toml").as_posix())
+    document = tmp_path / "calm.toml"
+    document.write_text(text.replace("tables/gone.csv", (FOLDER / "tables" / "whole.csv").as_posix()) + "off = true\n")
+    calm = load_vessel(str(document))
+    assert calm.document["waves"]["first_order"]["table"]["omega"][-1] == 2.0
