@@ -48,6 +48,11 @@ def kinematics(eta: SX, nu: SX) -> SX:
     return ca.vertcat(rotation(phi, theta, psi) @ nu[:3], angles)
 
 
+def heave_rate(eta: SX, nu: SX) -> SX:
+    """Downward velocity [m/s] of the origin in the inertial frame: zero in any steady motion, whatever the trim."""
+    return rotation(eta[3], eta[4], eta[5])[2, :] @ nu[:3]
+
+
 def current(eta: SX, nu: SX, V_c: SX, beta_c: SX) -> tuple[SX, SX]:
     """A steady uniform current in body axes, nu_c (6), and its rate d(nu_c)/dt = -omega x nu_c.
 

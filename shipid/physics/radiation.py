@@ -14,13 +14,8 @@ from typing import Annotated, Any
 import casadi as ca
 from casadi import SX
 
-from shipid.physics.frames import rotation, vector
+from shipid.physics.frames import heave_rate, vector
 from shipid.physics.grammar import POSITIVE
-
-
-def heave_rate(eta: SX, nu: SX) -> SX:
-    """Downward velocity [m/s] of the origin in the inertial frame: zero in any steady motion, whatever the trim."""
-    return rotation(eta[3], eta[4], eta[5])[2, :] @ nu[:3]
 
 
 def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]) -> list[SX]:

@@ -13,7 +13,7 @@ from casadi import SX
 
 from shipid.errors import DocumentError, choices
 from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
-from shipid.physics.frames import current, kinematics
+from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.vessel.bindings import Binding, bindings
@@ -25,7 +25,7 @@ ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
 ETA_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
-PLANE = (0, 1, 5)
+PLANE, HEAVE = (0, 1, 5), 2
 HELM = "helm"  # prefix of what a helmsman remembers
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
@@ -144,7 +144,9 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
-    force = M_A @ (nu_c_dot + _inertial_heave(nu)) - coriolis(M_RB, nu) - coriolis(_in_plane(M_A), nu - nu_c)
+    force = M_A @ (nu_c_dot + _inertial_heave(nu)) - coriolis(M_RB, nu) - _coriolis_in_plane(M_A, nu - nu_c)
+    if HEAVE in axes:
+        force += _upright(eta, nu, M_RB[0, 0])
     summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
@@ -197,13 +199,21 @@ def _inertial_heave(nu: SX) -> SX:
     return result
 
 
-def _in_plane(M_A: SX) -> SX:
-    """Surge, sway and yaw part of the added mass: only these carry Coriolis terms (manoeuvring in calm water)."""
-    result = SX(6, 6)
-    for i in PLANE:
-        for j in PLANE:
-            result[i, j] = M_A[i, j]
-    return result
+def _coriolis_in_plane(M_A: SX, nu_r: SX) -> SX:
+    """Coriolis terms of added mass in surge, sway and yaw alone: those of manoeuvring in calm water, and no others."""
+    plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
+    return coriolis(plane @ M_A @ plane, plane @ nu_r)
+
+
+def _upright(eta: SX, nu: SX, m: SX) -> SX:
+    """Keep what moves a ship up and down from pushing her along: it acts upright, not along her tilted axis.
+
+    The momentum of heave m h turns with the body axes, -m q h in surge and m p h in sway; buoyancy and wave pressure,
+    which drive it, do not. Both cancel to first order. Without this, heave forces on a pitching and rolling ship have a
+    mean along her axes, which the table of mean drift holds already.
+    """
+    h = heave_rate(eta, nu)
+    return vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)
 
 
 def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:

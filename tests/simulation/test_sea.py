@@ -1,0 +1,222 @@
+"""The sea: its spectrum, its draws, its directions, and the loads that a table gives in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from shipid.simulation.sea import (
+    GRAVITY,
+    Sea,
+    draw_components,
+    fourier,
+    interpolate,
+    jonswap,
+    spread_angles,
+    wave_loads,
+)
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.simulation.linear import MIRROR, all_round, heading_weights, lagrange, linear
+
+SHIP = load_vessel("gunnerus-28.9-6dof")
+HULLS = {"gunnerus-28.9-6dof": "gunnerus_289.npz", "gunnerus-33.9-6dof": "gunnerus_339.npz"}
+SEA = Sea(H_s=1.0, T_p=5.0)
+
+
+def draw(sea: Sea = SEA, direction: float = 0.7, count: int = 3) -> dict[str, np.ndarray]:
+    return draw_components(sea, np.full(count, direction), list(range(count)))
+
+
+@pytest.mark.parametrize(("H_s", "T_p", "gamma"), [(1.0, 5.0, 3.3), (0.5, 4.0, 1.0), (3.0, 9.0, 7.0)])
+def test_spectrum_has_its_height_and_its_peak(H_s: float, T_p: float, gamma: float) -> None:
+    sea, peak = Sea(H_s=H_s, T_p=T_p, gamma=gamma), 2 * np.pi / T_p
+    omega = np.linspace(0.3 * peak, 15 * peak, 60001)
+    S = jonswap(omega, sea)
+    assert np.trapezoid(S, omega) == pytest.approx(H_s**2 / 16, rel=2e-3)
+    assert omega[S.argmax()] == pytest.approx(peak, rel=1e-3)
+
+
+def test_spectrum_without_a_peak_factor_is_that_of_pierson_and_moskowitz() -> None:
+    """5/16 H_s^2 omega_p^4 omega^-5 exp(-5/4 (omega_p / omega)^4)."""
+    sea, peak = Sea(H_s=2.0, T_p=6.0, gamma=1.0), 2 * np.pi / 6.0
+    omega = np.linspace(0.6, 5.0, 40)
+    expected = 5 / 16 * 4.0 * peak**4 * omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4)
+    np.testing.assert_allclose(jonswap(omega, sea), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("components", [1, 20, 60])
+def test_components_hold_the_energy_of_the_range(components: int) -> None:
+    sea = Sea(H_s=1.5, T_p=5.0, components=components)
+    drawn = draw(sea)
+    omega = np.linspace(*sea.range, 20001)
+    energy = np.trapezoid(jonswap(omega, sea), omega)
+    np.testing.assert_allclose((drawn["amplitude"] ** 2 / 2).sum(axis=1), energy, rtol=0.01)
+    assert 0.99 < energy / (sea.H_s**2 / 16) < 1.0  # what the range leaves out
+    edges = np.linspace(*sea.range, components + 1)
+    assert ((drawn["omega"] >= edges[:-1]) & (drawn["omega"] < edges[1:])).all()
+
+
+def test_elevation_has_the_standard_deviation_of_the_sea_and_does_not_repeat() -> None:
+    """An hour at one place: H_s / 4; and equal bins would repeat after 2 pi / width."""
+    drawn = draw(count=1)
+    time = np.arange(0, 3600, 0.25)
+    wave = np.exp(1j * (np.outer(time, drawn["omega"][0]) + drawn["epsilon"][0])) @ drawn["amplitude"][0]
+    assert wave.real.std() == pytest.approx(SEA.H_s / 4, rel=0.02)
+    period = round(2 * np.pi / (np.diff(SEA.range)[0] / SEA.components) / 0.25)
+    assert abs(np.corrcoef(wave.real[:-period], wave.real[period:])[0, 1]) < 0.5
+
+
+def test_draws_of_a_sample_depend_on_its_name_alone() -> None:
+    """Not on how many there are, nor on where it stands, nor on the direction."""
+    few = draw_components(SEA, np.array([0.1, 0.2]), ["a", "b"])
+    many = draw_components(SEA, np.array([0.3, 0.2, 2.0, 0.1]), ["c", "b", "d", "a"])
+    for name in ("omega", "epsilon", "amplitude", "chi"):
+        np.testing.assert_array_equal(few[name], many[name][[3, 1]])
+    assert not np.isin(many["epsilon"][0], many["epsilon"][2]).any()
+    np.testing.assert_array_equal(few["chi"], np.repeat([[0.1], [0.2]], SEA.components, axis=1))
+
+
+def test_phases_are_uniform() -> None:
+    phases = draw(count=100)["epsilon"].ravel()
+    assert 0 <= phases.min() < phases.max() < 2 * np.pi
+    assert abs(np.exp(1j * phases).mean()) < 4 / np.sqrt(len(phases))
+
+
+@pytest.mark.parametrize("s", [1, 4, 25])
+def test_directions_follow_cos_2s(s: int) -> None:
+    """Mean direction and variance of the law within +-90 deg, by quadrature."""
+    sea = Sea(H_s=1.0, T_p=5.0, spreading=s)
+    apart = (draw(sea, direction=2.0, count=200)["chi"] - 2.0).ravel()
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 4001)
+    density = np.cos(angle) ** (2 * s)
+    width = np.sqrt(np.trapezoid(density * angle**2, angle) / np.trapezoid(density, angle))
+    assert abs(apart.mean()) < 4 * width / np.sqrt(len(apart))
+    assert apart.std() == pytest.approx(width, rel=0.03)
+    np.testing.assert_allclose(spread_angles(s, np.array([0.0, 0.5, 1.0])), [-np.pi / 2, 0, np.pi / 2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"H_s": -1.0}, {"T_p": 0.0}, {"gamma": 0.5}, {"components": 0}, {"spreading": 0}, {"height": 1.0}]
+)
+def test_impossible_seas_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        Sea(**{"H_s": 1.0, "T_p": 5.0, **wrong})
+
+
+def test_fourier_series_pass_through_the_table() -> None:
+    """Every heading of the table, both sides; and a series of fewer harmonics is the nearest in the mean square."""
+    columns = {name: np.array(values) for name, values in SHIP.document["waves"]["first_order"]["table"].items()}
+    for axis, side in (("Z", 1), ("K", -1)):
+        values = columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"]
+        series = fourier(columns, values, side, 12)
+        beta, m = np.radians(columns["beta_deg"]), np.arange(13)
+        rows = np.searchsorted(np.unique(columns["omega"]), columns["omega"])
+        for sign in (1, -1):
+            basis = np.cos(np.outer(beta, m)) if side > 0 else np.sin(sign * np.outer(beta, m))
+            own, expected = (series[rows] * basis).sum(axis=1), values if side > 0 else sign * values
+            # a sine series is zero at 0 and 180 deg, where the table holds rounding of the mesh
+            np.testing.assert_allclose(own, expected, rtol=0, atol=1e-3 * np.abs(values).max())
+        np.testing.assert_array_equal(fourier(columns, values, side, 6), series[:, :7])
+
+
+def test_interpolation_is_exact_for_cubics_and_ends_with_the_table() -> None:
+    grid = np.array([0.3, 0.4, 0.6, 0.7, 1.0, 1.4])
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0])
+    inside = np.linspace(0.3, 1.4, 23)
+    np.testing.assert_allclose(interpolate(inside, grid, cubic(grid)[:, None])[:, 0], cubic(inside), rtol=1e-10)
+    np.testing.assert_allclose(interpolate(np.array([0.1, 1.5]), grid, cubic(grid)[:, None])[:, 0], [cubic(0.3), 0])
+
+
+def simulated_loads(vessel: Vessel, drawn: dict[str, np.ndarray], t: float, pose: np.ndarray) -> dict[str, np.ndarray]:
+    """Wrench (6) of each wave term of sample 0, by the functions that every engine runs."""
+    model, loads = dynamics(vessel), wave_loads(vessel, drawn)
+    state = dict.fromkeys((*model.state, *model.hidden), 0.0)
+    state |= dict(zip(("north", "east", "psi"), pose, strict=True)) | {"waves.first_order.t": t}
+    rest = [0.0] * len(model.memory), [0.0] * len(model.commands), [0.0] * len(model.environment)
+    found = {}
+    for term in model.drawn:
+        one = [
+            term.function([*state.values()], *rest, [*vessel.parameters.values()], row) for row in loads[term.path][0]
+        ]
+        found[term.path] = np.array(sum(one)).ravel()
+    return found
+
+
+@pytest.mark.parametrize("spreading", [None, 4])
+@pytest.mark.parametrize("seed", range(3))
+def test_loads_are_those_of_the_table(seed: int, spreading: int | None) -> None:
+    """Summed over components against the Dirichlet kernel over 24 headings, anywhere, at any time."""
+    t, *pose = np.random.default_rng(seed).uniform([0, -200, -200, -4], [1000, 200, 200, 4])
+    drawn = draw(Sea(H_s=1.0, T_p=6.0, components=20, spreading=spreading), direction=2.0, count=1)
+    omega, amplitude, epsilon, chi = (drawn[name][0] for name in ("omega", "amplitude", "epsilon", "chi"))
+    weights, ship = heading_weights(chi - pose[2], 24), linear(SHIP)
+    transfer = np.einsum("kb,kbj->kj", weights, lagrange(omega, *ship.table))
+    phase = omega * t - omega**2 / GRAVITY * (pose[0] * np.cos(chi) + pose[1] * np.sin(chi)) + epsilon
+    expected = (transfer * (amplitude * np.exp(1j * phase))[:, None]).sum(axis=0).real
+    own = simulated_loads(SHIP, drawn, t, np.array(pose))
+    scale = np.sqrt((np.abs(transfer * amplitude[:, None]) ** 2).sum(axis=0))
+    assert (np.abs(own["waves.first_order"] - expected) < 1e-3 * scale).all()
+
+    columns = {name: np.array(values) for name, values in SHIP.document["waves"]["drift"]["table"].items()}
+    half = np.stack([columns[f"{axis}_drift"] for axis in "XYN"], axis=-1).reshape(len(ship.table[0]), -1, 3)
+    table = lagrange(omega, ship.table[0], all_round(half, np.array([1, -1, -1])))
+    mean = np.einsum("k,kb,kbj->j", amplitude**2, weights, table)
+    np.testing.assert_allclose(own["waves.drift"][[0, 1, 5]], mean, rtol=0, atol=2e-3 * np.abs(mean).max())
+
+
+def test_one_direction_is_one_drift_and_many_are_many() -> None:
+    long = wave_loads(SHIP, draw())["waves.drift"]
+    short = wave_loads(SHIP, draw(Sea(H_s=1.0, T_p=5.0, spreading=4)))["waves.drift"]
+    assert long.shape[:2] == (3, 1)
+    assert short.shape[:2] == (3, 60)
+
+
+def test_loads_scale_with_height_and_drift_with_its_square() -> None:
+    low, high = (wave_loads(SHIP, draw(Sea(H_s=H_s, T_p=5.0))) for H_s in (1.0, 2.0))
+    np.testing.assert_allclose(high["waves.first_order"][..., 5:], 2 * low["waves.first_order"][..., 5:], rtol=1e-9)
+    np.testing.assert_allclose(high["waves.drift"][..., 2:], 4 * low["waves.drift"][..., 2:], rtol=1e-9)
+    still = wave_loads(SHIP, draw(Sea(H_s=0.0, T_p=5.0)))
+    assert not still["waves.first_order"][..., 5:].any()
+    assert not still["waves.drift"][..., 2:].any()
+
+
+@pytest.mark.parametrize("beta_deg", [60, 90, 135, 180])
+def test_force_on_a_straight_course_has_the_spectrum_of_the_sea(beta_deg: int) -> None:
+    """Encounter moves energy in frequency and changes none: std of Z at 4 m/s within 3 % of the spectral integral."""
+    psi, speed, beta = 0.35, 4.0, np.radians(beta_deg)
+    drawn = draw(direction=psi + beta, count=4)
+    omega = np.linspace(*SEA.range, 1000)
+    transfer = linear(SHIP).excitation(omega, beta)[:, 2]
+    expected = np.sqrt(np.trapezoid(jonswap(omega, SEA) * np.abs(transfer) ** 2, omega))
+    time, rows, found = np.arange(0, 1800, 0.5), wave_loads(SHIP, drawn)["waves.first_order"], []
+    for row in rows:
+        w, k, c_chi, s_chi, epsilon = row[:, :5].T
+        series = (row[:, 5:].reshape(len(row), 2, 6, 13)[:, :, 2] @ np.cos(np.arange(13) * beta)).T
+        phase = np.outer(time, w - k * speed * (c_chi * np.cos(psi) + s_chi * np.sin(psi))) + epsilon
+        found.append(np.cos(phase) @ series[0] - np.sin(phase) @ series[1])
+    assert np.std(found) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("name", list(HULLS))
+def test_bundled_tables_are_those_of_the_data_base(name: str, shared_data: Path) -> None:
+    """Excitation and drift of the data base, moved from the centre of gravity to the origin: K - z Y, M + z X."""
+    source = shared_data.parent / "reference" / "seakeeping" / HULLS[name]
+    if not source.is_file():
+        pytest.skip(f"no {source.name} beside the recorded data")
+    base, ship = np.load(source), linear(load_vessel(name))
+    z = float(base["z_CG"])
+    F = base["F"].copy()
+    F[..., 3] -= z * F[..., 1]
+    F[..., 4] += z * F[..., 0]
+    omega, table = ship.table
+    np.testing.assert_allclose(omega, base["omega"])
+    expected = all_round(F, MIRROR)
+    assert (np.abs(table - expected) <= 1e-4 * np.abs(expected).max(axis=(0, 1))).all()
+    columns = load_vessel(name).document["waves"]["drift"]["table"]
+    own = np.stack([np.reshape(columns[f"{axis}_drift"], base["drift"].shape[:2]) for axis in "XYN"], axis=-1)
+    assert (np.abs(own - base["drift"]) <= 1e-4 * np.abs(base["drift"]).max(axis=(0, 1))).all()
