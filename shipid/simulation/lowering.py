@@ -11,15 +11,12 @@ import casadi as ca
 import numpy as np
 import torch
 
-from shipid.simulation.printing import STAGES, Dialect, print_function
+from shipid.simulation.printing import ARITHMETIC, STAGES, Dialect, print_function
 
 _UNARY: dict[int, str] = {
-    ca.OP_NEG: "(-{0})",
     ca.OP_EXP: "torch.exp({0})",
     ca.OP_LOG: "torch.log({0})",
     ca.OP_SQRT: "torch.sqrt({0})",
-    ca.OP_SQ: "({0} * {0})",
-    ca.OP_TWICE: "({0} + {0})",
     ca.OP_SIN: "torch.sin({0})",
     ca.OP_COS: "torch.cos({0})",
     ca.OP_TAN: "torch.tan({0})",
@@ -32,26 +29,15 @@ _UNARY: dict[int, str] = {
     ca.OP_FABS: "torch.abs({0})",
     ca.OP_SIGN: "torch.sign({0})",
     ca.OP_INV: "torch.reciprocal({0})",
-    ca.OP_NOT: "({0} == 0)",
     ca.OP_FLOOR: "torch.floor({0})",
     ca.OP_CEIL: "torch.ceil({0})",
 }
 _BINARY: dict[int, str] = {
-    ca.OP_ADD: "({0} + {1})",
-    ca.OP_SUB: "({0} - {1})",
-    ca.OP_MUL: "({0} * {1})",
-    ca.OP_DIV: "({0} / {1})",
     ca.OP_POW: "torch.pow({0}, {1})",
     ca.OP_CONSTPOW: "torch.pow({0}, {1})",
     ca.OP_ATAN2: "_atan2({0}, {1})",
     ca.OP_FMIN: "_minimum({0}, {1})",
     ca.OP_FMAX: "_maximum({0}, {1})",
-    ca.OP_LT: "({0} < {1})",
-    ca.OP_LE: "({0} <= {1})",
-    ca.OP_EQ: "({0} == {1})",
-    ca.OP_NE: "({0} != {1})",
-    ca.OP_AND: "(({0} != 0) & ({1} != 0))",
-    ca.OP_OR: "(({0} != 0) | ({1} != 0))",
     ca.OP_IF_ELSE_ZERO: "_where({0}, {1})",
 }
 
@@ -95,7 +81,7 @@ _NAMES = {
 }
 
 
-PYTORCH = Dialect(_UNARY | _BINARY, "    {0} = {1}", repr, "_number({0})")
+PYTORCH = Dialect(ARITHMETIC | _UNARY | _BINARY, "    {0} = {1}", repr, "_number({0})")
 
 
 @dataclass(frozen=True)

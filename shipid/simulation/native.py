@@ -25,7 +25,7 @@ import numpy as np
 
 from shipid.errors import ShipidError
 from shipid.simulation.integrate import Array, Batch, Method, integrate
-from shipid.simulation.printing import STAGES, Dialect, Printed, print_function
+from shipid.simulation.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.vessel.dynamics import Dynamics
 
 _CALLS = {
@@ -35,31 +35,17 @@ _CALLS = {
 }  # fmt: skip
 _OPERATIONS = {
     **{operation: f"v_{name}({{0}})" for operation, name in _CALLS.items()},
-    ca.OP_NEG: "(-{0})",
-    ca.OP_SQ: "({0} * {0})",
-    ca.OP_TWICE: "({0} + {0})",
     ca.OP_FABS: "v_abs({0})",
     ca.OP_SIGN: "(NUMBER({0} > 0) - NUMBER({0} < 0))",
     ca.OP_INV: "(1 / {0})",
-    ca.OP_NOT: "({0} == 0)",
-    ca.OP_ADD: "({0} + {1})",
-    ca.OP_SUB: "({0} - {1})",
-    ca.OP_MUL: "({0} * {1})",
-    ca.OP_DIV: "({0} / {1})",
     ca.OP_POW: "v_pow({0}, {1})",
     ca.OP_CONSTPOW: "v_pow({0}, {1})",
     ca.OP_ATAN2: "v_atan2({0}, {1})",
     ca.OP_FMIN: "CHOOSE({0} < {1}, {0}, {1})",
     ca.OP_FMAX: "CHOOSE({0} > {1}, {0}, {1})",
-    ca.OP_LT: "({0} < {1})",
-    ca.OP_LE: "({0} <= {1})",
-    ca.OP_EQ: "({0} == {1})",
-    ca.OP_NE: "({0} != {1})",
-    ca.OP_AND: "(({0} != 0) & ({1} != 0))",
-    ca.OP_OR: "(({0} != 0) | ({1} != 0))",
     ca.OP_IF_ELSE_ZERO: "((V)(({0} != 0) & (M){1}))",
 }
-_C = Dialect(_OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
+_C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
 

@@ -12,6 +12,22 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+ARITHMETIC = {  # the same in every dialect
+    ca.OP_NEG: "(-{0})",
+    ca.OP_SQ: "({0} * {0})",
+    ca.OP_TWICE: "({0} + {0})",
+    ca.OP_NOT: "({0} == 0)",
+    ca.OP_ADD: "({0} + {1})",
+    ca.OP_SUB: "({0} - {1})",
+    ca.OP_MUL: "({0} * {1})",
+    ca.OP_DIV: "({0} / {1})",
+    ca.OP_LT: "({0} < {1})",
+    ca.OP_LE: "({0} <= {1})",
+    ca.OP_EQ: "({0} == {1})",
+    ca.OP_NE: "({0} != {1})",
+    ca.OP_AND: "(({0} != 0) & ({1} != 0))",
+    ca.OP_OR: "(({0} != 0) | ({1} != 0))",
+}
 _TRUTH = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT}  # give booleans
 _TAKES_TRUTH = {ca.OP_NOT: 1, ca.OP_AND: 2, ca.OP_OR: 2, ca.OP_IF_ELSE_ZERO: 1}  # so many operands, from the first
 

@@ -19,6 +19,7 @@ from shipid.simulation.rollout import rollout
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
+from tests.simulation.operations import operations
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 SHIP = load_vessel("gunnerus-28.9")
@@ -32,36 +33,13 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     native._library.cache_clear()
 
 
-def operations() -> tuple[ca.SX, ca.SX, list[ca.SX]]:
-    x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
-    a, b, k = x[0], x[1], p[0] / 4e5
-    unary = (ca.exp, ca.sin, ca.cos, ca.tan, ca.atan, ca.sinh, ca.cosh, ca.tanh, ca.fabs, ca.sign, ca.floor, ca.ceil)
-    values = [f(a) for f in unary] + [f(k) for f in unary]
-    values += [
-        ca.log(ca.fabs(a)),
-        ca.sqrt(ca.fabs(a)),
-        ca.asin(ca.tanh(a)),
-        ca.acos(ca.tanh(b)),
-        1 / a,
-        2 * a,
-        a**2,
-        -a,
-    ]
-    values += [a + b, a - b, a * b, a / b, ca.fabs(a) ** b, ca.fabs(a) ** 2.5, a**3, k**1.5, 2.5**a]
-    values += [ca.atan2(a, b), ca.atan2(a, 0.3), ca.atan2(0.3, b), ca.fmin(a, b), ca.fmax(a, b), ca.fmax(k, 0.1)]
-    values += [ca.fmin(a, 0.2), ca.fmax(0.2, b), ca.fmin(k, a), a < b, a <= b, a == b, a != b, (a > 0) + (b > 0)]
-    values += [ca.if_else(ca.logic_and(a > 0, b > 0), 1e-6, -3.3), ca.if_else(ca.logic_or(a > k, k > 2), b, 0)]
-    values += [(a > 0) - ca.logic_not(a > k), ca.if_else(a, b, k)]
-    return x, p, values
-
-
 @pytest.mark.parametrize("wanted", ["here", "one lane at a time"])
 def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step of 1 s from rates that are the operations; with vector functions, and without."""
     if wanted != "here":
         monkeypatch.setattr(native, "target", lambda: Target(2, (), ""))
-    x, p, values = operations()
-    model = dynamics(SHIP)
+    x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
+    values, model = operations(x[0], x[1], p[0] / 4e5), dynamics(SHIP)
     sizes = [("memory", 0), ("commands", 4), ("environment", 2)]
     middle = [ca.SX.sym(name, size) for name, size in sizes]
     tau = ca.SX.sym("tau_extra", 3)
