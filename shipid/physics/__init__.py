@@ -66,7 +66,7 @@ TERMS: dict[str, Term] = {
     ),
     "radiation.roll": Term(radiation.roll, states=radiation.roll_states, rates=radiation.roll_rates),
     "waves.first_order": Term(
-        waves.first_order, drawn=waves.first_order_widths, states=waves.clock, rates=waves.clock_rate
+        waves.first_order, drawn=waves.first_order_widths, states=waves.passage, rates=waves.passage_rates
     ),
     "waves.drift": Term(waves.drift, drawn=waves.drift_widths),
     "wind.table": Term(wind.table),

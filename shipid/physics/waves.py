@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
+from shipid.physics.frames import rotation
 from shipid.physics.grammar import AXES
 
 EVEN = (0, 2, 4)
@@ -21,14 +22,14 @@ DRIFT = ("X_drift", "Y_drift", "N_drift")
 TABLES = {"waves.first_order": ("omega", "beta_deg", *FORCES), "waves.drift": ("omega", "beta_deg", *DRIFT)}
 
 
-def clock(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
-    """Waves go on with time, which no other term knows: it is a state."""
-    return ("t",)
+def passage(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
+    """Waves go on with time and are carried by the water: the time, and how far a current has taken the water."""
+    return ("t", "north", "east")
 
 
-def clock_rate(state: SX) -> SX:
-    """Time runs: 1."""
-    return SX.ones(state.numel())
+def passage_rates(eta: SX, nu: SX, nu_r: SX) -> SX:
+    """Time runs, and the water moves with the current: 1, then its velocity [m/s] north and east."""
+    return ca.vertcat(SX(1), (rotation(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
 
 
 def first_order_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
@@ -60,10 +61,11 @@ def relative_heading(psi: SX, c_chi: SX, s_chi: SX) -> tuple[SX, SX]:
 def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsilon: SX, real: SX, imag: SX) -> SX:
     """Wrench (6) of one component: Re F(omega, beta) a exp(i(omega t - k(N cos chi + E sin chi) + epsilon)).
 
-    The phase is that at the ship's own position, so speed enters as the frequency of encounter; the transfer function
-    is that of the wave's own frequency. real, imag (6 series, one after the other): Fourier coefficients of a F.
+    The phase is that at the ship's own position in the water, which a current carries along; so her speed through the
+    water enters as the frequency of encounter. The transfer function is that of the wave's own frequency. real, imag
+    (6 series, one after the other): Fourier coefficients of a F.
     """
-    phase = omega * state[0] - k * (c_chi * eta[0] + s_chi * eta[1]) + epsilon
+    phase = omega * state[0] - k * (c_chi * (eta[0] - state[1]) + s_chi * (eta[1] - state[2])) + epsilon
     c, s = ca.cos(phase), ca.sin(phase)
     count = real.numel() // 6
     cosines, sines = multiples(*relative_heading(eta[5], c_chi, s_chi), count - 1)

@@ -128,7 +128,8 @@ def steady(
         moving = np.max(changed, axis=0) >= SETTLED
         if not moving.any():
             _check_straight(vessel, n, state["r"])
-            return state | {name: np.zeros(len(n)) for name in ("north", "east", "psi")}, memory
+            anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
+            return state | {name: np.zeros(len(n)) for name in anew}, memory
     raise ShipidError(
         f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n, moving)} rpm: "
         'start from rest (approach = "rest")'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,7 +15,7 @@ Method = Literal["euler", "rk4"]
 
 @dataclass(frozen=True)
 class Batch:
-    """Inputs of a rollout as plain arrays, channel first: the layout that both engines share.
+    """Inputs of a rollout as plain arrays, channel first: the layout that all engines share.
 
     state (nx, S), memory (nm, S), commands (T, nc, S), environment (T, ne, S), tau_extra (T, n_dof, S) with T = 1 when
     held over the horizon, parameters (V, P). state holds the hidden states of terms after eta and nu; components holds,
@@ -28,6 +29,13 @@ class Batch:
     tau_extra: Array
     parameters: Array
     components: tuple[Array, ...] = ()
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def integrate(

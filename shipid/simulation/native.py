@@ -6,6 +6,7 @@ in the user's cache (XDG_CACHE_HOME), by the digest of source, compiler and proc
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import hashlib
 import os
@@ -24,7 +25,7 @@ import casadi as ca
 import numpy as np
 
 from shipid.errors import ShipidError
-from shipid.simulation.integrate import Array, Batch, Method, integrate
+from shipid.simulation.integrate import Array, Batch, Method, cores, integrate
 from shipid.simulation.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.vessel.dynamics import Dynamics
 
@@ -77,8 +78,15 @@ class Target:
 
 @cache
 def compiler() -> str | None:
-    """The C compiler, if there is one."""
-    return next((found for name in ("gcc", "cc", "clang") if (found := shutil.which(name))), None)
+    """The C compiler, if there is one that makes a library."""
+    trial = "#include <math.h>\ndouble probe(double x) { return sin(x); }"
+    for name in ("gcc", "cc", "clang"):
+        found = shutil.which(name)
+        if found is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                if _compile(found, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
+                    return found
+    return None
 
 
 @cache
@@ -94,36 +102,42 @@ def _processor() -> frozenset[str]:
 @cache
 def target() -> Target:
     """Widest vectors of this processor; vector functions of glibc where they link, else one lane at a time."""
-    x86 = platform.machine() in ("x86_64", "AMD64")
+    found, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
     if x86 and "avx512f" in _processor():
         best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
     elif x86 and {"avx2", "fma"} <= _processor():
         best = Target(4, ("-march=native",), "_ZGVdN4")
     else:
-        return Target(2, (), "")
+        best = Target(2, (), "")
+    if found is None or not best.prefix:
+        return best
     probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
     with tempfile.TemporaryDirectory() as folder:
-        linked = _compile(probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best)
+        linked = _compile(
+            found, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
+        )
     return best if linked is None else Target(best.lanes, best.flags, "")
 
 
-def _compile(source: str, library: Path, wanted: Target) -> str | None:
-    """Compile C into a shared library; what the compiler says if it fails."""
-    found = compiler()
-    assert found is not None
-    text = library.with_suffix(f".{os.getpid()}.c")
-    text.write_text(source, encoding="utf-8")
-    fresh = library.with_suffix(f".{os.getpid()}.so")
-    mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-    options = ["-O2", "-fno-math-errno", "-fPIC", "-shared", "-w", *wanted.flags]
-    result = subprocess.run(
-        [found, *options, str(text), "-o", str(fresh), *mvec, "-lm"], capture_output=True, text=True
-    )
-    text.unlink()
-    if result.returncode:
-        return result.stderr.strip() or "it gave no reason"
-    os.replace(fresh, library)
+def _compile(found: str, source: str, library: Path, wanted: Target) -> str | None:
+    """Compile C into a shared library, whole or not at all; what the compiler says if it fails."""
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
+        text.write_text(source, encoding="utf-8")
+        mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
+        options = ["-O2", "-fno-math-errno", "-fPIC", "-shared", "-w", *wanted.flags]
+        command = [found, *options, str(text), "-o", str(fresh), *mvec, "-lm"]
+        result = subprocess.run(command, capture_output=True, text=True)
+        if result.returncode:
+            return result.stderr.strip() or "it gave no reason"
+        os.replace(fresh, library)
     return None
+
+
+@cache
+def _version(found: str) -> str:
+    """What a compiler calls itself."""
+    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout
 
 
 def _vector_functions(wanted: Target) -> str:
@@ -285,23 +299,40 @@ for (long g = first; g < last; ++g) {{
 """
 
 
+@cache
+def _folder(wanted: str) -> Path:
+    """The user's cache, if libraries can be kept there, else a folder for this process."""
+    folder = Path(wanted) / "shipid"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        own = tempfile.TemporaryDirectory(prefix="shipid-")
+        atexit.register(own.cleanup)
+        return Path(own.name)
+
+
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method) -> Any:
     """The `run` of a model, compiled or from the cache; ShipidError if there is no compiler or it fails."""
-    if compiler() is None:
+    found = compiler()
+    if found is None:
         raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
     source = _Source(model, step, method).text(target())
-    words = "\n".join([source, str(compiler()), platform.machine(), *sorted(_processor())])
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shipid"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        folder = Path(tempfile.mkdtemp(prefix="shipid-"))
+    words = "\n".join([source, found, _version(found), platform.machine(), *sorted(_processor())])
+    folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
     library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
-    if not library.exists():
-        failure = _compile(source, library, target())
-        if failure is not None:
-            raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]}): use engine 'torch'")
+    try:
+        return _loaded(library)
+    except OSError:  # not there, or not whole
+        failure = _compile(found, source, library, target())
+    if failure is not None:
+        raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]}): use engine 'torch'")
+    return _loaded(library)
+
+
+def _loaded(library: Path) -> Any:
     run = ctypes.CDLL(str(library)).run
     run.restype = None
     return run
@@ -332,7 +363,7 @@ def run_native(
     records = np.empty((num_variants, groups, num_records, len(rows), lanes))
     worst = np.empty((num_variants, groups, lanes))
     values = np.ascontiguousarray(batch.parameters, dtype=float)
-    threads = os.cpu_count() or 1
+    threads = cores()
     size = max(1, -(-groups // (4 * threads)))
 
     def part(variant: int, first: int) -> None:

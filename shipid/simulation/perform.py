@@ -15,7 +15,7 @@ from shipid.simulation.approach import Controls, steady
 from shipid.simulation.integrate import Method
 from shipid.simulation.manoeuvre import DEGREE, RPM, Manoeuvre
 from shipid.simulation.rollout import Engine, Trajectories, rollout
-from shipid.simulation.truth import ON_BOARD, run_names
+from shipid.simulation.truth import ON_BOARD, logged, run_names
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
@@ -30,22 +30,25 @@ def perform(
     interval: float | None = None,
     method: Method = "rk4",
     environment: Mapping[str, float | Array] | None = None,
+    components: Mapping[str, Array] | None = None,
     engine: Engine = "auto",
 ) -> pd.DataFrame:
     """Run manoeuvres and log them: all that one helmsman (or the clock) orders in one rollout.
 
     The vessel's own actuators lag and limit what is ordered; a vessel without any follows at once. The approach is in
-    calm water, from t = 0 on the environment acts.
+    calm water, from t = 0 on environment and sea act.
 
     Parameters
     ----------
     step, interval : of the integration, and between logged rows [s]; default: every step is logged.
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> a value for all runs or (num_manoeuvres,); default 0.
+    components : a sea for each manoeuvre, as `rollout` takes it (`shipid.simulation.sea.wave_loads`); default: calm.
 
     Returns
     -------
-    DataFrame : `run`, `t` [s], the states, each command as ordered from that row on, what lagged ones have reached
-        (`actual.port.n`), wind where the vessel feels it, `flags` (0). Without `actual.*`: the columns of a dataset.
+    DataFrame : `run`, `t` [s], the states (u, v, r those of the horizontal plane), each command as ordered from that
+        row on, what lagged ones have reached (`actual.port.n`), wind where the vessel feels it, `flags` (0). Without
+        `actual.*`: the columns of a dataset.
 
     Raises
     ------
@@ -54,9 +57,10 @@ def perform(
     """
     if not manoeuvres:
         raise ShipidError("there is no manoeuvre to perform")
-    every = round((interval or step) / step)
-    if every < 1 or abs(every * step - (interval or step)) > 1e-9 * step * every:
-        raise ShipidError(f"interval {interval:g} s must be a multiple of step {step:g} s")
+    between = step if interval is None else interval
+    every = round(between / step)
+    if every < 1 or abs(every * step - between) > 1e-9 * step * every:
+        raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
     names = [own.name or number for own, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -70,7 +74,8 @@ def perform(
     for helmsman, members in groups.items():
         chosen = [names.index(name) for name in members]
         here = {channel: values[chosen] for channel, values in weather.items()}
-        frames |= _together(controls, helmsman, members, here, every, how)
+        sea = {path: np.asarray(drawn)[chosen] for path, drawn in (components or {}).items()}
+        frames |= _together(controls, helmsman, members, here, every, {**how, "components": sea})
     return pd.concat([frames[name] for name in names], ignore_index=True)
 
 
@@ -130,7 +135,11 @@ def _start(
     moving = [number for number, own in enumerate(manoeuvres) if own.approach == "steady"]
     if moving:
         speeds, which = np.unique([manoeuvres[number].n_rpm * RPM for number in moving], return_inverse=True)
-        for into, found in zip((start, memory), steady(controls, speeds, **how), strict=True):
+        for into, found in zip(
+            (start, memory),
+            steady(controls, speeds, **{name: how[name] for name in ("step", "method", "engine")}),
+            strict=True,
+        ):
             for name, values in found.items():
                 into[name][moving] = values[which]
     start["psi"] = start["psi"] + np.array([own.course_deg * DEGREE for own in manoeuvres])
@@ -147,7 +156,7 @@ def _columns(
 ) -> dict[str, Array]:
     """Columns of the log, (num_records, num_samples)."""
     model = dynamics(vessel, helmsman)
-    log = {("z" if name == "down" else name): path[name][:, 0] for name in model.state}
+    log = logged(path, model.state)
     log |= _orders(vessel, helmsman, path, commands, weather, every)
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}

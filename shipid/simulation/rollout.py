@@ -1,14 +1,14 @@
 """Rollouts: one step rule, many ways to run it.
 
-The integrator is written once, over `rates` and `advance`; CasADi runs it sample by sample (long simulations, few
-samples), PyTorch runs it over whole batches (many windows, many variants). Both give the same numbers.
+The integrator is written once, over `rates` and `advance`. Where there is a C compiler it runs as C on SIMD vectors;
+else CasADi runs it sample by sample, PyTorch over whole batches. All give the same numbers, to rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -86,6 +86,7 @@ def rollout(
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
     """
     model = dynamics(vessel, helmsman)
+    _check(engine, device, num_steps, every)
     if not start:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
     num_samples = len(next(iter(start.values())))
@@ -111,12 +112,8 @@ def rollout(
     if unknown is not None:
         raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
     rows = [names.index(name) for name in kept]
-    if num_steps % every:
-        raise ShipidError(f"num_steps must be a multiple of every, found {num_steps} and {every}")
     work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1)
     chosen = _by_size(work, num_samples * len(values), device) if engine == "auto" else engine
-    if chosen in ("native", "casadi") and device != "cpu":
-        raise ShipidError(f"engine {chosen!r} runs on the CPU: use 'torch' or 'compiled' on {device!r}")
     if num_samples == 0:
         raise ShipidError("a rollout needs at least one sample")
     with np.errstate(all="ignore"):
@@ -130,6 +127,15 @@ def rollout(
             records, worst = run_torch(model, batch, step, num_steps, method, every, rows, chosen == "compiled", device)
     diverged = ~(worst <= SPEED_LIMIT) | ~_finite(batch)
     return Trajectories(records, kept, diverged, step * every)
+
+
+def _check(engine: str, device: str, num_steps: int, every: int) -> None:
+    if engine not in get_args(Engine):
+        raise ShipidError(f"there is no engine {engine!r}: {choices(engine, get_args(Engine))}")
+    if engine in ("native", "casadi") and device != "cpu":
+        raise ShipidError(f"engine {engine!r} runs on the CPU: use 'torch' or 'compiled' on {device!r}")
+    if num_steps < 1 or every < 1 or num_steps % every:
+        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, found {num_steps} and {every}")
 
 
 def _finite(batch: Batch) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from collections.abc import Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.simulation.integrate import Array, Batch, Method, integrate
+from shipid.simulation.integrate import Array, Batch, Method, cores, integrate
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -88,7 +87,7 @@ def run_casadi(
         return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
 
     inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
-    mapped = scan.map(num_samples, "thread", min(os.cpu_count() or 1, num_samples))
+    mapped = scan.map(num_samples, "thread", min(cores(), num_samples))
     drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
     records, worst = [], []
     for values in batch.parameters:

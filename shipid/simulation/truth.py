@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,13 +13,15 @@ from shipid.errors import DocumentError, choices
 from shipid.simulation import gusts
 from shipid.simulation.gusts import Gusts
 from shipid.simulation.rollout import Trajectories, rollout
-from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.sea import Sea, draw_components, share_outside, table_range, wave_loads
 from shipid.simulation.sensors import Sensor, measure
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
 
 Range = tuple[FiniteFloat, FiniteFloat]
+NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
+MOST_LOST = 0.05  # of the energy of a sea may lie beyond the frequencies of a vessel's tables
 RPM = 1 / 60
 DEGREE = np.pi / 180
 ON_BOARD = ("V_w", "beta_w")  # what of the environment a ship logs: neither current nor waves
@@ -42,10 +45,10 @@ class Truth(BaseModel):
     seed: int = 0
     n_rpm: Range = (50.0, 200.0)
     alpha_deg: Range = (-50.0, 50.0)
-    wind_speed: Range = (0.0, 6.0)
+    wind_speed: NotNegative = (0.0, 6.0)
     gusts: Gusts | None = None
     waves: Sea | None = None
-    current_speed: Annotated[Range, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
+    current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
     sensors: dict[str, Sensor] = Field(default={}, description="logged column -> sensor model")
     start_speed: Annotated[Range, Field(description="m/s ahead at the start of a manoeuvre")] = (0.0, 0.0)
     actuators_at: Annotated[
@@ -66,7 +69,7 @@ class Truth(BaseModel):
 
 
 def check_truth(truth: Truth, vessel: Vessel) -> None:
-    """Refuse what this vessel cannot do: waves, current or gusts that act on no term, sensors of no column."""
+    """Refuse what this vessel cannot do: waves, current or gusts that act on no term, or a sea beyond its tables."""
     model = dynamics(vessel)
     if truth.waves is not None and not model.drawn:
         raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
@@ -74,8 +77,12 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
         raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
     if truth.gusts is not None and "V_w" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
-    if truth.gusts is not None and truth.wind_speed[0] < 0:
-        raise DocumentError(f"{truth.wind_speed[0]:g} m/s: gusts need a mean of 0 or more", path="truth.wind_speed")
+    if truth.waves is not None:
+        low, high = table_range(vessel)
+        lost = share_outside(truth.waves, low, high)
+        if lost > MOST_LOST:
+            message = f"{truth.waves.T_p:g} s: {lost:.0%} of the sea's energy lies outside the tables of {truth.vessel}"
+            raise DocumentError(f"{message}, {low:g} to {high:g} rad/s", path="truth.waves.T_p")
     columns = [_column(name) for name in model.state]
     columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment)]
     unknown = next((name for name in truth.sensors if name not in columns), None)
@@ -87,6 +94,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Run all manoeuvres in one batch and log them: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
     Both propulsors take the same orders, from t = 0 on; mean wind, current and the direction of the waves are constant.
+    Every ship starts upright and still but for her speed ahead: the first ten seconds of her roll are a transient.
     What is logged is that of the origin, the centre of gravity projected on the calm waterline: u and v horizontal,
     along and across the heading, and r = d(psi)/dt. Raises DocumentError if a manoeuvre diverges.
     """
@@ -123,7 +131,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
             path="truth",
         )
     measured = {name: values[::every] if values.ndim == 2 else values for name, values in weather.items()}
-    frame = _logged(path, {**commands, **{name: measured[name] for name in ON_BOARD if name in measured}})
+    frame = _log(path, {**commands, **{name: measured[name] for name in ON_BOARD if name in measured}})
     if truth.sensors:
         frame = measure(frame, truth.sensors, truth.interval, truth.seed)
     frame["flags"] = 0
@@ -138,18 +146,20 @@ def _sea(truth: Truth, vessel: Vessel, chi: np.ndarray) -> dict[str, np.ndarray]
     return wave_loads(vessel, draw_components(truth.waves, chi, names))
 
 
-def _logged(path: Trajectories, beside: dict[str, np.ndarray]) -> pd.DataFrame:
+def _log(path: Trajectories, beside: dict[str, np.ndarray]) -> pd.DataFrame:
     """Records as rows of a log; `beside` are orders and weather, (S,) or (R, S)."""
     count, _, num_samples, _ = path.states.shape
     names = run_names(num_samples)
     time = np.arange(count) * path.interval
-    columns: dict[str, np.ndarray] = {}
-    for name in path.names:
-        columns[_column(name)] = path[name][:, 0].T.ravel()
-    columns |= _horizontal(columns)
-    for name, values in beside.items():
-        columns[name] = np.broadcast_to(values, (count, num_samples)).T.ravel()
-    return pd.DataFrame({"run": np.repeat(names, count), "t": np.tile(time, num_samples), **columns})
+    columns = {**logged(path, path.names), **{k: np.broadcast_to(v, (count, num_samples)) for k, v in beside.items()}}
+    flat = {name: values.T.ravel() for name, values in columns.items()}
+    return pd.DataFrame({"run": np.repeat(names, count), "t": np.tile(time, num_samples), **flat})
+
+
+def logged(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """States of the first variant as a log has them, column -> (R, S): u, v and r are those of the horizontal plane."""
+    columns = {_column(name): path[name][:, 0] for name in names}
+    return columns | _horizontal(columns)
 
 
 def _column(state: str) -> str:

@@ -35,6 +35,8 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
         if not results.complete:
             message = f"is not finished: continue with `shipid study resume {results.folder}`"
             raise ResultError(message, file=results.folder)
+        if not (results.cells["status"] == "ok").any():
+            raise ResultError("has no cell with a result", file=results.folder)
     return worlds
 
 

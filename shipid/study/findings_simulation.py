@@ -268,11 +268,17 @@ def _S4(grid: Grid) -> Finding:
         )
         return _finding("S4", "undecided", evidence, **numbers)
     found, moving = grid.judge(holds), False
-    if worse and grid.moderate:
+    if not grid.moderate:
+        return _finding(
+            "S4", "undecided", f"{evidence}; no moderate model to compare their fluctuation with", **numbers
+        )
+    if worse:
         worst, calm = (float(np.median([_variation(grid.H[m]) for m in group])) for group in (worse, grid.moderate))
         moving = worst > calm
         evidence += f"; over {orders} nested orders H of these varies by {worst:.0%}, of moderate models by {calm:.0%}"
         numbers |= {"variation of the worst": worst, "variation of moderate models": calm}
+    if worse and not moving:
+        evidence += ", so not more"
     return _finding("S4", found if moving else "refuted", evidence, **numbers)
 
 
@@ -312,6 +318,10 @@ def _S6(grid: Grid) -> Finding:
         return _without("S6", "moderate")
     if len(grid.physics) < 2:
         return _finding("S6", "undecided", "one physics model: there is no other to compare it with")
+    if not _small(grid):
+        return _finding("S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
+    if min(grid.A[model] for model in grid.physics) >= max(grid.A[model] for model in grid.moderate):
+        return _finding("S6", "undecided", "no physics model is more accurate than a moderate one")
     data = {model: pair for model in grid.moderate if (pair := _against_data(grid, model))}
     physics = {model: pair for model in grid.moderate if (pair := _against_physics(grid, model))}
     kinds = (("pure data-driven with more runs", data), ("more accurate physics alone", physics))

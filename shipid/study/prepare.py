@@ -76,7 +76,10 @@ def obtain(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
-        frame = simulate(study.truth, plan.truth)
+        try:
+            frame = simulate(study.truth, plan.truth)
+        except DocumentError as error:
+            raise DocumentError(error.message, file=plan.file, path=error.path) from None
         return Dataset(frame, {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []})
     assert study.data is not None
     if study.data.dataset is not None:

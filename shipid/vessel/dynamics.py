@@ -139,12 +139,13 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     nu_c, nu_c_dot = SX(6, 1), SX(6, 1)
     if "current" in vessel.document:
         nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"])
+    nu_r = nu - nu_c
     own = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
-    available = {"eta": eta, "nu": nu, "nu_r": nu - nu_c, "psi": eta[5], **weather, **actual}
+    available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
-    force = M_A @ (nu_c_dot + _inertial_heave(nu)) - coriolis(M_RB, nu) - _coriolis_in_plane(M_A, nu - nu_c)
+    force = _added_mass_force(M_A, nu_r, nu_c_dot) - coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
     summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
@@ -192,17 +193,15 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     )
 
 
-def _inertial_heave(nu: SX) -> SX:
-    """What turns the rate of w into the downward acceleration: heave added mass acts in the inertial frame."""
-    result = SX(6, 1)
-    result[2] = nu[0] * nu[4] - nu[1] * nu[3]
-    return result
+def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX) -> SX:
+    """Force (6) of added mass beyond -M_A nu_dot.
 
-
-def _coriolis_in_plane(M_A: SX, nu_r: SX) -> SX:
-    """Coriolis terms of added mass in surge, sway and yaw alone: those of manoeuvring in calm water, and no others."""
+    Surge, sway and yaw have the Coriolis terms of manoeuvring in calm water. Heave acts in the inertial frame, on
+    w_dot + p v - q u, and what is coupled to it has no others.
+    """
+    heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
     plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
-    return coriolis(plane @ M_A @ plane, plane @ nu_r)
+    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - coriolis(plane @ M_A @ plane, plane @ nu_r)
 
 
 def _upright(eta: SX, nu: SX, m: SX) -> SX:

@@ -19,7 +19,7 @@ DRIFT = RNG.normal(size=(3, COUNT))
 
 
 def function() -> ca.Function:
-    eta, state, chi = ca.SX.sym("eta", 6), ca.SX.sym("state"), ca.SX.sym("chi")
+    eta, state, chi = ca.SX.sym("eta", 6), ca.SX.sym("state", 3), ca.SX.sym("chi")
     real, imag = (ca.DM(part.ravel()) for part in (COEFFICIENTS.real, COEFFICIENTS.imag))
     wrench = first_order(eta, state, OMEGA, K, ca.cos(chi), ca.sin(chi), EPSILON, real, imag)
     return ca.Function("wrench", [eta, state, chi], [wrench])
@@ -29,7 +29,7 @@ FIRST_ORDER = function()
 
 
 def force(t: float, north: float = 0.0, east: float = 0.0, psi: float = 0.0, chi: float = CHI) -> np.ndarray:
-    return np.array(FIRST_ORDER([north, east, 0.1, 0.02, 0.01, psi], t, chi)).ravel()
+    return np.array(FIRST_ORDER([north, east, 0.1, 0.02, 0.01, psi], [t, 0, 0], chi)).ravel()
 
 
 def transfer(beta: float) -> np.ndarray:
@@ -85,3 +85,9 @@ def test_drift_is_a_series_in_the_relative_heading() -> None:
         np.testing.assert_allclose(found, [X, Y, 0, 0, 0, N], atol=1e-12)
         mirrored = np.array(own([5, -6, 0.1, -0.02, 0.01, -psi], -CHI)).ravel()
         np.testing.assert_allclose(mirrored, MIRROR * found, atol=1e-12)
+
+
+def test_waves_travel_with_the_water() -> None:
+    """A ship that a current has carried along with the water meets the same wave as one that stayed in still water."""
+    carried = np.array(FIRST_ORDER([30.0, -8.0, 0.1, 0.02, 0.01, 0.3], [9.0, 25.0, -12.0], CHI)).ravel()
+    np.testing.assert_allclose(carried, force(9.0, 5.0, 4.0, 0.3), rtol=1e-12)

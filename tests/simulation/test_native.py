@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -104,3 +105,39 @@ def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw
 def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
     with pytest.raises(ShipidError, match="runs on the CPU"):
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native", device="cuda")
+
+
+def test_a_broken_library_is_made_anew(
+    own_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    """What a full disk left behind, found by a later process: here another cache, as a loaded file stays loaded."""
+
+    def run() -> np.ndarray:
+        native._library.cache_clear()
+        return rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").states
+
+    sound = run()
+    (library,) = own_cache.iterdir()
+    broken = tmp_path / "other" / "shipid" / library.name
+    broken.parent.mkdir(parents=True)
+    broken.write_bytes(b"")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
+    np.testing.assert_array_equal(run(), sound)
+    assert broken.stat().st_size > 0
+
+
+def test_threads_may_make_the_same_library_at_once(own_cache: Path) -> None:
+    """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
+    model = dynamics(SHIP)
+    with ThreadPoolExecutor(3) as pool:
+        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler") for _ in range(3)]:
+            future.result()
+    assert len(list(own_cache.iterdir())) == 1
+
+
+def test_a_cache_that_cannot_be_written_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert not rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").diverged.any()

@@ -11,7 +11,10 @@ from pydantic import ValidationError
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.rollout import rollout
+from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.truth import Truth, check_truth, simulate
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG, PATCHED
 
@@ -123,6 +126,8 @@ def test_diverging_truth_is_told() -> None:
         ({"n_rpm": (200.0, 50.0)}, "n_rpm runs backwards"),
         ({"manoeuvres": 1}, "greater than or equal to 2"),
         ({"wind": 3.0}, "Extra inputs"),
+        ({"wind_speed": (-3.0, -1.0)}, "greater than or equal to 0"),
+        ({"current_speed": (-1.0, 0.0)}, "greater than or equal to 0"),
     ],
 )
 def test_impossible_truths_are_refused(changes: dict[str, Any], said: str) -> None:
@@ -203,3 +208,41 @@ def test_what_a_vessel_cannot_feel_is_refused(changes: dict[str, Any], path: str
     with pytest.raises(DocumentError) as caught:
         simulate(truth(**changes), SHIP)
     assert (caught.value.path, said in str(caught.value)) == (path, True)
+
+
+@pytest.mark.parametrize(("T_p", "refused"), [(5.0, False), (12.0, False), (20.0, True), (2.5, True)])
+def test_a_sea_beyond_the_tables_is_refused(T_p: float, refused: bool) -> None:
+    """Short and long waves have no loads in the tables: more than 5 % of the energy may not be lost in silence."""
+    given = truth(waves={**SEA, "T_p": T_p})
+    if not refused:
+        check_truth(given, SIX)
+        return
+    with pytest.raises(DocumentError, match="of the sea's energy lies outside") as caught:
+        check_truth(given, SIX)
+    assert caught.value.path == "truth.waves.T_p"
+
+
+def test_a_current_carries_ship_and_sea_along() -> None:
+    """Galilei: the same start through the water, in waves, wind off: heave, roll, pitch and course are the same."""
+    ship = SIX.with_values({"current.kind": "uniform", "wind.off": True})
+    zero, psi, V_c, beta_c = np.zeros(2), np.array([0.4, 0.4]), np.array([0.0, 1.5]), np.array([0.0, 2.2])
+    loads = wave_loads(ship, draw_components(Sea(**SEA), np.array([1.0, 1.0]), ["same", "same"]))
+    start = dict.fromkeys(dynamics(ship).state, zero) | {"psi": psi, "down": zero + 0.2, "theta": zero + 0.05}
+    start |= {"u": 3.0 + V_c * np.cos(beta_c - psi) * np.cos(0.05), "v": V_c * np.sin(beta_c - psi)}
+    start |= {"w": V_c * np.cos(beta_c - psi) * np.sin(0.05)}
+    orders = {name: zero + (2.0 if name.endswith("n") else 0.3) for name in dynamics(ship).commands}
+    path = rollout(
+        ship,
+        start,
+        orders,
+        {"V_c": V_c, "beta_c": beta_c},
+        step=0.05,
+        num_steps=600,
+        every=20,
+        method="rk4",
+        components=loads,
+    )
+    for name in ("down", "phi", "theta", "psi", "p", "q", "r"):
+        np.testing.assert_allclose(path[name][:, 0, 1], path[name][:, 0, 0], atol=1e-8, err_msg=name)
+    drift = V_c[1] * 30.0
+    np.testing.assert_allclose(path["north"][-1, 0, 1] - path["north"][-1, 0, 0], drift * np.cos(2.2), atol=1e-7)
