@@ -10,6 +10,7 @@ from shipid.report.content import Floats
 
 Node = tuple[int, int]
 Edge = frozenset[Node]
+FEWEST = 6  # rows or columns that are enough to smooth
 NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a contour may have
 
 
@@ -23,6 +24,24 @@ def nice_levels(values: Floats, most: int) -> list[float]:
     inside = [digit * 10.0**decade for decade in decades for digit in NICE if low < digit * 10.0**decade < high]
     chosen = np.linspace(0, len(inside) - 1, min(most, len(inside))).round().astype(int)
     return [inside[i] for i in chosen]
+
+
+def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
+    """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
+
+    What is not finite stays so and counts for nothing. A grid smaller than six rows or columns stays as it is along it.
+    """
+    finite = np.isfinite(values) & (values > 0)
+    total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
+    for axis, width in enumerate(radius):
+        count = values.shape[axis]
+        if count < FEWEST:
+            continue
+        distance = np.subtract.outer(np.arange(count), np.arange(count))
+        bell = np.exp(-((distance / width) ** 2) / 2)
+        total, weight = (np.moveaxis(np.tensordot(bell, part, (1, axis)), 0, axis) for part in (total, weight))
+    mean = np.exp(total / np.where(weight > 0, weight, 1.0))
+    return np.where(finite, mean, np.nan)
 
 
 def contour(x: Floats, y: Floats, values: Floats, level: float) -> list[Floats]:

@@ -11,7 +11,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
-from shipid.report.contours import contour, length, nice_levels
+from shipid.report.contours import contour, length, nice_levels, smoothed
 from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line
 from shipid.report.gain import unplotted
 from shipid.report.palette import GRID, INK, MUTED, level
@@ -21,6 +21,7 @@ from shipid.report.wording import counted, metres, number
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
 MARGIN = {"l": 52, "r": 12, "t": 12, "b": 44}
 MOST_LINES = 5
+NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
 SHORT = 12  # characters of a name at the axis
 CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
@@ -49,8 +50,9 @@ def error_map(content: ReportContent) -> Figure | None:
     spots = _spots(content, means, rows)
     span = (float(means.H.min()), float(means.H.max()))
     pieces = _pieces(rows, counts, spots)
-    lined = " Lines of equal error are linear between neighbouring cells that gave a result, and none is drawn beside "
-    lined += "one that did not; pieces shorter than the distance of two N_D are left out."
+    lined = " Lines of equal error follow H averaged over neighbouring models and N_D (where there are six or more of "
+    lined += "them), and none is drawn beside a cell without a result; pieces shorter than the distance of two N_D are "
+    lined += "left out."
     return Figure(
         id="map",
         title="Physics and data: the map",
@@ -134,12 +136,12 @@ def _pieces(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot]) -> lis
     values = np.full((len(rows), len(counts)), np.nan)
     for spot in spots:
         values[spot.row, list(counts).index(spot.size)] = spot.H
-    values = values[physics.index.to_numpy()]
+    mean = smoothed(values[physics.index.to_numpy()], NEIGHBOURS)
     x, y = np.asarray(counts, dtype=float), physics.y.to_numpy(dtype=float)
     return [
         (height, piece)
-        for height in nice_levels(values, MOST_LINES)
-        for piece in contour(x, y, values, height)
+        for height in nice_levels(mean, MOST_LINES)
+        for piece in contour(x, y, mean, height)
         if np.ptp(piece[:, 0]) >= np.diff(x).min()
     ]
 

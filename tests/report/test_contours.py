@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.contours import contour, length, nice_levels
+from shipid.report.contours import contour, length, nice_levels, smoothed
 
 X, Y = np.array([10.0, 20.0, 50.0, 100.0]), np.array([0.0, 1.0, 3.0])
 
@@ -50,3 +50,24 @@ def test_levels_are_round_and_inside():
     assert max(levels) < 12
     assert {float(f"{level:.2g}") for level in levels} == set(levels)
     assert nice_levels(np.array([np.nan, 1.0, 2.0]), 5) == []
+
+
+def test_smoothing_keeps_what_is_smooth_and_calms_what_is_not():
+    rng = np.random.default_rng(3)
+    flat = np.full((8, 9), 2.0)
+    np.testing.assert_allclose(smoothed(flat, (2.0, 1.0)), flat)
+    rough = flat * np.exp(0.2 * rng.normal(size=flat.shape))
+    calm = smoothed(rough, (2.0, 1.0))
+    assert np.std(np.log(calm)) < 0.5 * np.std(np.log(rough))
+    assert np.isclose(np.log(calm).mean(), np.log(rough).mean(), atol=0.03)
+
+
+def test_smoothing_neither_fills_gaps_nor_takes_from_them():
+    values = np.full((8, 9), 2.0)
+    values[3, 4] = np.nan
+    found = smoothed(values, (2.0, 1.0))
+    assert np.isnan(found[3, 4])
+    assert np.isnan(found).sum() == 1
+    np.testing.assert_allclose(found[np.isfinite(found)], 2.0)
+    few = np.arange(1.0, 13.0).reshape(3, 4)
+    np.testing.assert_allclose(smoothed(few, (2.0, 1.0)), few)
