@@ -47,6 +47,9 @@ def main() -> None:
         sys.exit(1)
     except BrokenPipeError:
         sys.exit(141)
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        sys.exit(130)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
         sys.exit(1)
@@ -105,6 +108,10 @@ def vessel_show(
         for path, key, block in term_blocks(document, off)
     ]
     _print(_table(["term", "kind", "source"], rows))
+    for path, _, block in term_blocks(document):
+        if "table" in block:
+            omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
+            typer.echo(f"{path}: {min(omega):g} to {max(omega):g} rad/s, {len(set(beta))} headings from 0 to 180 deg")
     _print(_table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
 
 

@@ -93,10 +93,17 @@ def leaves(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield from leaves(value, f"{prefix}.{key}" if prefix else str(key))
 
 
+def parts(path: str) -> list[str]:
+    """Keys of a dotted path; one in double quotes may hold dots: `truth.sensors."port.n".noise`."""
+    if '"' not in path:
+        return path.split(".")
+    return [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|([^."]+)', path)]
+
+
 def get(document: Any, path: str) -> Any:
     """Value at a dotted path; KeyError names the part that is missing."""
     value = document
-    for part in path.split("."):
+    for part in parts(path):
         if isinstance(value, list) and part.isdecimal() and int(part) < len(value):
             value = value[int(part)]
         elif isinstance(value, Mapping) and part in value:
@@ -110,7 +117,7 @@ def replace(document: Any, changes: Mapping[str, Any]) -> Any:
     """A copy of the document with the values at the given dotted paths replaced or added."""
     result = copy.deepcopy(document)
     for path, value in changes.items():
-        *parents, last = path.split(".")
+        *parents, last = parts(path)
         node = result
         for part in parents:
             node = node[int(part)] if isinstance(node, list) else node.setdefault(part, {})

@@ -115,3 +115,9 @@ def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, mes
     assert caught.value.path == path
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_quoted_key_may_hold_dots() -> None:
+    found = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
+    assert found == {"sensors": {"port.n": {"noise": 0.1}}}
+    assert documents.get(found, 'sensors."port.n".noise') == 0.1

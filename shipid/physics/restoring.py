@@ -16,8 +16,8 @@ def hydrostatic(
     A_wp: Annotated[SX, "m^2", POSITIVE],
     x_F: Annotated[SX, "m"],
     nabla: Annotated[SX, "m^3", POSITIVE],
-    GM_T: Annotated[SX, "m"],
-    GM_L: Annotated[SX, "m"],
+    GM_T: Annotated[SX, "m", POSITIVE],
+    GM_L: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
     g: Annotated[SX, "m s^-2", POSITIVE],
 ) -> SX:

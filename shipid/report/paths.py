@@ -265,7 +265,8 @@ def _takeaway(content: ReportContent, size: int) -> str:
     parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
     said = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
     return (
-        f"At the end of the horizon, N_D = {size}, the models drawn miss the true place on average: {'; '.join(said)}."
+        f"In the {counted(len(windows), 'window')} to look at, N_D = {size}, the models drawn miss the true place at "
+        f"the end of the horizon on average: {'; '.join(said)}."
     )
 
 

@@ -66,6 +66,11 @@ def perform(
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
     controls, weather = Controls.of(vessel), _weather(vessel, environment or {}, len(manoeuvres))
+    seas = {path: np.asarray(drawn) for path, drawn in (components or {}).items()}
+    short = next((path for path, drawn in seas.items() if len(drawn) != len(manoeuvres)), None)
+    if short is not None:
+        found = f"components of {short} are for {len(seas[short])} ships"
+        raise ShipidError(f"{found}, and there are {len(manoeuvres)} manoeuvres")
     groups: dict[Helmsman | None, dict[str, Manoeuvre]] = {}
     for name, own in zip(names, manoeuvres, strict=True):
         groups.setdefault(own.helmsman(controls), {})[name] = own
@@ -74,7 +79,7 @@ def perform(
     for helmsman, members in groups.items():
         chosen = [names.index(name) for name in members]
         here = {channel: values[chosen] for channel, values in weather.items()}
-        sea = {path: np.asarray(drawn)[chosen] for path, drawn in (components or {}).items()}
+        sea = {path: drawn[chosen] for path, drawn in seas.items()}
         frames |= _together(controls, helmsman, members, here, every, {**how, "components": sea})
     return pd.concat([frames[name] for name in names], ignore_index=True)
 
@@ -122,7 +127,11 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
         raise DocumentError(
             f"{vessel.name} feels no {unknown!r}: {choices(unknown, names)}", file=vessel.file, path="environment"
         )
-    return {name: np.array(np.broadcast_to(environment.get(name, 0.0), count), dtype=float) for name in names}
+    given = {name: np.asarray(environment.get(name, 0.0), dtype=float) for name in names}
+    for name, values in given.items():
+        if values.shape not in ((), (count,)):
+            raise ShipidError(f"environment {name!r} must be one value or {count}, one a manoeuvre: {values.shape}")
+    return {name: np.array(np.broadcast_to(values, count)) for name, values in given.items()}
 
 
 def _start(

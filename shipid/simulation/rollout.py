@@ -23,6 +23,7 @@ from shipid.vessel.load import Vessel
 Engine = Literal["auto", "casadi", "torch", "compiled", "native"]
 
 SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
+COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
 COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
@@ -112,7 +113,8 @@ def rollout(
     if unknown is not None:
         raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
     rows = [names.index(name) for name in kept]
-    work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1)
+    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
+    work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1) * weight
     chosen = _by_size(work, num_samples * len(values), device) if engine == "auto" else engine
     if num_samples == 0:
         raise ShipidError("a rollout needs at least one sample")

@@ -216,6 +216,11 @@ class Plan:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def standing(self) -> list[Vessel]:
+        """The vessel of the truth, if there is one, and those of the models."""
+        return [vessel for vessel in (self.truth, *(model.vessel for model in self.models)) if vessel is not None]
+
+    @property
     def digest(self) -> str:
         """Digest of the document, every vessel, the data's sources and the recipe in full: what results depend on."""
         return self._digest(self.document)
@@ -226,8 +231,7 @@ class Plan:
         return self._digest({key: value for key, value in self.document.items() if key != "seed"})
 
     def _digest(self, document: Document) -> str:
-        standing = [self.truth, *(model.vessel for model in self.models)]
-        vessels = sorted({vessel.digest for vessel in standing if vessel is not None})
+        vessels = sorted({vessel.digest for vessel in self.standing})
         depends = {"vessels": vessels, "sources": dict(self.sources), "recipe": self.recipe.model_dump()}
         return documents.digest({"study": document, **depends})
 

@@ -317,7 +317,7 @@ def provenance_words(results: Results) -> dict[str, str]:
     machine = record.get("machine", {})
     words = {
         "study": f"{results.plan.name}, digest {record['digest']}",
-        "vessels": "; ".join(sorted({f"{m.vessel.key} {m.vessel.digest}" for m in results.plan.models if m.vessel})),
+        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in results.plan.standing})),
         "data": _source_words(results.dataset.metadata.get("source", "")),
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
         "seeds": ", ".join(map(str, study.grid.seeds)),

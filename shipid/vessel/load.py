@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import pandas as pd
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
@@ -113,6 +112,8 @@ def _with_tables(document: Document, file: Path) -> Document:
 
 def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
     """Columns of a CSV file with a header; lines that begin with # are words."""
+    import pandas as pd  # most vessels have no table, and it takes its time
+
     try:
         frame = pd.read_csv(source, comment="#")
     except OSError:

@@ -21,6 +21,7 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform
+from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 
@@ -159,3 +160,30 @@ def test_a_run_that_diverges_is_named() -> None:
     ]
     with pytest.raises(ShipidError, match="diverges in wild: take a smaller step"):
         perform(wild, chosen, step=0.1)
+
+
+def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
+    """A sea for each manoeuvre: it moves the ship, starts at t = 0, and the helmsman sees the heading that it makes."""
+    ship = load_vessel("gunnerus-28.9-6dof")
+    sea = draw_components(Sea(H_s=1.0, T_p=5.0, components=20), np.array([0.5, 2.0]), ["a", "b"])
+    zigzags = [Zigzag(n_rpm=120, duration=60), Zigzag(n_rpm=140, duration=60)]
+    calm = perform(ship, zigzags, step=0.05, interval=0.5)
+    rough = perform(ship, zigzags, step=0.05, interval=0.5, components=wave_loads(ship, sea))
+    assert calm["z"].std() < 0.02 < 0.1 < rough["z"].std()
+    for _, run in rough.groupby("run"):
+        turned = run["psi"][np.flatnonzero(np.diff(np.sign(run["port.alpha"]))) + run.index[0]]
+        assert len(turned) >= 2
+        assert np.abs(np.abs(turned / DEGREE) - 20).max() < 3  # rows are 0.5 s apart
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"environment": {"V_w": [3.0, 4.0, 5.0]}}, "environment 'V_w' must be one value or 2"),
+        ({"components": {"waves.drift": np.zeros((1, 1, 41))}}, "for 1 ships, and there are 2 manoeuvres"),
+        ({"interval": 0.0}, "interval 0 s must be a multiple"),
+    ],
+)
+def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ShipidError, match=said):
+        perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], step=0.1, **given)
