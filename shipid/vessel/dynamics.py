@@ -25,6 +25,7 @@ ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
 ETA_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
+LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
 PLANE, HEAVE = (0, 1, 5), 2
 HELM = "helm"  # prefix of what a helmsman remembers
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
@@ -108,12 +109,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     terms = list(term_blocks(vessel.document))
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden(terms)
-    ordered = tuple(
-        f"{path.rsplit('.', 1)[-1]}.{signal}"
-        for path, key, _ in terms
-        for signal in signals(TERMS[key].function)
-        if signal in SIGNALS.commands
-    )
+    ordered = _orders_taken(terms)
     state, state_of = _symbols("state", [*names, *(name for own in hidden.values() for name in own)])
     commands, told = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
     environment, weather = _symbols("environment", _environment(vessel))
@@ -121,17 +117,16 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     bound = bindings(vessel.document)
 
-    helm: dict[str, SX] = {f"{HELM}.{name}": SX.sym(name) for name in (helmsman.memory if helmsman else ())}
-    orders, helm_after = dict(told), []
+    helm: dict[str, SX] = {name: SX.sym(name) for name in (helmsman.memory if helmsman else ())}
+    orders, helm_after = dict(told), list(helm.values())
     if helmsman:
         seen = {name: state_of[name] for name in names}
-        remembered = {name.removeprefix(f"{HELM}."): symbol for name, symbol in helm.items()}
-        orders = _ordered(helmsman, ordered, helmsman.orders(seen, told, remembered), vessel)
+        orders = _ordered(helmsman, ordered, helmsman.orders(seen, told, helm), vessel)
         if helmsman.advance:
-            after = helmsman.advance(seen, told, remembered, dt)
-            helm_after = [after[name] for name in remembered]
+            after = helmsman.advance(seen, told, helm, dt)
+            helm_after = [after[name] for name in helm]
     lags, actual, lags_after = _actuators(terms, bound, orders, value_of, dt)
-    memory = {**helm, **lags}
+    memory = {**{f"{HELM}.{name}": symbol for name, symbol in helm.items()}, **lags}
 
     eta, nu = SX(6, 1), SX(6, 1)
     for position, axis in enumerate(axes):
@@ -159,7 +154,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
 
     def function(name: str, result: SX, *extra: SX) -> ca.Function:
-        last = [entry.name() if entry.is_scalar() else "tau_extra" for entry in extra]
+        last = [LAST[name.split("_")[0]]] if extra else []
         return ca.Function(name, [*inputs, *extra], [ca.densify(result)], [*INPUTS, *last], ["result"], {"cse": True})
 
     return Dynamics(
@@ -167,29 +162,27 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         advance=function("advance", ca.vertcat(*helm_after, *lags_after), dt),
         orders=function("orders", ca.vertcat(*(orders[name] for name in ordered))),
         sums=tuple(
-            SumOverComponents(
-                path,
-                ca.Function(
-                    f"sum_{i}",
-                    [*inputs, entry],
-                    [ca.densify(wrench[rows])],
-                    [*INPUTS, "component"],
-                    ["tau"],
-                    {"cse": True},
-                ),
-                widths,
-                arrays,
-            )
+            SumOverComponents(path, function(f"sum_{i}", wrench[rows], entry), widths, arrays)
             for i, (path, entry, wrench, widths, arrays) in enumerate(mapped)
         ),
         state=names,
         hidden=tuple(name for entries in hidden.values() for name in entries),
-        memory={name: "-" if name in helm else _command_unit(name) for name in memory},
+        memory={name: _command_unit(name) if name in lags else "-" for name in memory},
         commands=tuple(told),
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
         ordered=ordered,
         helmsman=helmsman,
+    )
+
+
+def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[str, ...]:
+    """Commands that terms ask for, by the last name of their block: `port.n`."""
+    return tuple(
+        f"{path.rsplit('.', 1)[-1]}.{signal}"
+        for path, key, _ in terms
+        for signal in signals(TERMS[key].function)
+        if signal in SIGNALS.commands
     )
 
 
