@@ -49,6 +49,7 @@ def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...]
     """Lower the functions of a vessel's structure and put the integrator around them."""
     functions = [lower(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
     num_drawn, speeds = len(model.drawn), slice(model.num_dof, 2 * model.num_dof)
+    fixed = [None if term.arrays is None else torch.tensor(term.arrays.T) for term in model.sums]
 
     def parameters_stage(parameters: torch.Tensor) -> list[torch.Tensor]:
         return [function.early[0](parameters) for function in functions]
@@ -66,9 +67,9 @@ def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...]
     def rates(state: torch.Tensor, memory: torch.Tensor, tau: torch.Tensor, *rest: torch.Tensor) -> torch.Tensor:
         drawn, saved = list(rest[:num_drawn]), saved_of(rest[num_drawn:])
         total = list(tau)
-        for term, function, early in zip(model.sums, functions[2:], saved[2:], strict=True):
+        for arrays, function, early in zip(fixed, functions[2:], saved[2:], strict=True):
             wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory)]
-            entries = drawn.pop(0) if term.arrays is None else torch.tensor(term.arrays.T).to(tau)
+            entries = drawn.pop(0) if arrays is None else arrays.to(tau)
             wrench = function.main(*wide, entries, *(part.unsqueeze(-1) for part in early))
             total = [a + _sum(b, entries.shape[-1]) for a, b in zip(total, wrench, strict=True)]
         return _stacked(functions[0].main(state, memory, total, *saved[0]), state)
