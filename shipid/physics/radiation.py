@@ -52,7 +52,7 @@ def heave_pitch(
     K55_cos: Annotated[list[SX], "kg m^2 s^-2"],
     K55_sin: Annotated[list[SX], "kg m^2 s^-2"],
 ) -> SX:
-    """Wrench (6) of heave and pitch radiation; states (4 modes) are driven by heave rate and pitch rate.
+    """Wrench (6) of heave and pitch radiation; states (4 x modes) [m, rad] are driven by heave rate and pitch rate.
 
     K_ij : force i by velocity j, and the other way round, the a (`cos`) and b (`sin`) of each mode.
     """
@@ -88,7 +88,7 @@ def roll(
     K44_cos: Annotated[list[SX], "kg m^2 s^-2"],
     K44_sin: Annotated[list[SX], "kg m^2 s^-2"],
 ) -> SX:
-    """Wrench (6) of roll radiation; states (2 modes) are driven by the roll rate."""
+    """Wrench (6) of roll radiation; states (2 x modes) [rad] are driven by the roll rate."""
     return vector(0, 0, 0, -kernel_force(state, K44_cos, K44_sin), 0, 0)
 
 

@@ -62,8 +62,9 @@ def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsi
     """Wrench (6) of one component: Re F(omega, beta) a exp(i(omega t - k(N cos chi + E sin chi) + epsilon)).
 
     The phase is that at the ship's own position in the water, which a current carries along; so her speed through the
-    water enters as the frequency of encounter. The transfer function is that of the wave's own frequency. real, imag
-    (6 series, one after the other): Fourier coefficients of a F.
+    water enters as the frequency of encounter. The transfer function is that of the wave's own frequency. omega
+    [rad/s]; k [rad/m]; c_chi, s_chi: cosine and sine of the direction of travel; epsilon [rad] at the origin at t = 0;
+    real, imag (6 series, one after the other): Fourier coefficients of a F [N, N m].
     """
     phase = omega * state[0] - k * (c_chi * (eta[0] - state[1]) + s_chi * (eta[1] - state[2])) + epsilon
     c, s = ca.cos(phase), ca.sin(phase)
@@ -84,7 +85,7 @@ def _series(coefficients: SX, basis: list[SX]) -> SX:
 def drift(eta: SX, c_chi: SX, s_chi: SX, drift: SX) -> SX:
     """Wrench (6) of the mean drift force of one direction of waves: surge, sway and yaw.
 
-    drift (3 series, one after the other): Fourier coefficients of the sum of a^2 D(omega, beta).
+    drift (3 series, one after the other): Fourier coefficients of the sum of a^2 D(omega, beta) [N, N m].
     """
     count = drift.numel() // 3
     cosines, sines = multiples(*relative_heading(eta[5], c_chi, s_chi), count - 1)

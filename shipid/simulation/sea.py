@@ -13,7 +13,7 @@ from shipid.vessel.perturb import uniform
 from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
-GRAVITY = 9.81  # m/s^2: dispersion in deep water, k = omega^2 / g
+GRAVITY = 9.81  # m/s^2, where a vessel does not say: dispersion in deep water, k = omega^2 / g
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
 SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # even or odd in the relative heading
 
@@ -101,13 +101,14 @@ def wave_loads(vessel: Vessel, drawn: Mapping[str, Array]) -> dict[str, Array]:
     found = {}
     for path, key, block in term_blocks(vessel.document):
         if key == "waves.first_order":
-            found[path] = _first_order(block, drawn)
+            g = vessel.document.get("constants", {}).get("g", GRAVITY)
+            found[path] = _first_order(block, drawn, g)
         elif key == "waves.drift":
             found[path] = _drift(block, drawn)
     return found
 
 
-def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
+def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array], g: float) -> Array:
     columns = {name: np.asarray(values) for name, values in block["table"].items()}
     series = [
         fourier(columns, columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"], SIDE[axis], block["harmonics"])
@@ -116,7 +117,7 @@ def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
     omega, grid = drawn["omega"], np.unique(columns["omega"])
     own = [interpolate(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
     coefficients = np.concatenate(own, axis=-1)
-    head = (omega, omega**2 / GRAVITY, np.cos(drawn["chi"]), np.sin(drawn["chi"]), drawn["epsilon"])
+    head = (omega, omega**2 / g, np.cos(drawn["chi"]), np.sin(drawn["chi"]), drawn["epsilon"])
     return np.concatenate([np.stack(head, axis=-1), coefficients.real, coefficients.imag], axis=-1)
 
 

@@ -71,23 +71,28 @@ class Truth(BaseModel):
 def check_truth(truth: Truth, vessel: Vessel) -> None:
     """Refuse what this vessel cannot do: waves, current or gusts that act on no term, or a sea beyond its tables."""
     model = dynamics(vessel)
-    if truth.waves is not None and not model.drawn:
-        raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
+    if truth.waves is not None:
+        _check_sea(truth, truth.waves, vessel)
     if truth.current_speed != (0.0, 0.0) and "V_c" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
     if truth.gusts is not None and "V_w" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
-    if truth.waves is not None:
-        low, high = table_range(vessel)
-        lost = share_outside(truth.waves, low, high)
-        if lost > MOST_LOST:
-            message = f"{truth.waves.T_p:g} s: {lost:.0%} of the sea's energy lies outside the tables of {truth.vessel}"
-            raise DocumentError(f"{message}, {low:g} to {high:g} rad/s", path="truth.waves.T_p")
     columns = [_column(name) for name in model.state]
     columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment)]
     unknown = next((name for name in truth.sensors if name not in columns), None)
     if unknown is not None:
         raise DocumentError(f"no column that is measured: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
+
+
+def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
+    if not dynamics(vessel).drawn:
+        raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
+    low, high = table_range(vessel)
+    lost = share_outside(sea, low, high)
+    if lost > MOST_LOST:
+        message = f"{sea.T_p:g} s: {lost:.0%} of the sea's energy lies outside the tables of {truth.vessel}"
+        remedy = f"{low:g} to {high:g} rad/s; at most {MOST_LOST:.0%} may"
+        raise DocumentError(f"{message}, {remedy}", path="truth.waves.T_p")
 
 
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
