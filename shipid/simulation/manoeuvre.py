@@ -5,6 +5,7 @@ Helm angles are counted by what they do: helm > 0 turns the ship to starboard, w
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
@@ -17,20 +18,19 @@ from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
+from shipid.simulation.truth import DEGREE, RPM
 
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
-RPM = 1 / 60
-DEGREE = np.pi / 180
 HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 
-class Manoeuvre(BaseModel):
+class Manoeuvre(BaseModel, ABC):
     """What all kinds share: the approach, at whose end the log begins with t = 0."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -42,9 +42,9 @@ class Manoeuvre(BaseModel):
     course_deg: Annotated[FiniteFloat, Field(description="deg, heading at t = 0")] = 0.0
 
     @property
+    @abstractmethod
     def length(self) -> float:
         """Length of the log [s]."""
-        raise NotImplementedError
 
     def shaft(self, t: Array) -> Array:
         """Ordered shaft speed [rev/s] at times (T,) [s]."""

@@ -13,9 +13,9 @@ from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
 from shipid.simulation.integrate import Method
-from shipid.simulation.manoeuvre import DEGREE, RPM, Manoeuvre
+from shipid.simulation.manoeuvre import Manoeuvre
 from shipid.simulation.rollout import Engine, Trajectories, rollout
-from shipid.simulation.truth import ON_BOARD, logged, run_names
+from shipid.simulation.truth import DEGREE, ON_BOARD, RPM, logged, run_names
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 

@@ -12,7 +12,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from shipid.errors import DocumentError
 from shipid.simulation.manoeuvre import (
-    DEGREE,
     AnyManoeuvre,
     CrashStop,
     Excitation,
@@ -26,6 +25,7 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform
+from shipid.simulation.truth import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 

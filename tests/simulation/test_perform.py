@@ -11,7 +11,6 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, ShipidError
 from shipid.simulation.manoeuvre import (
-    DEGREE,
     CrashStop,
     Manoeuvre,
     ReverseSpiral,
@@ -22,6 +21,7 @@ from shipid.simulation.manoeuvre import (
 )
 from shipid.simulation.perform import perform
 from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.truth import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 

@@ -29,6 +29,13 @@ def first_rows(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[frame["t"] == 0.0].reset_index(drop=True)
 
 
+def planar_rates(run: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Rates of position and heading that the logged u, v and r mean."""
+    psi, u, v = (run[name].to_numpy() for name in ("psi", "u", "v"))
+    north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    return {"north": north, "east": east, "psi": run["r"].to_numpy()}
+
+
 def test_more_manoeuvres_change_none_that_exist() -> None:
     few, many = simulate(truth(), SHIP), simulate(truth(manoeuvres=12), SHIP)
     assert many["run"].nunique() == 12
@@ -74,12 +81,8 @@ def test_log_obeys_kinematics() -> None:
     """Positions are the integral of the logged velocities: trapezoid on a fine log."""
     frame = simulate(truth(interval=0.1, duration=8.0, start_speed=(1.0, 3.0)), SHIP)
     for _, run in frame.groupby("run"):
-        t, psi, u, v = (run[name].to_numpy() for name in ("t", "psi", "u", "v"))
-        for name, rate in (
-            ("north", u * np.cos(psi) - v * np.sin(psi)),
-            ("east", u * np.sin(psi) + v * np.cos(psi)),
-            ("psi", run["r"].to_numpy()),
-        ):
+        t = run["t"].to_numpy()
+        for name, rate in planar_rates(run).items():
             moved = np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
             assert run[name].iloc[-1] - run[name].iloc[0] == pytest.approx(moved, abs=2e-3)
 
@@ -155,12 +158,8 @@ def test_the_log_of_a_rolling_ship_obeys_planar_kinematics() -> None:
     frame = simulate(truth(duration=20.0, interval=0.1, waves={**SEA, "H_s": 2.0}), SIX)
     assert frame["phi"].abs().max() > 0.05
     for _, run in frame.groupby("run"):
-        t, psi, u, v = (run[name].to_numpy() for name in ("t", "psi", "u", "v"))
-        for name, rate in (
-            ("north", u * np.cos(psi) - v * np.sin(psi)),
-            ("east", u * np.sin(psi) + v * np.cos(psi)),
-            ("psi", run["r"].to_numpy()),
-        ):
+        t = run["t"].to_numpy()
+        for name, rate in planar_rates(run).items():
             moved = np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
             np.testing.assert_allclose(run[name].to_numpy()[1:] - run[name].iloc[0], moved, atol=3e-3)
 
