@@ -1,0 +1,130 @@
+"""The recipe `paper` on cells of experiment 1: slow, so run once, piece by piece, and kept beside this file.
+
+`python -m tests.benchmarks.yardstick` goes on where it was stopped: every trained network is kept in
+`results/yardstick` until its cell is done, and finished cells are added to `yardstick.json`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pickle
+import subprocess
+import time
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipid.estimation import tuning
+from shipid.estimation.recipe import Recipe
+from shipid.estimation.training import use_threads
+from shipid.metrics import position_error, summary
+from shipid.study.plan import Batch, Plan, read_plan
+from shipid.study.prepare import Prepared, obtain, prepare
+from shipid.study.run import machine
+
+KEPT = Path(__file__).with_suffix(".json")
+PIECES = Path("results/yardstick")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of the study `simulation` in a world of its own (top-level `seed`)."""
+
+    world: int
+    N_D: int
+    model: str
+
+    @property
+    def name(self) -> str:
+        """File-safe name."""
+        return f"world-{self.world}-N{self.N_D:03d}-{self.model}"
+
+
+CELLS = (  # spanning N_D and A; worlds that no recipe was chosen on
+    Cell(5, 10, "moderate-1"),
+    Cell(6, 10, "high-1"),
+    Cell(7, 10, "none"),
+    Cell(8, 30, "moderate-2"),
+    Cell(9, 10, "nominal"),
+    Cell(9, 30, "high-2"),
+    Cell(5, 100, "moderate-3"),
+    Cell(7, 30, "nominal"),
+    Cell(6, 100, "high-3"),
+    Cell(8, 100, "none"),
+)
+
+
+def world(number: int) -> tuple[Plan, Prepared]:
+    """The study `simulation` in a world: its plan and all that its cells need."""
+    plan = read_plan("simulation", {"seed": number})
+    return plan, prepare(plan, obtain(plan))
+
+
+def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, recipe: Recipe) -> dict[str, Any]:
+    """Tune one cell alone, on one thread: core-seconds, H and H_90 [m], and its trials."""
+    batch = Batch(cell.N_D, plan.batches[0].seed)
+    mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
+    windows = prepared.pool.select(mask)
+    targets = {cell.model: windows.future - prepared.pool_paths[cell.model][:, mask]}
+    folds = prepared.folds(plan, batch, windows)
+    start = time.process_time()
+    found = tuning.tune(windows.columns, prepared.commands, targets, folds, recipe, batch.seed)[cell.model]
+    seconds = time.process_time() - start
+    assert found.compensator is not None
+    paths = prepared.test_paths[cell.model] + found.compensator.predict(prepared.test.columns)
+    error = summary(position_error(paths, prepared.test.future))
+    alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
+    row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
+    chosen = dict(found.compensator.hyperparameters)
+    return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": found.trials}
+
+
+def main() -> None:
+    """Run the cells that are not kept yet."""
+    use_threads(1)
+    done = json.loads(KEPT.read_text()) if KEPT.exists() else []
+    finished = {(row["world"], row["N_D"], row["model"]) for row in done}
+    for cell in CELLS:
+        if (cell.world, cell.N_D, cell.model) in finished:
+            continue
+        plan, prepared = world(cell.world)
+        spent = _remember(PIECES / cell.name)
+        row = tune_cell(plan, prepared, cell, Recipe.preset("paper"))
+        row |= {"core_seconds": sum(spent), "machine": machine(), "date": date.today().isoformat(), "commit": _commit()}
+        done.append(row)
+        KEPT.write_text(json.dumps(done, indent=1) + "\n")
+        print(f"{cell.name}: {row['core_seconds']:.0f} core-seconds, {len(row['trials'])} trials", flush=True)
+
+
+def _remember(folder: Path) -> list[float]:
+    """Keep every network that `tune` trains, so that it is trained once; returns the core-seconds as they add up."""
+    folder.mkdir(parents=True, exist_ok=True)
+    train = getattr(tuning._fit, "__wrapped__", tuning._fit)
+    spent: list[float] = []
+
+    def kept(data: Any, stack: Any, recipe: Recipe, entropy: tuple[int, ...], device: str) -> Any:
+        words = json.dumps([entropy, {key: dict(values) for key, values in stack.items()}], sort_keys=True)
+        file = folder / f"{entropy[1]:02d}-{hashlib.sha256(words.encode()).hexdigest()[:12]}.pickle"
+        if not file.exists():
+            start = time.process_time()
+            result = train(data, stack, recipe, entropy, device)
+            file.write_bytes(pickle.dumps((time.process_time() - start, result)))
+        seconds, result = pickle.loads(file.read_bytes())
+        spent.append(seconds)
+        return result
+
+    kept.__wrapped__ = train  # type: ignore[attr-defined]
+    tuning._fit = kept
+    return spent
+
+
+def _commit() -> str:
+    return subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+
+
+if __name__ == "__main__":
+    main()
