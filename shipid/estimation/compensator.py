@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from shipid.errors import DataError, ResultError
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Layers = tuple[tuple[Array, Array], ...]
 MOTIONS = ("u", "v", "r")
 TOLERANCE = 1e-9  # two columns that differ by less, relative to their size, are one column written twice
@@ -98,19 +99,19 @@ class Normaliser:
 
 @dataclass(frozen=True)
 class Network:
-    """One trained network with what belongs to its data: inputs, statistics, scale of its targets.
+    """One trained network with what belongs to its data: inputs, statistics, shapes of its outputs.
 
     Parameters
     ----------
     features : name of each input -> the columns that were equal to it in training.
     normaliser : z-score of those inputs.
-    scale : (T, 2) [m] that one unit of each output stands for.
-    layers : (weight (i, o), bias (o,)) of each layer; outputs are x_1 ... x_T, y_1 ... y_T.
+    basis : (T, r) shapes over the horizon [m] that the outputs weigh; the identity where each step has its own output.
+    layers : (weight (i, o), bias (o,)) of each layer; outputs are x_1 ... x_r, y_1 ... y_r.
     """
 
     features: Mapping[str, tuple[str, ...]]
     normaliser: Normaliser
-    scale: Array
+    basis: Array
     layers: Layers
 
     def predict(self, table: Mapping[str, Array]) -> Array:
@@ -119,7 +120,7 @@ class Network:
         *hidden, (weight, bias) = self.layers
         for w, b in hidden:
             h = np.tanh(h @ w + b)
-        return unflatten(h @ weight + bias) * self.scale[:, None, :]
+        return np.tensordot(self.basis, unflatten(h @ weight + bias), 1)
 
 
 @dataclass(frozen=True)
@@ -161,13 +162,13 @@ class Compensator:
         }
 
     def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.mean`, `0.std`, `0.scale`, `0.weight.0`, `0.bias.0`, ..."""
+        """Return all arrays by flat names: `0.mean`, `0.std`, `0.basis`, `0.weight.0`, `0.bias.0`, ..."""
         flat: dict[str, Array] = {}
         for i, network in enumerate(self.networks):
             flat |= {
                 f"{i}.mean": network.normaliser.mean,
                 f"{i}.std": network.normaliser.std,
-                f"{i}.scale": network.scale,
+                f"{i}.basis": network.basis,
             }
             for j, (weight, bias) in enumerate(network.layers):
                 flat |= {f"{i}.weight.{j}": weight, f"{i}.bias.{j}": bias}
@@ -182,11 +183,27 @@ class Compensator:
                 features = {k: tuple(v) for k, v in entry["features"].items()}
                 layers = tuple((arrays[f"{i}.weight.{j}"], arrays[f"{i}.bias.{j}"]) for j in range(entry["layers"]))
                 normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])
-                networks.append(Network(features, normaliser, arrays[f"{i}.scale"], layers))
+                networks.append(Network(features, normaliser, arrays[f"{i}.basis"], layers))
                 _check(networks[-1], i)
             return cls(tuple(header["commands"]), tuple(networks), dict(header["hyperparameters"]))
         except KeyError as error:
             raise ResultError("missing in the saved compensator", path=str(error.args[0])) from None
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What tuning found for one model.
+
+    Parameters
+    ----------
+    compensator : the best; None where every trial diverged (targets that are not numbers).
+    trials : a row each: number, params, value [m^2], epochs, seconds, state (`complete` or `diverged`).
+    seconds : time spent on this model, its share of each stack.
+    """
+
+    compensator: Compensator | None
+    trials: list[dict[str, Any]]
+    seconds: float
 
 
 def _check(network: Network, index: int) -> None:
@@ -195,7 +212,7 @@ def _check(network: Network, index: int) -> None:
     expected = [((i, o), (o,)) for i, o in pairwise(widths)]
     shapes = [(weight.shape, bias.shape) for weight, bias in network.layers]
     statistics = {network.normaliser.mean.shape, network.normaliser.std.shape}
-    if shapes != expected or statistics != {(widths[0],)} or network.scale.shape != (widths[-1] // 2, 2):
+    if shapes != expected or statistics != {(widths[0],)} or network.basis.shape[1:] != (widths[-1] // 2,):
         raise ResultError("the arrays of the saved compensator do not fit together", path=f"networks.{index}")
 
 

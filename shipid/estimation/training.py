@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, pi
 
 import numpy as np
 import torch
@@ -25,23 +24,21 @@ Stack = Sequence[tuple[Tensor, Tensor]]
 Masks = Sequence[Tensor | None]
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's defaults
-WARM_UP, START, END = 0.3, 1 / 25, 1 / 25e4  # shape of the one-cycle rate, as PyTorch's OneCycleLR
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Structure and schedule shared by a stack, and the hyperparameters of each of its K members.
+    """Structure and length shared by a stack, and the hyperparameters of each of its K members.
 
     Parameters
     ----------
     layers, units : hidden layers of tanh, and the one width of all of them.
-    learning_rate : (K,) peak rate of each member.
+    learning_rate : (K,) rate of each member.
     weight_decay : (K,) decoupled decay (AdamW); 0 is Adam.
     input_dropout, hidden_dropout : (K,) probability in [0, 1] that an input or a hidden unit is dropped.
     epochs : at most so many passes over the training samples.
     batch : samples per optimiser step; 0 = all of them.
     patience : epochs without a better validation loss after which a member stops; 0 = it never does.
-    one_cycle : anneal the rate up and down once over all epochs; False = constant.
     """
 
     layers: int
@@ -53,17 +50,16 @@ class Settings:
     epochs: int
     batch: int = 0
     patience: int = 0
-    one_cycle: bool = False
 
 
 @dataclass(frozen=True)
 class Trained:
-    """What a stack of K members learned: the weights of its best epoch, or of the last where nothing was watched.
+    """What a stack of K members learned: the weights of its best epoch.
 
     Parameters
     ----------
     layers : K tuples of (weight (i, o), bias (o,)) per layer.
-    loss : (K,) best validation loss [m^2], per coordinate; NaN where nothing was watched.
+    loss : (K,) best validation loss [m^2], per coordinate; NaN where it never was a number.
     epochs : (K,) epochs until the member stopped.
     status : K times `ok`, or `diverged` where a loss stopped being a number.
     """
@@ -78,24 +74,22 @@ def train(
     inputs: Array,
     targets: Array,
     train_idx: NDArray[np.int64],
-    val_idx: NDArray[np.int64] | None,
+    val_idx: NDArray[np.int64],
     settings: Settings,
     seeds: Sequence[int],
     *,
-    scale: Array | None = None,
     order_seed: int = 0,
     device: str = "cpu",
 ) -> Trained:
-    """Train K networks, sample -> target / scale, on the mean squared error of the scaled targets.
+    """Train K networks, sample -> target, on the mean squared error.
 
     Parameters
     ----------
     inputs : (n, d), normalised; the same for all members.
     targets : (K, n, m) [m].
-    train_idx, val_idx : samples to learn from, and to watch; None = watch nothing and keep the last weights.
+    train_idx, val_idx : samples to learn from, and to watch.
     settings : structure and hyperparameters.
     seeds : (K,) of the initial weights and drop-out of each member.
-    scale : (K, m) [m], ones by default.
     order_seed : of the order of the samples in batches, the same for all members.
     device : a PyTorch device; random numbers are drawn on the CPU, hence the same everywhere.
 
@@ -105,10 +99,8 @@ def train(
     """
     num_members, num_samples = len(targets), len(train_idx)
     widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]
-    unit = _tensor(np.ones(targets[:, 0].shape) if scale is None else scale, device)[:, None]
-    x, y = _tensor(inputs[train_idx], device), _tensor(targets[:, train_idx], device) / unit
-    if val_idx is not None:
-        x_val, y_val = _tensor(inputs[val_idx], device), _tensor(targets[:, val_idx], device)
+    x, y = _tensor(inputs[train_idx], device), _tensor(targets[:, train_idx], device)
+    x_val, y_val = _tensor(inputs[val_idx], device), _tensor(targets[:, val_idx], device)
 
     generators = [torch.Generator().manual_seed(int(seed)) for seed in seeds]
     order = torch.Generator().manual_seed(order_seed)
@@ -119,19 +111,14 @@ def train(
     watch = _Watch(weights, settings.patience)
 
     batch = min(settings.batch or num_samples, num_samples)
-    num_steps = settings.epochs * -(-num_samples // batch)
     for _ in range(settings.epochs):
         total = torch.zeros(num_members, device=device)
         for rows in _batches(num_samples, batch, order):
             x_batch, y_batch = x[rows], y[:, rows]
             masks = _masks(len(x_batch), widths, settings, generators, device)
-            factor = one_cycle(adam.count, num_steps) if settings.one_cycle else 1.0
-            total += _step(x_batch, y_batch, layers, masks, adam, rate * factor)
+            total += _step(x_batch, y_batch, layers, masks, adam, rate)
         with torch.no_grad():
-            if val_idx is None:
-                watch.follow(total)
-            else:
-                watch.compare(total, (forward(x_val, layers) * unit - y_val).square().mean(dim=(1, 2)))
+            watch.compare(total, (forward(x_val, layers) - y_val).square().mean(dim=(1, 2)))
         if not watch.running.any():
             break
     return watch.result(widths)
@@ -193,16 +180,6 @@ class Adam:
         self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
 
 
-def one_cycle(step: int, num_steps: int) -> float:
-    """Return the factor on the peak rate: a cosine from 1/25 to 1 in the first 30 %, then to 4e-6 (Smith, 2018)."""
-    peak, last = WARM_UP * num_steps - 1, num_steps - 1
-    if step <= peak:
-        start, end, share = START, 1.0, step / peak
-    else:
-        start, end, share = 1.0, END, (step - peak) / (last - peak)
-    return end + (start - end) * (1 + cos(pi * share)) / 2
-
-
 class _Watch:
     """Keeps the best weights of each member and decides who is still running."""
 
@@ -215,25 +192,17 @@ class _Watch:
         self.running = torch.ones(num_members, dtype=torch.bool, device=device)
         self.finite = torch.ones(num_members, dtype=torch.bool, device=device)
 
-    def follow(self, training: Tensor) -> None:
-        """Judge an epoch without validation: keep the weights of all whose training loss (K,) is a number."""
-        self._judge(training)
-        self.kept = torch.where(self.running[:, None], self.weights, self.kept)
-
     def compare(self, training: Tensor, validation: Tensor) -> None:
         """Judge an epoch by validation loss (K,): keep better weights; who has waited too long stops for good."""
-        self._judge(training + validation)
+        self.epochs += self.running
+        self.finite &= (training + validation).isfinite() | ~self.running
+        self.running &= self.finite
         better = self.running & (validation < self.best)
         self.best = torch.where(better, validation, self.best)
         self.kept = torch.where(better[:, None], self.weights, self.kept)
         self.waited = torch.where(better, 0, self.waited + 1)
         if self.patience:
             self.running &= self.waited < self.patience
-
-    def _judge(self, loss: Tensor) -> None:
-        self.epochs += self.running
-        self.finite &= loss.isfinite() | ~self.running
-        self.running &= self.finite
 
     def result(self, widths: Sequence[int]) -> Trained:
         layers = [

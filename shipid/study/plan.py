@@ -16,7 +16,7 @@ from shipid.data.importing import sha256_of
 from shipid.data.mapping import read_mapping
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
-from shipid.estimation.tuning import Recipe
+from shipid.estimation.recipe import Recipe
 from shipid.simulation.truth import Truth, check_truth
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
@@ -381,11 +381,11 @@ def _recipe(study: Study, file: Path) -> Recipe:
     """The named recipe with the changes of its block."""
     block = dict(study.recipe)
     kind = str(block.pop("kind", "fast"))
-    unknown = next((key for key in block if key not in Recipe.model_fields), None)
-    if unknown is not None:
-        hint = choices(unknown, Recipe.model_fields)
-        raise DocumentError(f"unknown key: {hint}", file=file, path=f"recipe.{unknown}")
     try:
+        fields = Recipe.kind(kind).model_fields
+        unknown = next((key for key in block if key not in fields), None)
+        if unknown is not None:
+            raise DocumentError(f"unknown key of {kind!r}: {choices(unknown, fields)}", path=f"recipe.{unknown}")
         return Recipe.preset(kind, **block)
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None

@@ -17,6 +17,7 @@ from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
 from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, split_folds, split_runs
 from shipid.errors import DataError, DocumentError, choices
+from shipid.estimation.recipe import RidgeRecipe
 from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
 from shipid.simulation.scan import memory_along
@@ -62,9 +63,15 @@ class Prepared:
         return nested(plan, self.pool, batch)
 
     def folds(self, plan: Plan, batch: Batch, windows: Windows) -> list[tuple[Array, Array]]:
-        """(Training, validation) indices into the windows of a batch, split by run, sharing no moment."""
+        """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
+
+        A recipe in closed form leaves out every run in turn; others follow the study's `split`.
+        """
         runs, num_folds = self.runs(plan, batch), plan.study.split.folds
-        if num_folds == 1:
+        held_out: list[tuple[str, ...]]
+        if isinstance(plan.recipe, RidgeRecipe):
+            held_out = [(run,) for run in runs]
+        elif num_folds == 1:
             held_out = [split_runs(runs, VALIDATION_SHARE, batch.seed)[1]]
         else:
             held_out = list(split_folds(runs, min(num_folds, len(runs)), batch.seed))
