@@ -276,7 +276,7 @@ def study_screen(
     _print(_table(["family", "members", "diverged", *shares], rows))
     found = screen.drivers(frame)
     typer.echo("what drives A: rank correlation with a factor, and with its distance from 1:")
-    pairs = [(row.family, row.paths, f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in found.itertuples()]
+    pairs = [(str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in found.itertuples()]
     _print(_table(["family", "parameter", "factor", "distance"], pairs))
     typer.echo(f"{len(frame)} members -> {file}")
 

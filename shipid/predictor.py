@@ -144,7 +144,7 @@ def physics_paths(
     """
     found = rollout(
         vessel,
-        **_instants(vessel, columns),
+        *_instants(vessel, columns),
         step=step,
         num_steps=horizon,
         method=method,  # type: ignore[arg-type]
@@ -178,8 +178,8 @@ def physics_distances(
     origin = (columns.get(name, np.zeros(future.shape[1])) for name in ("north", "east", "psi"))
     return distances(
         vessel,
-        **_instants(vessel, columns),
-        goal=np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1),
+        *_instants(vessel, columns),
+        np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1),
         step=step,
         method=method,  # type: ignore[arg-type]
         parameters=parameters,
@@ -189,14 +189,16 @@ def physics_distances(
     )
 
 
-def _instants(vessel: Vessel, columns: Mapping[str, Array]) -> dict[str, Mapping[str, Array]]:
+def _instants(
+    vessel: Vessel, columns: Mapping[str, Array]
+) -> tuple[dict[str, Array], Mapping[str, Array], dict[str, Array]]:
     """Start, commands and environment of a rollout from columns (S,); what is not there is zero."""
     model = dynamics(vessel)
     zero = np.zeros(len(columns["u"]))
     columns = {"down": columns.get("z", zero), **columns}
     start = {name: columns.get(name, zero) for name in model.state}
     environment = {name: columns.get(name, zero) for name in model.environment}
-    return {"start": start, "commands": columns, "environment": environment}
+    return start, columns, environment
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:

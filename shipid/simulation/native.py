@@ -427,7 +427,8 @@ def _width(batch: Batch) -> int:
 
 def _parts(batch: Batch) -> int:
     """Into how many parts the samples go, so that all threads are busy to the end."""
-    return min(-(-4 * cores() // len(batch.parameters)), _width(batch) // target().lanes)
+    num_variants, groups = len(batch.parameters), _width(batch) // target().lanes
+    return min(-(-4 * cores() // num_variants), groups)
 
 
 def _run(

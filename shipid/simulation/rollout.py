@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from shipid.errors import DataError, ShipidError, choices
-from shipid.metrics import tally as tally_of
+from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
 from shipid.simulation.integrate import Array, Batch, Method
 from shipid.simulation.native import compiler, measure_native, run_native
@@ -150,8 +150,8 @@ def distances(
     rows = [model.state.index("north"), model.state.index("east")]
     if chosen == "native":
         there = goal.transpose(0, 2, 1)
-        total, tally, worst = measure_native(model, batch, step, num_steps, method, rows, there)
-        return Distances(total, tally, ~(worst <= SPEED_LIMIT) | ~_finite(batch))
+        total, counts, worst = measure_native(model, batch, step, num_steps, method, rows, there)
+        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~_finite(batch))
     few = max(1, PATHS_KEPT // goal.size)
     found = []
     for first in range(0, len(batch.parameters), few):
@@ -160,8 +160,8 @@ def distances(
             parameters=batch.parameters[first : first + few], keep=("north", "east"), engine=chosen, device=device,
         )  # fmt: skip
         with np.errstate(all="ignore"):
-            apart = np.sqrt(np.square(part.states[1:] - goal[:, None]).sum(axis=-1))
-            found.append((apart.sum(axis=0), np.array([tally_of(own) for own in apart.swapaxes(0, 1)]), part.diverged))
+            apart = [position_error(part.states[1:, own], goal) for own in range(part.states.shape[1])]
+        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), part.diverged))
     return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 

@@ -16,6 +16,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DocumentError, choices
 from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.predictor import check_columns, physics_distances
+from shipid.simulation.native import compiler
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, window_memory
 from shipid.vessel.load import Vessel
@@ -35,12 +36,14 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
         for family in resolve(plan.study.family, plan.file)
         if any(isinstance(block.factor, tuple) for block in family.perturb)
     ]
+    if name is None and not drawn:
+        raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
     found = [family for family in drawn if name in (None, family.name)]
     if not found:
-        named = [family.name for family in drawn]
-        hint = choices(name or "", named) if named else "no family of this study does"
-        message = "draws no factor from a range" if name in [f.name for f in plan.study.family] else "is no family"
-        raise DocumentError(f"{name!r} {message}: {hint}" if name else hint, file=plan.file, path="family")
+        known = name in [family.name for family in plan.study.family]
+        fault = "draws no factor from a range" if known else "is no family"
+        hint = choices(str(name), [family.name for family in drawn])
+        raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
     return found
 
 
@@ -82,6 +85,7 @@ def _rows(
                 plan.study.prediction.method,
                 parameters=values[same],
                 memory=window_memory(vessel, dataset, windows),
+                engine="native" if device == "cpu" and compiler() is not None else "auto",
                 device=device,
             )
             total[same] += found.total.sum(axis=1)
@@ -131,14 +135,15 @@ def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
     """
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
-        alike: dict[bytes, list[str]] = {}
-        for path in frame.columns.difference(OWN, sort=False):
+        A, alike = part["A"].to_numpy(), dict[bytes, list[str]]()
+        for path in frame.columns.difference(list(OWN), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
-        found = []
         for paths in alike.values():
-            A, factor = part["A"].to_numpy(), part[paths[0]].to_numpy()
-            pair = {"factor": rank_correlation(A, factor), "away": rank_correlation(A, np.abs(factor - 1))}
-            found.append({"family": name, "paths": ", ".join(paths), **pair})
-        rows += sorted(found, key=lambda row: -max(abs(row["factor"]), abs(row["away"])))[:most]  # type: ignore[arg-type]
-    return pd.DataFrame(rows, columns=["family", "paths", "factor", "away"])
+            factor = part[paths[0]].to_numpy()
+            pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
+            rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
+    found = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
+    largest = found.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
+    order = largest["family"].map(list(dict.fromkeys(found["family"])).index)
+    return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)
