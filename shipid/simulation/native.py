@@ -422,7 +422,7 @@ def measure_native(
 def _width(batch: Batch) -> int:
     """Samples, filled up to whole vectors."""
     lanes = target().lanes
-    return -(-batch.state.shape[1] // lanes) * lanes
+    return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
 def _parts(batch: Batch) -> int:
