@@ -23,29 +23,31 @@ def run(members: int = MEMBERS) -> dict[str, Any]:
     """Wall time of a tenth of the members and of all, drawing and checking them included, and the greatest memory."""
     plan = read_plan(STUDY)
     wanted = families(plan, FAMILY)
-    few, begun, _ = _timed(plan, wanted, members // 10)
+    few, begun, few_busy, _ = _timed(plan, wanted, members // 10)
     few_memory = _memory()
-    many, _, frame = _timed(plan, wanted, members)
-    each = (many - few) / (members - members // 10)
+    many, _, busy, frame = _timed(plan, wanted, members)
+    more = members - members // 10
+    each = (many - few) / more
     return {
         "data and windows, first block [s]": round(begun, 2),
         f"{members // 10} members [s]": round(few, 2),
         f"{members} members [s]": round(many, 2),
         "each further member [ms]": round(1e3 * each, 2),
+        "each further member, of all threads [ms]": round(1e3 * (busy - few_busy) / more, 2),
         f"{ALL} members, from these [s]": round(many + each * (ALL - members), 1),
         f"memory at {members // 10} / {members} members [MB]": f"{few_memory:.0f} / {_memory():.0f}",
         "A, median [m]": round(float(frame["A"].median()), 3),
     }
 
 
-def _timed(plan: Any, wanted: Any, members: int) -> tuple[float, float, pd.DataFrame]:
-    """Wall time of all blocks and of the first, and the rows."""
-    start = time.perf_counter()
+def _timed(plan: Any, wanted: Any, members: int) -> tuple[float, float, float, pd.DataFrame]:
+    """Wall time of all blocks and of the first, time that all threads were busy, and the rows."""
+    start, busy = time.perf_counter(), time.process_time()
     blocks, begun = [], 0.0
     for block in screen(plan, wanted, members):
         begun = begun or time.perf_counter() - start
         blocks.append(block)
-    return time.perf_counter() - start, begun, joined(blocks)
+    return time.perf_counter() - start, begun, time.process_time() - busy, joined(blocks)
 
 
 def _memory() -> float:
