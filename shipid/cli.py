@@ -246,6 +246,55 @@ def study_variants(
         typer.echo(f"{write_patches(save, models)} patches -> {save}")
 
 
+@study_app.command("screen")
+def study_screen(
+    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    family: Annotated[str | None, typer.Argument(help="family; default: all that draw factors from a range")] = None,
+    members: Annotated[int, typer.Option(min=2, max=100000, help="members of each family")] = 1000,
+    out: Annotated[
+        Path | None, typer.Option(help="file for a row per member: .csv or .parquet; default: <study>-screen.csv")
+    ] = None,
+    changes: Changes = None,
+    device: Device = "cpu",
+) -> None:
+    """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    from shipid.study import screen
+    from shipid.study.plan import read_plan
+    from shipid.study.store import check_table, write_table
+
+    plan = read_plan(study, _parsed(changes))
+    file = out or Path(f"{plan.name}-screen.csv")
+    check_table(file)
+    wanted = screen.families(plan, family)
+    blocks = _counted(screen.screen(plan, wanted, members, device), members * len(wanted))
+    frame = screen.joined(list(blocks))
+    write_table(file, frame)
+    table = screen.spread(frame)
+    shares = [f"{share:.0%}" for share in screen.SHARES]
+    rows = [[*map(str, row[:3]), *(f"{value:.2f}" for value in row[3:])] for row in table.itertuples(index=False)]
+    typer.echo("accuracy A [m] that so many of the members reach:")
+    _print(_table(["family", "members", "diverged", *shares], rows))
+    found = screen.drivers(frame)
+    typer.echo("what drives A: rank correlation with a factor, and with its distance from 1:")
+    pairs = [(str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in found.itertuples()]
+    _print(_table(["family", "parameter", "factor", "distance"], pairs))
+    typer.echo(f"{len(frame)} members -> {file}")
+
+
+def _counted(blocks: Iterable[Any], total: int) -> Iterator[Any]:
+    """Pass blocks of rows on, with a bar of how many rows of all are there; on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("members"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task("members", total=total)
+        for block in blocks:
+            progress.advance(task, len(block))
+            yield block
+
+
 @study_app.command("run")
 def study_run(
     study: Annotated[str, typer.Argument(help="bundled study or path of one")],

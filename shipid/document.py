@@ -114,17 +114,20 @@ def get(document: Any, path: str) -> Any:
 
 
 def replace(document: Any, changes: Mapping[str, Any]) -> Any:
-    """A copy of the document with the values at the given dotted paths replaced or added."""
-    result = copy.deepcopy(document)
+    """A new document with the values at the given dotted paths replaced or added; it shares what is not on them."""
+    result = copy.copy(document)
+    own = {id(result)}
     for path, value in changes.items():
         *parents, last = parts(path)
         node = result
         for part in parents:
-            node = node[int(part)] if isinstance(node, list) else node.setdefault(part, {})
-        if isinstance(node, list):
-            node[int(last)] = value
-        else:
-            node[last] = value
+            key: Any = int(part) if isinstance(node, list) else part
+            below = node[key] if isinstance(node, list) else node.setdefault(key, {})
+            if id(below) not in own:
+                node[key] = below = copy.copy(below)
+                own.add(id(below))
+            node = below
+        node[int(last) if isinstance(node, list) else last] = value
     return result
 
 

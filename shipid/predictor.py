@@ -13,10 +13,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from shipid.data.windows import to_frame
+from shipid.data.windows import from_frame, to_frame
 from shipid.errors import DataError, ResultError
 from shipid.estimation.compensator import Compensator
-from shipid.simulation.rollout import rollout
+from shipid.simulation.rollout import Distances, Engine, distances, rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -142,16 +142,9 @@ def physics_paths(
     Commands and wind are held at their value at the instant (method, section 2); what the vessel feels and the columns
     do not hold, such as wind that was not measured, is zero: see `assumed`.
     """
-    model = dynamics(vessel)
-    zero = np.zeros(len(columns["u"]))
-    columns = {"down": columns.get("z", zero), **columns}
-    start = {name: columns.get(name, zero) for name in model.state}
-    environment = {name: columns.get(name, zero) for name in model.environment}
     found = rollout(
         vessel,
-        start,
-        columns,
-        environment,
+        *_instants(vessel, columns),
         step=step,
         num_steps=horizon,
         method=method,  # type: ignore[arg-type]
@@ -164,6 +157,48 @@ def physics_paths(
     with np.errstate(invalid="ignore"):  # a diverged path is flagged, and no news to the caller
         x, y = to_frame(north[1:], east[1:], north[0], east[0], columns["psi"])
     return np.stack([x, y], axis=-1), found.diverged
+
+
+def physics_distances(
+    vessel: Vessel,
+    columns: Mapping[str, Array],
+    future: Array,
+    step: float,
+    method: str,
+    *,
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    engine: Engine = "auto",
+    device: str = "cpu",
+) -> Distances:
+    """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11) of S instants.
+
+    The errors of `physics_paths` in sum and tally, without keeping a path: for families too large to keep.
+    """
+    origin = (columns.get(name, np.zeros(future.shape[1])) for name in ("north", "east", "psi"))
+    return distances(
+        vessel,
+        *_instants(vessel, columns),
+        np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1),
+        step=step,
+        method=method,  # type: ignore[arg-type]
+        parameters=parameters,
+        memory=memory,
+        engine=engine,
+        device=device,
+    )
+
+
+def _instants(
+    vessel: Vessel, columns: Mapping[str, Array]
+) -> tuple[dict[str, Array], Mapping[str, Array], dict[str, Array]]:
+    """Start, commands and environment of a rollout from columns (S,); what is not there is zero."""
+    model = dynamics(vessel)
+    zero = np.zeros(len(columns["u"]))
+    columns = {"down": columns.get("z", zero), **columns}
+    start = {name: columns.get(name, zero) for name in model.state}
+    environment = {name: columns.get(name, zero) for name in model.environment}
+    return start, columns, environment
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:

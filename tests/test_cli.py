@@ -68,7 +68,7 @@ def test_help_names_every_command() -> None:
         ([], ("vessel", "data", "study", "predict")),
         (["vessel"], ("list", "show")),
         (["data"], ("import", "check", "fetch")),
-        (["study"], ("list", "variants", "run", "resume", "report")),
+        (["study"], ("list", "variants", "screen", "run", "resume", "report")),
     ):
         text = said(*group, "--help")
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
@@ -138,6 +138,25 @@ def test_studies_and_variants(study: Path) -> None:
     assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
     text = said("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
     assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
+
+
+def test_screen_writes_a_row_per_member(study: Path) -> None:
+    text = said("study", "screen", study, "--members", "6")
+    frame = pd.read_csv("tiny-screen.csv")
+    assert list(frame["member"]) == [f"wrong-{k}" for k in range(1, 7)]
+    shown = re.search(r"^ *wrong +6 +0 +([\d. ]+)$", text, re.MULTILINE)
+    assert shown
+    expected = np.quantile(frame["A"], [0.05, 0.25, 0.5, 0.75, 0.95])
+    np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.005)
+    assert len(re.findall(r"^ *wrong +hull\.derivatives\.\S+ +[+-]\d\.\d\d +[+-]\d\.\d\d *$", text, re.MULTILINE)) == 5
+    said("study", "screen", study, "wrong", "--members", "2", "--out", "new/rows.parquet")
+    pd.testing.assert_frame_equal(pd.read_parquet("new/rows.parquet"), frame[:2], rtol=1e-12)
+    for arguments, remedy in (
+        (["right"], "'right' draws no factor from a range"),
+        (["--out", "rows.txt"], "ending in .parquet or .csv"),
+    ):
+        with pytest.raises(ShipidError, match=re.escape(remedy)):
+            said("study", "screen", study, *arguments)
 
 
 def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:

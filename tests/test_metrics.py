@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from shipid import metrics
+from shipid.metrics import BINS, tally, tally_quantile
 
 
 @pytest.fixture
@@ -98,3 +99,27 @@ def test_median_slope_ignores_a_point_far_off():
     assert metrics.median_slope(x, y) == pytest.approx(0.5)
     assert metrics.median_slope(np.array([0.0, 0.0, 2.0]), np.array([5.0, 1.0, 3.0])) == pytest.approx(0.0)
     assert np.isnan(metrics.median_slope(np.ones(3), np.arange(3.0)))
+
+
+def test_a_tally_has_every_error_in_its_bin() -> None:
+    """Bins double in 512 equal steps from 1 mm on; what lies beyond, or is no number, joins an end."""
+    edges = np.array([2.0**-10, 2.0**-10 * (1 + 1 / 512), 1.0, 3.0, 2.0**20])
+    places = [0, 1, 10 * 512, 11 * 512 + 256, BINS - 1]
+    for edge, place in zip(edges, places, strict=True):
+        assert tally(np.array([edge])).nonzero()[0] == [place]
+    ends = tally(np.array([0.0, np.nan, 1e-9, np.inf, 1e12]))
+    assert (ends[0], ends[-1], ends.sum()) == (3, 2, 5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize("count", [1, 2, 10, 5000])
+def test_quantiles_of_a_tally(share: float, count: int) -> None:
+    """Within the width of a bin of the quantile of the errors themselves, as `summary` takes it."""
+    rng = np.random.default_rng(count)
+    errors = rng.gamma(2.0, 3.0, (3, count))
+    found = tally_quantile(np.array([tally(own) for own in errors]), share)
+    low, high = (np.quantile(errors, share, axis=1, method=end) for end in ("lower", "higher"))
+    assert (found >= low * (1 - 1 / 512)).all()
+    assert (found <= high * (1 + 1 / 512)).all()
+    if count == 5000:
+        np.testing.assert_allclose(found, np.quantile(errors, share, axis=1), rtol=2e-3)

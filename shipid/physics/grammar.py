@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import casadi as ca
 from casadi import SX
@@ -30,7 +31,7 @@ class Monomial:
         """Number of factors."""
         return len(self.factors)
 
-    @property
+    @cached_property
     def canonical(self) -> tuple[str, tuple[tuple[str, bool], ...]]:
         """The same for names that mean the same: order of factors does not matter and |x||x| = xx."""
         moduli = [symbol for symbol, absolute in self.factors if absolute]
@@ -48,6 +49,7 @@ class Monomial:
         return product
 
 
+@cache
 def monomial(name: str, alphabet: str, axes: str = AXES) -> Monomial:
     """Read a name; ValueError says what it should look like."""
     factor, before = rf"[{alphabet}]|\|[{alphabet}]\|", rf"([{axes}])_" if axes else "()"

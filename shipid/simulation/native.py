@@ -14,10 +14,12 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ import casadi as ca
 import numpy as np
 
 from shipid.errors import ShipidError
+from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
 from shipid.simulation.integrate import Array, Batch, Method, cores, integrate
 from shipid.simulation.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.vessel.dynamics import Dynamics
@@ -36,19 +39,21 @@ _CALLS = {
 }  # fmt: skip
 _OPERATIONS = {
     **{operation: f"v_{name}({{0}})" for operation, name in _CALLS.items()},
-    ca.OP_FABS: "v_abs({0})",
+    ca.OP_FABS: "v_fabs({0})",
     ca.OP_SIGN: "(NUMBER({0} > 0) - NUMBER({0} < 0))",
     ca.OP_INV: "(1 / {0})",
     ca.OP_POW: "v_pow({0}, {1})",
     ca.OP_CONSTPOW: "v_pow({0}, {1})",
     ca.OP_ATAN2: "v_atan2({0}, {1})",
-    ca.OP_FMIN: "CHOOSE({0} < {1}, {0}, {1})",
-    ca.OP_FMAX: "CHOOSE({0} > {1}, {0}, {1})",
+    ca.OP_FMIN: "v_min({0}, {1})",
+    ca.OP_FMAX: "v_max({0}, {1})",
     ca.OP_IF_ELSE_ZERO: "((V)(({0} != 0) & (M){1}))",
 }
 _C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
+
+BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
 _HEAD = """
 #include <math.h>
@@ -57,13 +62,27 @@ typedef long long M __attribute__((vector_size(8 * W)));
 typedef double U __attribute__((vector_size(8 * W), aligned(8), may_alias));
 #define K(x) ((V){} + (x))
 #define NUMBER(m) ((V)((m) & (M)K(1.0)))
-#define CHOOSE(m, a, b) ((V)(((m) & (M)(V)(a)) | (~(m) & (M)(V)(b))))
 #define EACH(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i]); return r;
 #define EACH2(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i], y[i]); return r;
-static inline V v_abs(V x) { return CHOOSE(x < 0, -x, x); }
+static inline V v_fabs(V x) { return (V)((M)x & ((M){} + 0x7fffffffffffffffLL)); }
 static inline V v_sqrt(V x) { EACH(__builtin_sqrt) }
 static inline V v_floor(V x) { EACH(__builtin_floor) }
 static inline V v_ceil(V x) { EACH(__builtin_ceil) }
+#ifdef __AVX__ // one instruction, that compilers do not find
+#define PICK(name, relation) V r; __asm__(name " %2, %1, %0" : "=v"(r) : "v"(x), "vm"(y)); return r;
+#else
+#define PICK(name, relation) M m = x relation y; return (V)((m & (M)x) | (~m & (M)y));
+#endif
+static inline V v_min(V x, V y) { PICK("vminpd", <) }
+static inline V v_max(V x, V y) { PICK("vmaxpd", >) }
+"""
+_MEASURE = f"""
+static inline V measured(V north, V east, long samples, unsigned *tally) {{
+  V distance = v_sqrt(north * north + east * east);
+  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({MOST!r})) >> {SHIFT}) - {FIRST};
+  for (int i = 0; i < W && i < samples; ++i) ++tally[bins[i]];
+  return distance;
+}}
 """
 
 
@@ -125,7 +144,7 @@ def _compile(found: str, source: str, library: Path, wanted: Target) -> str | No
         text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
         text.write_text(source, encoding="utf-8")
         mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-        options = ["-O2", "-fno-math-errno", "-fPIC", "-shared", "-w", *wanted.flags]
+        options = ["-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w", *wanted.flags]
         command = [found, *options, str(text), "-o", str(fresh), *mvec, "-lm"]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode:
@@ -180,7 +199,7 @@ class _Source:
 
     def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
         """Lines that read what the named stages saved."""
-        heads = [f"const U *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
+        heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
 
     def sum(self, i: int) -> str:
@@ -208,16 +227,16 @@ class _Source:
         ends = [f"out[{i}] = {text};" for i, text in enumerate(rates.outputs)]
         lags = [f"out[{i}] = {text};" for i, text in enumerate(advance.outputs)]
         return f"""
-static void stage0(const U *parameters, U *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
-static void stage1(const U *commands, const U *environment, const U *saved0, U *saved) {{
+static void stage0(const V *parameters, V *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
+static void stage1(const V *commands, const V *environment, const V *saved0, V *saved) {{
 {" ".join(self.stage(1, p) for p in self.all)} }}
-static void rates(const U *state, const U *memory, const U *tau, const U *saved0, const U *saved1,
-                  const U *const *drawn, const long *counts, U *out) {{
+static void rates(const V *state, const V *memory, const V *tau, const V *saved0, const V *saved1,
+                  const U *const *drawn, const long *counts, V *out) {{
 V total[{n}]; for (int i = 0; i < {n}; ++i) total[i] = tau[i];
 {" ".join(self.sum(i) for i in range(len(self.sums)))}
 const V *tau_extra = total;
 {self.block(rates, (0, 1), [*rates.lines[2], *ends])} }}
-static void advance(const U *state, const U *memory, double step, const U *saved0, const U *saved1, U *out) {{
+static void advance(const V *state, const V *memory, double step, const V *saved0, const V *saved1, V *out) {{
 const V dt[1] = {{ K(step) }};
 {self.block(advance, (0, 1), [*advance.lines[2], *lags])} }}
 """
@@ -228,7 +247,7 @@ const V dt[1] = {{ K(step) }};
         num_states = len(self.model.state) + len(self.model.hidden)
 
         def name(size: int) -> str:
-            lines.append(f"U b{len(lines)}[{max(1, size)}];")
+            lines.append(f"V b{len(lines)}[{max(1, size)}];")
             return f"b{len(lines) - 1}"
 
         def rates(state: str, memory: str) -> str:
@@ -257,44 +276,65 @@ const V dt[1] = {{ K(step) }};
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
         nc, ne, parameters = len(model.commands), len(model.environment), len(model.parameters)
         widths = [sum(term.widths.values()) for term in model.drawn]
+        block = 1 if widths else BLOCK
         drawn = " ".join(f"own[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
         return f"""#define W {wanted.lanes}
 {_HEAD}
 {_vector_functions(wanted)}
 {self.functions()}
-void run(long first, long last, long steps, long every, const long *lengths, const double *numbers, const U *start,
-         const U *memory, const U *commands, const U *environment, const U *extra, const double *const *drawn,
-         const long *counts, const long *rows, long num_rows, U *records, U *worst) {{
-U parameters[{max(1, parameters)}], saved0[{self.total(0)}], saved1[{self.total(1)}];
+{_MEASURE}
+#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
+#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
+#define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
+#define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
+#define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
+void run(long first, long last, long stride, long samples, long steps, long every, const long *lengths,
+         const double *numbers, double *start, double *memory, double *commands, double *environment, double *extra,
+         const double *const *drawn, const long *counts, const long *rows, long num_rows, double *records,
+         const U *goal, double *sums, unsigned *tally, double *worst) {{
+V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
+V states[{block}][{nx}], memories[{block}][{max(1, nm)}], taus[{block}][{n}], greatest[{block}], distance[{block}];
 for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
 stage0(parameters, saved0);
-for (long g = first; g < last; ++g) {{
-  U x[{nx}], m[{max(1, nm)}];
-  const U *own[{max(1, len(widths))}];
-  {drawn}
-  V greatest = K(0), sum = K(0);
-  for (int i = 0; i < {nx}; ++i) {{ x[i] = start[g * {nx} + i]; sum += x[i]; }}
-  for (int i = 0; i < {nm}; ++i) {{ m[i] = memory[g * {nm} + i]; sum += m[i]; }}
-  for (int i = {n}; i < {2 * n}; ++i) greatest = CHOOSE(v_abs(x[i]) > greatest, v_abs(x[i]), greatest);
-  greatest += 0 * sum;
-  U *record = records + g * (steps / every + 1) * num_rows;
-  for (long i = 0; i < num_rows; ++i) record[i] = rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}];
-  for (long k = 0; k < steps; ++k) {{
-    const U *tau = extra + (g * lengths[2] + (k < lengths[2] ? k : lengths[2] - 1)) * {n};
-    if (k == 0 || (k < lengths[0] && lengths[0] > 1) || (k < lengths[1] && lengths[1] > 1))
-      stage1(commands + (g * lengths[0] + (k < lengths[0] ? k : lengths[0] - 1)) * {nc},
-             environment + (g * lengths[1] + (k < lengths[1] ? k : lengths[1] - 1)) * {ne}, saved0, saved1);
+for (long front = first; front < last; front += {block}) {{
+  long end = front + {block} < last ? front + {block} : last;
+  EACH_GROUP(end) {{
+    V *x = states[j], *m = memories[j], sum = K(0);
+    greatest[j] = distance[j] = K(0);
+    for (int i = 0; i < {nx}; ++i) {{ x[i] = *AT(start, i); sum += x[i]; }}
+    for (int i = 0; i < {nm}; ++i) {{ m[i] = *AT(memory, i); sum += m[i]; }}
+    for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
+    greatest[j] += 0 * sum;
+    if (records) NOTE(0)
+  }}
+  for (long k = 0; k < steps; ++k) EACH_GROUP(end) {{
+    V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
+    const U *own[{max(1, len(widths))}];
+    {drawn}
+    if (k == 0 || k < lengths[2])
+      for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, k * {n} + i);
+    if (k == 0 || k < lengths[0] || k < lengths[1]) {{
+      V c[{max(1, nc)}], e[{max(1, ne)}];
+      for (int i = 0; i < {nc}; ++i) c[i] = *AT(commands, NOW(0, k) * {nc} + i);
+      for (int i = 0; i < {ne}; ++i) e[i] = *AT(environment, NOW(1, k) * {ne} + i);
+      stage1(c, e, saved0, saved1);
+    }}
     {self.one_step()}
-    V all = K(0);
     for (int i = 0; i < {nx}; ++i) all += x[i];
     for (int i = 0; i < {nm}; ++i) all += m[i];
-    for (int i = {n}; i < {2 * n}; ++i) greatest = CHOOSE(v_abs(x[i]) > greatest, v_abs(x[i]), greatest);
-    greatest += 0 * all;
-    if ((k + 1) % every == 0)
-      for (long i = 0; i < num_rows; ++i)
-        record[(k + 1) / every * num_rows + i] = rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}];
+    for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
+    greatest[j] += 0 * all;
+    if ((k + 1) % every == 0) {{
+      long record = (k + 1) / every;
+      const U *there = goal + 2 * (g * (steps / every) + record - 1);
+      if (records) NOTE(record)
+      if (goal) distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, tally);
+    }}
   }}
-  worst[g] = greatest;
+  EACH_GROUP(end) {{
+    if (goal) *AT(sums, 0) = distance[j];
+    *AT(worst, 0) = greatest[j];
+  }}
 }} }}
 """
 
@@ -338,54 +378,113 @@ def _loaded(library: Path) -> Any:
     return run
 
 
+def _padded(array: Array, width: int) -> Array:
+    """(..., S) -> (..., width), the last sample repeated."""
+    fill = width - array.shape[-1]
+    filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
+    return np.ascontiguousarray(filled, dtype=float)
+
+
 def _packed(array: Array, lanes: int) -> Array:
-    """(..., channel, S) -> (groups, ..., channel, lanes), the last sample repeated."""
-    groups = -(-array.shape[-1] // lanes)
-    fill = groups * lanes - array.shape[-1]
-    filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1)
-    return np.ascontiguousarray(np.moveaxis(filled.reshape(*array.shape[:-1], groups, lanes), -2, 0), dtype=float)
+    """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
+    count, entries, num_samples = array.shape
+    groups = -(-num_samples // lanes)
+    filled = _padded(array, groups * lanes).reshape(count, entries, groups, lanes)
+    return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
 
 
 def run_native(
     model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
 ) -> tuple[Array, Array]:
-    """Records (R, V, S, C) and the greatest speed (V, S): groups of samples on threads, variants one after another."""
-    run, lanes = _library(model, step, method), target().lanes
-    num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
-    groups, num_records = -(-num_samples // lanes), num_steps // every + 1
-    series = [_packed(part, lanes) for part in (batch.commands, batch.environment, batch.tau_extra)]
-    lengths = (ctypes.c_long * 3)(*(part.shape[1] for part in series))
+    """Records (R, V, S, C) and the greatest speed (V, S)."""
+    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
+    records = np.empty((num_variants, num_steps // every + 1, len(rows), width))
+    worst = np.empty((num_variants, width))
+    _run(model, batch, step, num_steps, method, every, rows, worst, records=records)
+    return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
+
+
+def measure_native(
+    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, rows: list[int], goal: Array
+) -> tuple[Array, Array, Array]:
+    """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
+
+    The distances are those of the two channels `rows` to `goal` (T, 2, S), after every step.
+    """
+    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
+    sums, worst = np.empty((num_variants, width)), np.empty((num_variants, width))
+    tally = np.zeros((_parts(batch), num_variants, BINS), dtype=np.uint32)
+    there = _packed(goal, target().lanes)
+    _run(model, batch, step, num_steps, method, 1, rows, worst, goal=there, sums=sums, tally=tally)
+    return sums[:, :num_samples], tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
+
+
+def _width(batch: Batch) -> int:
+    """Samples, filled up to whole vectors."""
+    lanes = target().lanes
+    return -(-int(batch.state.shape[1]) // lanes) * lanes
+
+
+def _parts(batch: Batch) -> int:
+    """Into how many parts the samples go, so that all threads are busy to the end."""
+    num_variants, groups = len(batch.parameters), _width(batch) // target().lanes
+    return min(-(-4 * cores() // num_variants), groups)
+
+
+def _run(
+    model: Dynamics,
+    batch: Batch,
+    step: float,
+    num_steps: int,
+    method: Method,
+    every: int,
+    rows: list[int],
+    worst: Array,
+    **wanted: Array,
+) -> None:
+    """Fill the arrays that are wanted; parts of the samples on threads, variants one after another."""
+    run, lanes, width, parts = _library(model, step, method), target().lanes, _width(batch), _parts(batch)
+    series = [_padded(part, width) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
     drawn = [_packed(part.transpose(2, 0, 1), lanes) for part in batch.components]
     counts = (ctypes.c_long * max(1, len(drawn)))(*(part.shape[1] for part in drawn))
     pointers = (ctypes.c_void_p * max(1, len(drawn)))(*(part.ctypes.data for part in drawn))
     places = (ctypes.c_long * len(rows))(*rows)
-    start, memory = _packed(batch.state, lanes), _packed(batch.memory, lanes)
-    records = np.empty((num_variants, groups, num_records, len(rows), lanes))
-    worst = np.empty((num_variants, groups, lanes))
+    inputs = [_padded(batch.state, width), _padded(batch.memory, width), *series]
     values = np.ascontiguousarray(batch.parameters, dtype=float)
-    threads = cores()
-    size = max(1, -(-groups // (4 * threads)))
+    edges = np.linspace(0, width // lanes, parts + 1).astype(int).tolist()
+    records, goal, sums, tally = (wanted.get(name) for name in ("records", "goal", "sums", "tally"))
 
-    def part(variant: int, first: int) -> None:
+    def longs(*numbers: int) -> list[Any]:
+        return [ctypes.c_long(number) for number in numbers]
+
+    def address(array: Array | None, *place: int) -> Any:
+        return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
+
+    def work(variant: int, part: int) -> None:
         run(
-            *(ctypes.c_long(n) for n in (first, min(first + size, groups), num_steps, every)),
+            *longs(edges[part], edges[part + 1], width, batch.state.shape[1], num_steps, every),
             lengths,
-            *(ctypes.c_void_p(a.ctypes.data) for a in (values[variant], start, memory, *series)),
+            *(address(array) for array in (values[variant], *inputs)),
             pointers,
             counts,
             places,
-            ctypes.c_long(len(rows)),
-            *(ctypes.c_void_p(a.ctypes.data) for a in (records[variant], worst[variant])),
+            *longs(len(rows)),
+            *(address(records, variant), address(goal), address(sums, variant), address(tally, part, variant)),
+            address(worst, variant),
         )
 
-    with ThreadPoolExecutor(threads) as pool:
-        tasks = [pool.submit(part, v, g) for v in range(num_variants) for g in range(0, groups, size)]
+    waiting = product(range(len(values)), range(parts))
+
+    def drain() -> None:
+        for task in waiting:
+            work(*task)
+
+    with ThreadPoolExecutor(max(1, cores() - 1)) as pool:
+        helpers = [pool.submit(drain) for _ in range(cores() - 1)]
         try:
-            for task in tasks:
-                task.result()
-        except BaseException:
-            for task in tasks:
-                task.cancel()
-            raise
-    result = records.transpose(2, 0, 1, 4, 3).reshape(num_records, num_variants, groups * lanes, len(rows))
-    return result[:, :, :num_samples], worst.reshape(num_variants, -1)[:, :num_samples]
+            drain()
+        finally:
+            deque(waiting, maxlen=0)  # after an interrupt the others begin nothing new
+        for helper in helpers:
+            helper.result()

@@ -119,6 +119,9 @@ class _Printer:
         stage = max(operand.stage for operand in operands)
         if stage < 0:
             return _Value(repr(float(ca.evalf(_on_numbers(operation, [float(o.text) for o in operands])))), -1)
+        if operation == ca.OP_DIV and 0 <= operands[1].stage < stage:  # divide once, early; then multiply
+            operands[1] = self.reciprocal(operands[1])
+            template = self.dialect.operations[ca.OP_MUL]
         bare = _TAKES_TRUTH.get(operation, 0)
         texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
         self.lines[stage].append(self.dialect.assignment.format(f"a{k}", template.format(*texts)))
@@ -133,6 +136,11 @@ class _Printer:
         text = self.dialect.number.format(value.text) if value.truth else value.text
         saved = self.saved[value.stage]
         return f"s{value.stage}[{saved.setdefault(text, len(saved))}]"
+
+    def reciprocal(self, value: _Value) -> _Value:
+        """One over a value, in the stage that computes it."""
+        text = self.dialect.number.format(value.text) if value.truth else value.text
+        return _Value(self.dialect.operations[ca.OP_INV].format(text), value.stage)
 
     def finish(self) -> Printed:
         """Everything that was printed."""

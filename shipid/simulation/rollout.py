@@ -13,9 +13,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from shipid.errors import DataError, ShipidError, choices
+from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
 from shipid.simulation.integrate import Array, Batch, Method
-from shipid.simulation.native import compiler, run_native
+from shipid.simulation.native import compiler, measure_native, run_native
 from shipid.simulation.scan import run_casadi
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
@@ -26,6 +27,7 @@ SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
 COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
 COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
+PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 
@@ -86,38 +88,16 @@ def rollout(
         (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
     """
-    model = dynamics(vessel, helmsman)
     _check(engine, device, num_steps, every)
-    if not start:
-        raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
-    num_samples = len(next(iter(start.values())))
-    values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
-    if values.shape[1] != len(model.parameters):
-        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), found {values.shape}")
-    at_rest = dict.fromkeys(model.hidden, np.zeros(num_samples))
-    batch = Batch(
-        state=_channels((*model.state, *model.hidden), {**at_rest, **start}, num_samples, num_steps, "state", vessel)[
-            0
-        ],
-        memory=np.zeros((0, num_samples)),
-        commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
-        environment=_channels(model.environment, environment or {}, num_samples, num_steps, "environment", vessel),
-        tau_extra=_tau(tau_extra, model.num_dof, num_samples, num_steps),
-        parameters=values,
-        components=_components(model, components or {}, num_samples),
-    )
-    batch = replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
+    given = start, commands, environment or {}, components or {}
+    model, batch = _prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     names = (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
     kept = tuple(names if keep is None else keep)
     unknown = next((name for name in kept if name not in names), None)
     if unknown is not None:
         raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
     rows = [names.index(name) for name in kept]
-    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
-    work = num_steps * num_samples * len(values) * (4 if method == "rk4" else 1) * weight
-    chosen = _by_size(work, num_samples * len(values), device) if engine == "auto" else engine
-    if num_samples == 0:
-        raise ShipidError("a rollout needs at least one sample")
+    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
     with np.errstate(all="ignore"):
         if chosen == "casadi":
             records, worst = run_casadi(model, batch, step, num_steps, method, every, rows)
@@ -127,8 +107,97 @@ def rollout(
             from shipid.simulation.batched import run_torch
 
             records, worst = run_torch(model, batch, step, num_steps, method, every, rows, chosen == "compiled", device)
-    diverged = ~(worst <= SPEED_LIMIT) | ~_finite(batch)
-    return Trajectories(records, kept, diverged, step * every)
+    return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~_finite(batch), step * every)
+
+
+@dataclass(frozen=True)
+class Distances:
+    """How far variants end up from true paths; what was predicted is not kept.
+
+    total : (V, S) sum [m] over the steps of the distance to the true path.
+    tally : (V, BINS) how often each distance occurs, see `shipid.metrics.tally`.
+    diverged : (V, S) as in `Trajectories`.
+    """
+
+    total: Array
+    tally: Array
+    diverged: Array
+
+
+def distances(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array],
+    goal: Array,
+    *,
+    step: float,
+    method: Method = "euler",
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    engine: Engine = "auto",
+    device: str = "cpu",
+) -> Distances:
+    """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
+
+    As `rollout`, but the native engine measures while it runs, so that nothing grows with the horizon; the others keep
+    the paths of a few variants at a time.
+    """
+    num_steps = len(goal)
+    _check(engine, device, num_steps, 1)
+    model, batch = _prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
+    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
+    rows = [model.state.index("north"), model.state.index("east")]
+    if chosen == "native":
+        there = goal.transpose(0, 2, 1)
+        total, counts, worst = measure_native(model, batch, step, num_steps, method, rows, there)
+        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~_finite(batch))
+    few = max(1, PATHS_KEPT // goal.size)
+    found = []
+    for first in range(0, len(batch.parameters), few):
+        part = rollout(
+            vessel, start, commands, environment, step=step, num_steps=num_steps, method=method, memory=memory,
+            parameters=batch.parameters[first : first + few], keep=("north", "east"), engine=chosen, device=device,
+        )  # fmt: skip
+        with np.errstate(all="ignore"):
+            apart = [position_error(part.states[1:, own], goal) for own in range(part.states.shape[1])]
+        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), part.diverged))
+    return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _prepared(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array],
+    components: Mapping[str, Array],
+    num_steps: int,
+    parameters: Array | None,
+    memory: Mapping[str, Array] | None,
+    tau_extra: Array | None,
+    helmsman: Helmsman | None,
+) -> tuple[Dynamics, Batch]:
+    """Equations and inputs as every engine takes them; whatever is missing or of another shape is told."""
+    model = dynamics(vessel, helmsman)
+    if not start:
+        raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
+    num_samples = len(next(iter(start.values())))
+    if num_samples == 0:
+        raise ShipidError("a rollout needs at least one sample")
+    values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
+    if values.shape[1] != len(model.parameters):
+        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), found {values.shape}")
+    begun = {**dict.fromkeys(model.hidden, np.zeros(num_samples)), **start}
+    batch = Batch(
+        state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel)[0],
+        memory=np.zeros((0, num_samples)),
+        commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
+        environment=_channels(model.environment, environment, num_samples, num_steps, "environment", vessel),
+        tau_extra=_tau(tau_extra, model.num_dof, num_samples, num_steps),
+        parameters=values,
+        components=_components(model, components, num_samples),
+    )
+    return model, replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
 
 
 def _check(engine: str, device: str, num_steps: int, every: int) -> None:
@@ -148,7 +217,10 @@ def _finite(batch: Batch) -> Array:
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 
 
-def _by_size(work: float, width: int, device: str) -> Engine:
+def _by_size(batch: Batch, num_steps: int, method: Method, device: str) -> Engine:
+    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
+    width = batch.state.shape[1] * len(batch.parameters)
+    work = num_steps * width * (4 if method == "rk4" else 1) * weight
     if device != "cpu":
         return "compiled" if work > COMPILE_FROM else "torch"
     if work > NATIVE_FROM and compiler() is not None:

@@ -11,12 +11,10 @@ from shipid.data.dataset import Dataset, pieces, read_dataset
 from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
 from shipid.data.windows import from_frame
-from shipid.errors import DataError, ResultError, choices
+from shipid.errors import ResultError, choices
 from shipid.predictor import Predictor, check_columns
 from shipid.study.prepare import states_along
-from shipid.study.store import cell_file
-
-FORMATS = (".parquet", ".csv")
+from shipid.study.store import cell_file, check_table, write_table
 
 
 def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Path) -> tuple[pd.DataFrame, float]:
@@ -25,19 +23,14 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
     Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m],
     outside) and the share of instants outside the training's limits. Pure data-driven cells have NaN for physics.
     """
-    if out.suffix not in FORMATS:
-        raise DataError(f"{out.suffix or 'no ending'}: write to a file ending in {' or '.join(FORMATS)}", file=out)
+    check_table(out)
     predictor = Predictor.load(_known_cell(folder, cell))
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
     parts = [_along(predictor, dataset, run, rows) for run, rows in pieces(dataset)]
     frame = pd.concat(parts, ignore_index=True)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    if out.suffix == ".csv":
-        frame.to_csv(out, index=False)
-    else:
-        frame.to_parquet(out, index=False)
+    write_table(out, frame)
     return frame, float(frame["outside"].mean())
 
 

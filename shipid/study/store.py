@@ -14,13 +14,14 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.data.windows import Windows
-from shipid.errors import DocumentError, ResultError
+from shipid.errors import DataError, DocumentError, ResultError
 from shipid.predictor import read_arrays
 from shipid.study.plan import Batch, Model, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, MODELS = "study.toml", "vessels.json", "provenance.json", "models.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
+TABLES = (".parquet", ".csv")
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
 
@@ -30,6 +31,27 @@ def write_text(file: Path, text: str) -> None:
     temporary = file.with_name(f".{file.name}.{os.getpid()}")
     temporary.write_text(text, encoding="utf-8")
     os.replace(temporary, file)
+
+
+def check_table(file: Path) -> None:
+    """Raise DataError for a table file of another kind than `write_table` writes, before any work is done for it."""
+    if file.suffix not in TABLES:
+        raise DataError(f"{file.suffix or 'no ending'}: write to a file ending in {' or '.join(TABLES)}", file=file)
+
+
+def write_table(file: Path, frame: pd.DataFrame) -> None:
+    """Write a frame as Parquet or CSV by the file's ending, whole or not at all."""
+    check_table(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        if file.suffix == ".csv":
+            frame.to_csv(temporary, index=False)
+        else:
+            frame.to_parquet(temporary, index=False)
+        os.replace(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def write_json(file: Path, content: Any) -> None:

@@ -72,7 +72,18 @@ class Vessel:
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """The same vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
-        return check_vessel(documents.replace(self.document, values), self.file)
+        document = documents.replace(self.document, values)
+        if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
+            try:
+                documents.parse(vessel_model(), document, self.file)
+            except DocumentError:
+                return check_vessel(document, self.file)
+            vessel = Vessel(document, self.file, documents.digest(document))
+            vessel.__dict__["units"] = self.units
+            vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
+            _check_numbers(vessel)
+            return vessel
+        return check_vessel(document, self.file)
 
 
 def load_vessel(name: str, relative_to: Path | None = None) -> Vessel:
@@ -182,13 +193,20 @@ def check_vessel(document: Document, file: str) -> Vessel:
             message = f"{paths[name]} has the same last name, by which commands go: choose another"
             raise DocumentError(message, file=file, path=path)
         paths[name] = path
-        _check_lists(path, block, file)
+        _check_lengths(path, block, file)
         if TABLE in block:
             _check_wave_table(f"{path}.{TABLE}", block[TABLE], TABLES[key], file)
     _check_units(vessel)
+    _check_numbers(vessel)
+    return vessel
+
+
+def _check_numbers(vessel: Vessel) -> None:
+    """What the values of numbers can break where all names are right."""
+    for path, _, block in term_blocks(vessel.document):
+        _check_order(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
-    return vessel
 
 
 def _check_sense(vessel: Vessel) -> None:
@@ -224,8 +242,7 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     documents.parse(term_model(f"{group}.{kind}"), block, file, path)
 
 
-def _check_lists(path: str, block: Mapping[str, Any], file: str) -> None:
-    _check_lengths(path, block, file)
+def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
     for key, value in block.items():
         if isinstance(value, list) and key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
             raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")

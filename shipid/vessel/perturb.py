@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -138,35 +138,62 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
 
     Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
     """
-    original = base.parameters
-    values: dict[str, float] = {}
-    times: dict[str, int] = {}
+    return _draw(family, _rules(family, base, file), member, base, counter, file)
+
+
+def members(
+    family: Family, base: Vessel, file: str | Path | None = None, numbers: Iterable[int] | None = None
+) -> list[Variant]:
+    """Members of a resolved family, all or those of the given numbers from 0, none redrawn."""
+    rules = _rules(family, base, file)
+    wanted = range(family.members) if numbers is None else numbers
+    return [_draw(family, rules, number, base, 0, file) for number in wanted]
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """One perturbation with its paths looked up: what is removed, what is set, and the key of each path's draw."""
+
+    remove: Sequence[str]
+    set: Mapping[str, float]
+    factor: float | tuple[float, float] | None
+    keys: Mapping[str, tuple[str, int]]
+
+
+def _rules(family: Family, base: Vessel, file: str | Path | None) -> list[_Rule]:
+    """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
+    original, times, found = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb):
         where = f"family {family.name!r}.perturb.{index}"
-        for path in _select(block.remove, original, file, f"{where}.remove"):
-            values[path] = 0.0
-        for path, value in block.set.items():
+        remove = _select(block.remove, original, file, f"{where}.remove")
+        for path in block.set:
             if path not in original:
                 raise DocumentError(
                     f"{base.key} has no parameter {path!r}: {choices(path, original)}", file=file, path=f"{where}.set"
                 )
-            values[path] = value
         paths = _select(block.parameters, original, file, f"{where}.parameters")
         keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
         times.update({key: times.get(key, -1) + 1 for key in keys.values()})
-        for path, key in keys.items():
-            values[path] = values.get(path, original[path]) * _factor(block, family, member, key, times[key], counter)
+        found.append(_Rule(remove, block.set, block.factor, {path: (key, times[key]) for path, key in keys.items()}))
+    return found
+
+
+def _draw(
+    family: Family, rules: Sequence[_Rule], member: int, base: Vessel, counter: int, file: str | Path | None
+) -> Variant:
+    original = base.parameters
+    values: dict[str, float] = {}
+    for rule in rules:
+        values |= dict.fromkeys(rule.remove, 0.0) | dict(rule.set)
+        for path, (key, times) in rule.keys.items():
+            factor = _factor(rule.factor, family, member, key, times, counter)
+            values[path] = values.get(path, original[path]) * factor
     _check(family, member, base, values, file)
     factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
     name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
     return Variant(
         name, family.name, member, family.base or base.key, base.digest, values, factors, counter, family.seed, original
     )
-
-
-def members(family: Family, base: Vessel, file: str | Path | None = None) -> list[Variant]:
-    """All members of a resolved family, none redrawn."""
-    return [draw(family, member, base, file=file) for member in range(family.members)]
 
 
 def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float], file: str | Path | None) -> None:
@@ -178,11 +205,13 @@ def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float
         raise DocumentError(message, file=file, path=f"family {family.name!r}") from None
 
 
-def _factor(block: Perturbation, family: Family, member: int, key: str, times: int, counter: int) -> float:
-    if not isinstance(block.factor, tuple):
-        assert block.factor is not None
-        return block.factor
-    low, high = block.factor
+def _factor(
+    given: float | tuple[float, float] | None, family: Family, member: int, key: str, times: int, counter: int
+) -> float:
+    if not isinstance(given, tuple):
+        assert given is not None
+        return given
+    low, high = given
     return low + (high - low) * uniform(family.seed, family.name, member, key, times, counter)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -13,10 +14,11 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
+from shipid.metrics import position_error, tally
 from shipid.simulation import native
 from shipid.simulation.integrate import Batch
 from shipid.simulation.native import Target, compiler, run_native, target
-from shipid.simulation.rollout import rollout
+from shipid.simulation.rollout import distances, rollout
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
@@ -141,3 +143,54 @@ def test_a_cache_that_cannot_be_written_is_no_obstacle(
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert not rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").diverged.any()
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
+@pytest.mark.parametrize("num_variants", [1, 3])
+def test_distances_are_those_of_the_paths(count: int, num_variants: int, draw_inputs: Callable[..., Any]) -> None:
+    """Summed and tallied on the way, in vectors with filling that must not be counted."""
+    given = draw_inputs(SHIP, count)
+    rng = np.random.default_rng(0)
+    goal = rng.uniform(-9, 9, (5, count, 2))
+    parameters = np.array(list(SHIP.parameters.values())) * rng.uniform(0.9, 1.1, (num_variants, 1))
+    options: dict[str, Any] = {"step": 1.0, "parameters": parameters}
+    paths = rollout(SHIP, **given, num_steps=5, keep=("north", "east"), engine="casadi", **options)
+    expected = [position_error(paths.states[1:, own], goal) for own in range(num_variants)]
+    for engine in ("native", "casadi"):
+        found = distances(SHIP, goal=goal, **given, engine=engine, **options)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found.total, [own.sum(axis=0) for own in expected], rtol=1e-12)
+        np.testing.assert_array_equal(found.tally, [tally(own) for own in expected])
+        assert not found.diverged.any()
+
+
+def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any]) -> None:
+    given = draw_inputs(SHIP, 11)
+    goal = np.zeros((5, 11, 2))
+    sound = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
+    given["start"]["u"] = np.where(np.arange(11) == 4, np.nan, given["start"]["u"])
+    harmed = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
+    others = np.arange(11) != 4
+    assert (harmed.diverged[0] == ~others).all()
+    np.testing.assert_array_equal(harmed.total[:, others], sound.total[:, others])
+    assert harmed.tally.sum() == sound.tally.sum() == 55
+
+
+def test_an_interrupt_leaves_no_thread_at_work(
+    monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    """What another thread has begun it ends; nothing new is begun."""
+    run = native._library(dynamics(SHIP), 1.0, "euler")
+    calls: list[int] = []
+
+    def interrupted(*arguments: Any) -> None:
+        calls.append(1)
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        run(*arguments)
+
+    parameters = np.tile(list(SHIP.parameters.values()), (5000, 1))
+    with monkeypatch.context() as patch:
+        patch.setattr(native, "_library", lambda *_: interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            rollout(SHIP, **draw_inputs(SHIP, 8), step=1.0, num_steps=2, parameters=parameters, engine="native")
+    assert len(calls) < 5000

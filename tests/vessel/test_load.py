@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.document import bundled, leaves, replace
+from shipid.errors import DocumentError
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 
 UNIT = re.compile(r"-|prime|deg|1/s of the command|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
@@ -92,6 +93,36 @@ def test_new_values_leave_the_old_vessel_alone() -> None:
     base = load_vessel("gunnerus-28.9")
     assert base.with_values({"inertia.m": 1.0e6}).parameters["inertia.m"] == 1.0e6
     assert base.parameters["inertia.m"] == 410931.81
+
+
+def test_new_numbers_make_the_vessel_that_a_document_of_them_makes(vessel: Vessel) -> None:
+    """The short way, for numbers alone, and the whole check agree."""
+    values = {path: value * 1.01 for path, value in vessel.parameters.items() if not path.startswith("wind.gamma")}
+    short, whole = vessel.with_values(values), check_vessel(replace(vessel.document, values), vessel.file)
+    assert short == whole
+    assert (short.parameters, short.units, short.structure) == (whole.parameters, whole.units, whole.structure)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"inertia.m": -1.0},
+        {"inertia.m": float("nan")},
+        {"inertia.m": 410.9},
+        {"added_mass.X_udot": 1.0},
+        {"added_mass.Y_rdot": 1e9, "added_mass.N_vdot": 1e9},
+        {"wind.gamma_deg.3": 5},
+        {"thruster.port.D_p": 0.0},
+    ],
+)
+def test_new_numbers_that_make_no_vessel_are_told_as_in_a_document(values: dict[str, float]) -> None:
+    base = load_vessel("gunnerus-28.9")
+    told = []
+    for check in (base.with_values, lambda new: check_vessel(replace(base.document, new), base.file)):
+        with pytest.raises(DocumentError) as caught:
+            check(values)
+        told.append(str(caught.value))
+    assert told[0] == told[1]
 
 
 def test_patches_may_be_stacked(tmp_path: Path) -> None:

@@ -1,0 +1,149 @@
+"""Screening: how accurate each of many members of a family is on every window, before any training is paid for.
+
+Nothing that grows with the members is kept but their rows: they run in blocks, and their errors are summed and tallied
+on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Windows
+from shipid.errors import DocumentError, choices
+from shipid.metrics import BINS, rank_correlation, tally_quantile
+from shipid.predictor import check_columns, physics_distances
+from shipid.simulation.native import compiler
+from shipid.study.plan import Plan
+from shipid.study.prepare import obtain, partition, window_memory
+from shipid.vessel.load import Vessel
+from shipid.vessel.perturb import Family, Variant, members, resolve
+
+Array = np.ndarray
+MEMBERS = 64  # of a block
+NUMBERS = 4_000_000  # that a block keeps, a sum per window and a tally per member: fewer members where windows are many
+SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+OWN = ("family", "member", "A", "A_90", "diverged")
+
+
+def families(plan: Plan, name: str | None = None) -> list[Family]:
+    """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
+    drawn = [
+        family
+        for family in resolve(plan.study.family, plan.file)
+        if any(isinstance(block.factor, tuple) for block in family.perturb)
+    ]
+    if name is None and not drawn:
+        raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
+    found = [family for family in drawn if name in (None, family.name)]
+    if not found:
+        known = name in [family.name for family in plan.study.family]
+        fault = "draws no factor from a range" if known else "is no family"
+        hint = choices(str(name), [family.name for family in drawn])
+        raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
+    return found
+
+
+def screen(plan: Plan, wanted: Sequence[Family], count: int, device: str = "cpu") -> Iterator[pd.DataFrame]:
+    """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
+
+    A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows, the share of windows on which
+    the member diverged (A is NaN then), and a column per drawn parameter: its factor on the base. Members are those
+    that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
+    """
+    dataset = obtain(plan)
+    pool, test, _ = partition(plan, dataset)
+    size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
+    for family in wanted:
+        base = plan.vessels[str(family.base)]
+        check_columns(base, test.columns, plan.file)
+        for first in range(0, count, size):
+            numbers = range(first, min(first + size, count))
+            named = family.model_copy(update={"members": count})
+            variants = members(named, base, plan.file, numbers)
+            yield _rows(plan, dataset, (pool, test), base, variants, device)
+
+
+def _rows(
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], base: Vessel, variants: Sequence[Variant], device: str
+) -> pd.DataFrame:
+    """A row per member of a block."""
+    values = np.array([variant.parameters for variant in variants])
+    total, failed = np.zeros(len(variants)), np.zeros(len(variants))
+    counts = np.zeros((len(variants), BINS), dtype=np.uint32)
+    for same in _equal_lags(base, values):
+        vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
+        for windows in parts:
+            found = physics_distances(
+                vessel,
+                windows.columns,
+                windows.future,
+                plan.study.prediction.step,
+                plan.study.prediction.method,
+                parameters=values[same],
+                memory=window_memory(vessel, dataset, windows),
+                engine="native" if device == "cpu" and compiler() is not None else "auto",
+                device=device,
+            )
+            total[same] += found.total.sum(axis=1)
+            counts[same] += found.tally
+            failed[same] += found.diverged.sum(axis=1)
+    whole, num_windows = failed == 0, sum(map(len, parts))
+    rows = {
+        "family": [variant.family for variant in variants],
+        "member": [variant.name for variant in variants],
+        "A": np.where(whole, total / (num_windows * parts[0].horizon), np.nan),
+        "A_90": np.where(whole, tally_quantile(counts, 0.9), np.nan),
+        "diverged": failed / num_windows,
+    }
+    return pd.concat([pd.DataFrame(rows), pd.DataFrame([dict(variant.factors) for variant in variants])], axis=1)
+
+
+def _equal_lags(base: Vessel, values: Array) -> list[Array]:
+    """Members in groups whose actuators lag alike: equal hidden states at the start of a window."""
+    lags = [place for place, path in enumerate(base.parameters) if ".actuator." in path]
+    if not lags:
+        return [np.arange(len(values))]
+    _, group = np.unique(values[:, lags], axis=0, return_inverse=True)
+    return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+
+
+def joined(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """All rows as one frame; a parameter that a family leaves alone has the factor 1."""
+    frame = pd.concat(blocks, ignore_index=True)
+    drawn = [name for name in frame.columns if name not in OWN]
+    return frame.fillna(dict.fromkeys(drawn, 1.0))
+
+
+def spread(frame: pd.DataFrame) -> pd.DataFrame:
+    """A row per family: members, how many diverged, and quantiles of A [m] over the others."""
+    rows = []
+    for name, part in frame.groupby("family", sort=False):
+        A = part["A"].dropna()
+        row = {"family": name, "members": len(part), "diverged": len(part) - len(A)}
+        rows.append(row | {share: A.quantile(share) for share in SHARES})
+    return pd.DataFrame(rows)
+
+
+def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
+    """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
+
+    The few largest, a row each: family, paths (those drawn together count once), factor, away.
+    """
+    rows = []
+    for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
+        A, alike = part["A"].to_numpy(), dict[bytes, list[str]]()
+        for path in frame.columns.difference(list(OWN), sort=False):
+            if part[path].nunique() > 1:
+                alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
+        for paths in alike.values():
+            factor = part[paths[0]].to_numpy()
+            pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
+            rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
+    found = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
+    largest = found.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
+    order = largest["family"].map(list(dict.fromkeys(found["family"])).index)
+    return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)

@@ -1,0 +1,167 @@
+"""Screening: the errors of the paths themselves, whatever the block, the engine and the rest of the family."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError, DocumentError
+from shipid.metrics import position_error, summary
+from shipid.predictor import physics_paths
+from shipid.simulation import native, rollout
+from shipid.study import screen as module
+from shipid.study.plan import Plan
+from shipid.study.prepare import obtain, partition, prepare, window_memory
+from shipid.study.screen import drivers, families, joined, screen, spread
+from shipid.study.store import write_table
+from shipid.vessel.perturb import members
+from tests.study.tiny import tiny_plan
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Plan:
+    return tiny_plan(tmp_path)
+
+
+def screened(plan: Plan, count: int, name: str = "wrong") -> pd.DataFrame:
+    return joined(list(screen(plan, families(plan, name), count)))
+
+
+def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
+    """A, A_90 and share of failures of each member by way of its paths on pool and test."""
+    (family,), base = families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
+    dataset = obtain(plan)
+    found = []
+    for variant in members(family.model_copy(update={"members": count}), base):
+        vessel, errors = base.with_values(variant.values), []
+        for windows in partition(plan, dataset)[:2]:
+            memory = window_memory(vessel, dataset, windows)
+            paths, _ = physics_paths(vessel, windows.columns, windows.horizon, 1.0, "euler", memory=memory)
+            errors.append(position_error(paths[:, 0], windows.future))
+        whole = summary(np.concatenate(errors, axis=1))
+        found.append({"member": variant.name, "factors": variant.factors, **whole})
+    return found
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a C compiler, where errors are summed on the way, and without one."""
+    if not compiled:
+        for place in (native, rollout, module):
+            monkeypatch.setattr(place, "compiler", lambda: None)
+    frame, expected = screened(plan, 5), by_paths(plan, 5)
+    assert list(frame["member"]) == [row["member"] for row in expected]
+    np.testing.assert_allclose(frame["A"], [row["mean"] for row in expected], rtol=1e-12)
+    np.testing.assert_allclose(frame["A_90"], [row["p90"] for row in expected], rtol=2e-3)
+    for row, (_, found) in zip(expected, frame.iterrows(), strict=True):
+        assert row["factors"] == {path: found[path] for path in row["factors"]}
+
+
+def test_members_are_those_of_the_study(plan: Plan) -> None:
+    """A member keeps its number and draw whatever the size of the family."""
+    prepared = prepare(plan, obtain(plan))
+    own = {model.name: model.variant.factors for model in prepared.models if model.family == "wrong" and model.variant}
+    frame = screened(plan, 7).set_index("member")
+    assert len(own) == 2
+    for name, factors in own.items():
+        assert dict(frame.loc[name, list(factors)]) == factors
+
+
+def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = screened(plan, 7)
+    monkeypatch.setattr(module, "MEMBERS", 3)
+    pd.testing.assert_frame_equal(screened(plan, 7), whole, check_exact=True)
+    monkeypatch.setattr(module, "NUMBERS", 1)
+    assert [len(block) for block in screen(plan, families(plan, "wrong"), 3)] == [1, 1, 1]
+
+
+def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Path) -> None:
+    """Each lag has its own hidden states at the start of a window: those of the orders before."""
+    vessel = tmp_path / "lagged.toml"
+    lag = "kind = 'first_order'\nT = 2.0\nrate = 0.2\n"
+    vessel.write_text(
+        "extends = 'gunnerus-28.9'\n" + "".join(f"[thruster.{s}.actuator.n]\n{lag}" for s in ("port", "starboard"))
+    )
+    rules = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.5, 3.0]}]
+    family = [{"name": "wrong", "base": str(vessel), "members": 2, "perturb": rules}]
+    plan = tiny_plan(tmp_path, {"family": family, "truth.vessel": str(vessel), "truth.actuators_at": "rest"})
+    plan.vessels["gunnerus-28.9"] = plan.vessels[str(vessel)]  # type: ignore[index]
+    np.testing.assert_allclose(screened(plan, 3)["A"], [row["mean"] for row in by_paths(plan, 3)], rtol=1e-12)
+
+
+def test_a_member_that_diverges_is_said_so(tmp_path: Path) -> None:
+    wild = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"], "factor": [-3e4, 1.0]}]
+    family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
+    frame = screened(tiny_plan(tmp_path, {"family": family}), 6)
+    bad = frame["diverged"] > 0
+    assert bad.any()
+    assert frame["A"].isna().equals(bad)
+    assert frame["A_90"].isna().equals(bad)
+    assert (frame["diverged"] <= 1).all()
+    assert spread(frame)["diverged"].item() == bad.sum()
+
+
+def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
+    """Two numbers drawn together count once; one that matters stands before one that does not."""
+    rules = [
+        {"parameters": ["thruster.*.D_p"], "factor": [0.5, 1.5], "together": True},
+        {"parameters": ["hull.derivatives.X_rr"], "factor": [0.99, 1.01]},
+    ]
+    family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules}]
+    found = drivers(screened(tiny_plan(tmp_path, {"family": family}), 24))
+    assert list(found["paths"]) == ["thruster.port.D_p, thruster.starboard.D_p", "hull.derivatives.X_rr"]
+    assert found["away"][0] > 0.8  # too large and too small are wrong alike
+    assert abs(found["factor"][0]) < found["away"][0]
+
+
+def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
+    rules = [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]
+    more = [{"parameters": ["inertia.I_z"], "factor": [0.9, 1.1]}]
+    family = [
+        {"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules},
+        {"name": "other", "base": "gunnerus-28.9", "members": 2, "perturb": more},
+    ]
+    plan = tiny_plan(tmp_path, {"family": family})
+    frame = joined(list(screen(plan, families(plan), 2)))
+    assert list(frame["family"]) == ["wrong", "wrong", "other", "other"]
+    assert list(frame["inertia.I_z"][:2]) == [1, 1]
+    assert list(frame["inertia.m"][2:]) == [1, 1]
+    assert list(spread(frame)["family"]) == ["wrong", "other"]
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"), [("wrnog", "is no family: did you mean 'wrong'"), ("right", "draws no factor from a range")]
+)
+def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        families(plan, name)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_study_that_draws_nothing(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"family": [{"name": "right", "base": "gunnerus-28.9"}]})
+    with pytest.raises(DocumentError, match="draws a factor from a range"):
+        families(plan)
+
+
+def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = pd.DataFrame({"A": [1.0, 2.0]})
+
+    def interrupted(_: pd.DataFrame, file: Path, **__: Any) -> None:
+        Path(file).write_text("A\n1.0")
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pd.DataFrame, "to_csv", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            write_table(tmp_path / "rows.csv", frame)
+    assert list(tmp_path.iterdir()) == []
+    for ending, read in ((".csv", pd.read_csv), (".parquet", pd.read_parquet)):
+        write_table(tmp_path / f"rows{ending}", frame)
+        pd.testing.assert_frame_equal(read(tmp_path / f"rows{ending}"), frame)
+    with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
+        write_table(tmp_path / "rows.txt", frame)
