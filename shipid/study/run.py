@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Iterator
@@ -30,6 +32,7 @@ from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, prepare
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how workers start
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ def run_study(
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
+    if scheduler is None:
+        _import_for_workers()
     if not (folder / store.DATASET).exists():
         made = plan.study.data is not None and plan.study.data.dataset is not None
         doing = "reading the dataset" if made else "importing the log"
@@ -201,6 +206,23 @@ def _compute(
             yield futures[future], future.result()
 
 
+def _import_for_workers() -> None:
+    """Let a process import all that workers need, while this one prepares; they fork from it, and ignore Ctrl-C as it.
+
+    Once per process, and on Linux only: elsewhere forks are less safe than they are quick.
+    """
+    if METHOD != "forkserver" or threading.current_thread() is not threading.main_thread():
+        return
+    from multiprocessing import forkserver
+
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # is inherited
+    try:
+        forkserver.set_forkserver_preload([__name__, "distributed.nanny"])
+        forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 @contextmanager
 def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[Any]:
     """A Dask client: of an existing scheduler, or of a local cluster of single-threaded processes."""
@@ -208,6 +230,7 @@ def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[A
     from dask.distributed import Client, LocalCluster
 
     quiet = {"distributed.worker.memory.terminate": False, "distributed.admin.large-graph-warning-threshold": "1GB"}
+    quiet |= {"distributed.worker.multiprocessing-method": METHOD}
     with warnings.catch_warnings(), dask.config.set(quiet):
         warnings.simplefilter("ignore")
         if scheduler is not None:
