@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-import signal
 import sys
-import threading
 import time
 import warnings
 from collections.abc import Iterator
@@ -30,9 +28,9 @@ from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, prepare
+from shipid.study.workers import METHOD, import_for_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
-METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how workers start
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def run_study(
     check_device(device)
     store.open_folder(folder, plan)
     if scheduler is None:
-        _import_for_workers()
+        import_for_workers()
     if not (folder / store.DATASET).exists():
         made = plan.study.data is not None and plan.study.data.dataset is not None
         doing = "reading the dataset" if made else "importing the log"
@@ -204,23 +202,6 @@ def _compute(
         }
         for future in as_completed(futures):
             yield futures[future], future.result()
-
-
-def _import_for_workers() -> None:
-    """Let a process import all that workers need, while this one prepares; they fork from it, and ignore Ctrl-C as it.
-
-    Once per process, and on Linux only: elsewhere forks are less safe than they are quick.
-    """
-    if METHOD != "forkserver" or threading.current_thread() is not threading.main_thread():
-        return
-    from multiprocessing import forkserver
-
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # is inherited
-    try:
-        forkserver.set_forkserver_preload([__name__, "distributed.nanny"])
-        forkserver.ensure_running()
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

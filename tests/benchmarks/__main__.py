@@ -30,6 +30,7 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "orchestration": 1,
 }
 RESULTS = Path("results/bench.json")
+WIDTH = 140
 
 
 def main() -> int:
@@ -67,7 +68,7 @@ def measure(name: str) -> dict[str, Any]:
 
 def show(figures: dict[str, dict[str, Any]], ratios: list[Ratio]) -> None:
     """Print all figures, then the ratios beside what was recorded and promised."""
-    console = Console()
+    console = Console(width=WIDTH, markup=False, highlight=False)
     table = Table("group", "figure", "value")
     for group, measured in figures.items():
         for label, value in measured.items():
