@@ -305,6 +305,10 @@ def study_run(
     device: Device = "cpu",
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
+    from shipid.study.workers import import_for_workers
+
+    if scheduler is None:
+        import_for_workers()  # before this process imports for itself
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, _parsed(changes))

@@ -28,6 +28,7 @@ from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, prepare
+from shipid.study.workers import METHOD, import_for_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
@@ -67,6 +68,8 @@ def run_study(
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
+    if scheduler is None:
+        import_for_workers()
     if not (folder / store.DATASET).exists():
         made = plan.study.data is not None and plan.study.data.dataset is not None
         doing = "reading the dataset" if made else "importing the log"
@@ -208,6 +211,7 @@ def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[A
     from dask.distributed import Client, LocalCluster
 
     quiet = {"distributed.worker.memory.terminate": False, "distributed.admin.large-graph-warning-threshold": "1GB"}
+    quiet |= {"distributed.worker.multiprocessing-method": METHOD}
     with warnings.catch_warnings(), dask.config.set(quiet):
         warnings.simplefilter("ignore")
         if scheduler is not None:

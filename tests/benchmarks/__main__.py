@@ -1,33 +1,126 @@
-"""`make bench`: run every benchmark, print a table, write `results/bench.json` with machine and versions."""
+"""`make bench`: measure, print tables, write `results/bench.json`, and fail where a ratio regressed."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
+from datetime import date
+from importlib import import_module
 from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
 
 from shipid.estimation.training import use_threads
 from shipid.study.run import machine
-from tests.benchmarks import cells, commands, rollouts, truth
+from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best, compare, read_recorded
 
-BENCHMARKS = {"rollouts": rollouts, "truth": truth, "commands": commands, "cells": cells}
+THREADS = {  # group, the module of that name -> threads that PyTorch may use
+    "limits": 1,
+    "rollouts": 2,
+    "screening": 2,
+    "truth": 2,
+    "growth": 2,
+    "commands": 2,
+    "first": 2,
+    "cells": 1,
+    "recipes": 1,
+    "orchestration": 1,
+}
+RESULTS = Path("results/bench.json")
+WIDTH = 140
 
 
-def main(wanted: list[str]) -> None:
-    """Run the benchmarks named, or all."""
-    report = {"machine": machine(), "threads": 2}
-    for name in wanted or BENCHMARKS:
-        use_threads(1 if name == "cells" else 2)
-        figures = BENCHMARKS[name].run()
-        report[name] = figures
-        print(f"\n{name}")
-        for label, value in figures.items():
-            print(f"  {label:40s} {value}")
-    file = Path("results/bench.json")
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(json.dumps(report, indent=1))
-    print(f"\n-> {file}")
+def main() -> int:
+    """Run the benchmarks named, or all; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
+    parser.add_argument("groups", nargs="*", metavar="group", help=f"one of {', '.join(THREADS)}; default: all")
+    parser.add_argument("--record", action="store_true", help="accept the ratios measured now")
+    asked = parser.parse_args()
+    unknown = [name for name in asked.groups if name not in THREADS]
+    if unknown:
+        parser.error(f"no such group: {', '.join(unknown)}")
+    recorded = read_recorded()
+    figures = {name: measure(name) for name in asked.groups or THREADS}
+    again = {ratio.group for ratio in compare(figures, recorded) if ratio.regressed and not asked.record}
+    if again:
+        print(f"measured once more: {', '.join(sorted(again))}", file=sys.stderr)
+        figures = best(figures, {name: measure(name) for name in figures if name in again}, recorded)
+    ratios = compare(figures, recorded)
+    show(figures, ratios)
+    write(figures, ratios)
+    if asked.record:
+        RECORDED.write_text(json.dumps(accepted(figures, recorded), indent=1) + "\n")
+        print(f"recorded -> {RECORDED}")
+        return 0
+    return verdict(ratios)
+
+
+def measure(name: str) -> dict[str, Any]:
+    """Figures of one group."""
+    print(f"{name} ...", file=sys.stderr)
+    use_threads(THREADS[name])
+    figures: dict[str, Any] = import_module(f"tests.benchmarks.{name}").run()
+    return figures
+
+
+def show(figures: dict[str, dict[str, Any]], ratios: list[Ratio]) -> None:
+    """Print all figures, then the ratios beside what was recorded and promised."""
+    console = Console(width=WIDTH, markup=False, highlight=False)
+    table = Table("group", "figure", "value")
+    for group, measured in figures.items():
+        for label, value in measured.items():
+            table.add_row(group, label, f"{value:g}" if isinstance(value, float) else str(value))
+        table.add_section()
+    console.print(table)
+    table = Table("group", "ratio", "now", "recorded", "worse by", "better", "promise", "")
+    for ratio in ratios:
+        was = "-" if ratio.recorded is None else f"{ratio.recorded:g}"
+        bound = "-" if ratio.promise is None else f"{ratio.promise:g}"
+        word = "regressed" if ratio.regressed else "promise missed" if ratio.kept is False else ""
+        table.add_row(
+            ratio.group, ratio.label, f"{ratio.value:g}", was, f"{ratio.worse_by:+.0%}", ratio.better, bound, word
+        )
+    console.print(table)
+
+
+def write(figures: dict[str, dict[str, Any]], ratios: list[Ratio]) -> None:
+    """Write `results/bench.json`: date, machine with versions, figures, ratios."""
+    compared = [
+        {"group": one.group, "ratio": one.label, "value": one.value, "recorded": one.recorded, "better": one.better}
+        | {"worse_by": round(one.worse_by, 3), "regressed": one.regressed, "promise": one.promise, "kept": one.kept}
+        for one in ratios
+    ]
+    report = {"date": date.today().isoformat(), "machine": machine() | {"processor": processor()}}
+    report |= {"threads": {name: THREADS[name] for name in figures}, "figures": figures, "ratios": compared}
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(report, indent=1) + "\n")
+    print(f"-> {RESULTS}")
+
+
+def processor() -> str:
+    """Name of the processor, where the system tells."""
+    file = Path("/proc/cpuinfo")
+    lines = file.read_text().splitlines() if file.exists() else []
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def verdict(ratios: list[Ratio]) -> int:
+    """Name what regressed; 1 if anything did."""
+    worse = [ratio for ratio in ratios if ratio.regressed]
+    for ratio in worse:
+        print(
+            f"{ratio.group}: {ratio.label}: {ratio.value:g}, recorded {ratio.recorded:g} ({ratio.better} is better): "
+            f"worse by {ratio.worse_by:.0%}, more than {TOLERANCE:.0%}",
+            file=sys.stderr,
+        )
+    if worse:
+        names = " ".join(dict.fromkeys(ratio.group for ratio in worse))
+        print(f"to accept the new values: python -m tests.benchmarks {names} --record", file=sys.stderr)
+    return 1 if worse else 0
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main())

@@ -6,12 +6,17 @@ import time
 from collections.abc import Callable, Mapping
 
 
+def clock(run: Callable[[], object]) -> float:
+    """Wall time [s] of one call."""
+    start = time.perf_counter()
+    run()
+    return time.perf_counter() - start
+
+
 def best_of(ways: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
     """Least wall time [s] of each way over `rounds` rounds, every round calling all of them in turn."""
     best = dict.fromkeys(ways, float("inf"))
     for _ in range(rounds):
         for name, run in ways.items():
-            start = time.perf_counter()
-            run()
-            best[name] = min(best[name], time.perf_counter() - start)
+            best[name] = min(best[name], clock(run))
     return best

@@ -27,13 +27,18 @@ def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
 
 def run_here(plan: Plan, folder: Path) -> list[run.Event]:
     """Run a study in this process, without a cluster."""
+    return list(events_here(plan, folder))
+
+
+def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
+    """The same, event by event."""
 
     def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *_: Any) -> Iterator[Any]:
         for batch in batches:
             yield batch, run.run_batch(plan, prepared, batch, "cpu")
 
     with patch.object(run, "_compute", compute):
-        return list(run.run_study(plan, folder))
+        yield from run.run_study(plan, folder)
 
 
 def logged(runs: Mapping[str, Mapping[str, Any]], t: np.ndarray, **metadata: Any) -> Dataset:
