@@ -124,7 +124,7 @@ def tune_ridge(
         seen = mirrored if point["mirror"] and mirrored is not None else plain
         hidden = _draw(seen, point, recipe.units, seed_of(seed, number))
         parts = _parts(seen, hidden, outputs, device)
-        errors = np.stack([_left_out(parts, ridge, blocks, len(names)) for ridge in ridges])
+        errors = _left_out(parts, ridges, blocks, len(names))
         for k, key in enumerate(names):
             ridge = ridges[errors[:, k].argmin()]
             params = {**point, "mirror": float(seen is mirrored), "ridge": ridge}
@@ -229,17 +229,23 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
     return eigenvalues.clamp(min=0.0), axes
 
 
-def _left_out(parts: Sequence[_Part], ridge: float, blocks: Sequence[tuple[Tensor, Tensor]], num_models: int) -> Array:
-    """Sum of squared errors (K,) [m^2] over all judged windows, each block predicted without itself."""
-    total = torch.zeros(num_models, dtype=torch.float64, device=parts[0].rotated.device)
+def _left_out(
+    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[tuple[Tensor, Tensor]], num_models: int
+) -> Array:
+    """Sums of squared errors (ridges, K) [m^2] over all judged windows, each block predicted without itself."""
+    total = torch.zeros((len(ridges), num_models), dtype=torch.float64, device=parts[0].rotated.device)
     for part in parts:
-        shrunk = 1 / (part.eigenvalues + ridge)
-        residual = part.targets - part.rotated @ (shrunk[:, None] * part.product)
         for out, judged in blocks:
-            rows = part.rotated[out]  # (folds, b, M)
-            system = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device) - (rows * shrunk) @ rows.mT
-            error = torch.linalg.solve(system, residual[out]).take_along_dim(judged[:, :, None], dim=1)
-            total += error.square().sum(dim=(0, 1)).view(num_models, -1).sum(dim=1)
+            rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
+            unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
+            for i, ridge in enumerate(ridges):
+                shrunk = 1 / (part.eigenvalues + ridge)
+                weighted = rows * shrunk
+                residual = targets - weighted @ part.product
+                error = torch.linalg.solve(unit - weighted @ rows.mT, residual)
+                if judged.shape != out.shape:
+                    error = error.take_along_dim(judged[:, :, None], dim=1)
+                total[i] += error.square().sum(dim=(0, 1)).view(num_models, -1).sum(dim=1)
     found: Array = total.cpu().numpy()
     return found
 

@@ -1,6 +1,6 @@
 """What a study costs beside its cells, and what a second worker gains, against bare processes in the same run.
 
-The cells of the first part are known work: `tune` is replaced by one that trains next to nothing and then computes
+The cells of the first part are known work: `tune` is replaced by one that solves next to nothing and then computes
 until each of its cells has had a second of its thread's processor time. All else of a cell is as ever: windows, folds,
 predictors, scores, files.
 """
@@ -32,9 +32,9 @@ from tests.benchmarks.timing import best_of, clock
 
 CELL = 1.0  # s
 WORKERS = (1, 2)
-LIGHT = {"trials": 1, "epochs": 1, "min_steps": 0, "refit": 0}
+LIGHT = {"trials": 1, "averaged": 1, "units": 16}
 KNOWN = {"grid.N_D": [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]}  # 60 cells
-REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "recipe.trials": 2, "recipe.min_steps": 500}
+REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "recipe.trials": 30}
 PRODUCT, PRODUCTS = 1500, 40  # order of the matrices, and how many products each of two tasks is
 
 run_batch = study.run_batch
@@ -104,15 +104,15 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
 
 
 def gain() -> dict[str, Any]:
-    """Gain of a whole study, truly trained, from a second worker, over that of a matrix product in two processes."""
+    """Gain of a whole study, truly tuned, from a second worker, over that of a matrix product in two processes."""
     plan = read_plan("quick", REAL)
     prepare(plan, obtain(plan))
     product = _product_gain()
     one, two = (_study(plan, count)[0] for count in WORKERS)
     product = max(product, _product_gain())
     return {
-        "trained study, 1 worker [s]": round(one, 1),
-        "trained study, 2 workers [s]": round(two, 1),
+        "tuned study, 1 worker [s]": round(one, 1),
+        "tuned study, 2 workers [s]": round(two, 1),
         "gain of the study": round(one / two, 3),
         "gain of a matrix product": round(product, 3),
         "gain of the study / of a product": round(one / two / product, 3),

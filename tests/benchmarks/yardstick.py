@@ -11,16 +11,17 @@ import json
 import pickle
 import subprocess
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shipid.estimation import tuning
+from shipid.estimation import gradient
 from shipid.estimation.recipe import Recipe
 from shipid.estimation.training import use_threads
+from shipid.estimation.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare
@@ -45,22 +46,18 @@ class Cell:
 
 
 CELLS = (  # spanning N_D and A; worlds that no recipe was chosen on
-    Cell(5, 10, "moderate-1"),
-    Cell(6, 10, "high-1"),
-    Cell(7, 10, "none"),
+    *(Cell(number, 10, model) for model in ("moderate-1", "high-1", "none", "nominal") for number in range(5, 10)),
     Cell(8, 30, "moderate-2"),
-    Cell(9, 10, "nominal"),
     Cell(9, 30, "high-2"),
-    Cell(5, 100, "moderate-3"),
     Cell(7, 30, "nominal"),
+    Cell(5, 100, "moderate-3"),
     Cell(6, 100, "high-3"),
-    Cell(8, 100, "none"),
 )
 
 
 def world(number: int) -> tuple[Plan, Prepared]:
     """The study `simulation` in a world: its plan and all that its cells need."""
-    plan = read_plan("simulation", {"seed": number})
+    plan = read_plan("simulation", {"seed": number, "recipe.kind": "fast"})
     return plan, prepare(plan, obtain(plan))
 
 
@@ -70,9 +67,9 @@ def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, recipe: Recipe) -> dic
     mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
     windows = prepared.pool.select(mask)
     targets = {cell.model: windows.future - prepared.pool_paths[cell.model][:, mask]}
-    folds = prepared.folds(plan, batch, windows)
+    folds = prepared.folds(replace(plan, recipe=recipe), batch, windows)
     start = time.process_time()
-    found = tuning.tune(windows.columns, prepared.commands, targets, folds, recipe, batch.seed)[cell.model]
+    found = tune(windows.columns, prepared.commands, targets, folds, recipe, batch.seed)[cell.model]
     seconds = time.process_time() - start
     assert found.compensator is not None
     paths = prepared.test_paths[cell.model] + found.compensator.predict(prepared.test.columns)
@@ -103,7 +100,7 @@ def main() -> None:
 def _remember(folder: Path) -> list[float]:
     """Keep every network that `tune` trains, so that it is trained once; returns the core-seconds as they add up."""
     folder.mkdir(parents=True, exist_ok=True)
-    train = getattr(tuning._fit, "__wrapped__", tuning._fit)
+    train = getattr(gradient._fit, "__wrapped__", gradient._fit)
     spent: list[float] = []
 
     def kept(data: Any, stack: Any, recipe: Recipe, entropy: tuple[int, ...], device: str) -> Any:
@@ -118,7 +115,7 @@ def _remember(folder: Path) -> list[float]:
         return result
 
     kept.__wrapped__ = train  # type: ignore[attr-defined]
-    tuning._fit = kept
+    gradient._fit = kept
     return spent
 
 

@@ -1,0 +1,50 @@
+"""`fast` against the yardstick `paper`: the same cells, each tuned alone on one thread, on worlds not chosen on."""
+
+from __future__ import annotations
+
+import json
+import time
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from shipid.estimation.recipe import Recipe
+from shipid.study.run import run_batch
+from tests.benchmarks.yardstick import KEPT, Cell, tune_cell, world
+
+FAST = Recipe.preset("fast")
+world = cache(world)
+
+
+def run() -> dict[str, Any]:
+    """Core-seconds and errors of each cell of the yardstick by `fast`, and the ratios of the means."""
+    pairs = [(kept, _fast(Cell(kept["world"], kept["N_D"], kept["model"]))) for kept in json.loads(KEPT.read_text())]
+    result: dict[str, Any] = {"cells": len(pairs)}
+    for kept, fast in pairs:
+        name = f"world {kept['world']}, N_D {kept['N_D']}, {kept['model']}"
+        result[f"{name}: core-seconds, paper / fast"] = f"{kept['core_seconds']:.0f} / {fast['core_seconds']:.1f}"
+        result[f"{name}: H, paper / fast [m]"] = f"{kept['H']:.2f} / {fast['H']:.2f}"
+    for key, label in (("core_seconds", "time"), ("H", "mean H"), ("H_90", "mean H_90")):
+        paper, fast = (np.array([pair[side][key] for pair in pairs]) for side in (0, 1))
+        result |= {f"{label}, paper": round(float(paper.mean()), 3), f"{label}, fast": round(float(fast.mean()), 3)}
+        result[f"{label}, fast / paper"] = round(float(fast.mean() / paper.mean()), 4)
+        if key != "core_seconds":
+            result[f"{label}: fast is better in"] = f"{int((fast < paper).sum())} of {len(pairs)}"
+    return result | _in_company(pairs[0][0]["world"])
+
+
+def _fast(cell: Cell) -> dict[str, Any]:
+    return tune_cell(*world(cell.world), cell, FAST)
+
+
+def _in_company(number: int) -> dict[str, Any]:
+    """Core-seconds per cell where all models of an amount of data are tuned together, as a study does."""
+    plan, prepared = world(number)
+    result = {}
+    for batch in plan.batches[:: len(plan.batches) - 1]:
+        start = time.process_time()
+        rows = run_batch(plan, prepared, batch, "cpu")
+        seconds = (time.process_time() - start) / len(rows)
+        result[f"in a batch of {len(rows)}, N_D {batch.N_D}: core-seconds a cell"] = round(seconds, 2)
+    return result
