@@ -20,6 +20,7 @@ MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
 BINS = 9  # of the middle line
 WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
+MOST_DECADES = 5.0  # with a tick each
 CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
 
@@ -163,8 +164,11 @@ def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
         x = axis(label(spoken(name)), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
     elif low > 0 and high / low > WIDE:
         ends = np.log10([low, high])
-        span = [float(ends[0] - room * np.ptp(ends)), float(ends[1] + room * np.ptp(ends))]
-        x = logarithmic(title, (1,) if np.ptp(ends) > 1.5 else (1, 2, 5), range=span)
+        decades = float(np.ptp(ends))
+        span = [float(ends[0] - room * decades), float(ends[1] + room * decades)]
+        x = logarithmic(title, (1,) if decades > 1.5 else (1, 2, 3, 5), range=span)
+        if decades > MOST_DECADES:
+            x |= {name: x[name][::2] for name in ("tickvals", "ticktext")}
     else:
         x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
     ticks: dict[str, Any] = {
@@ -215,9 +219,10 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
 def _row(size: int, mine: pd.DataFrame, shares: dict[str, bool], passes: bool) -> list[Cell]:
     counts = [mine.cell.nunique(), len(mine), int(mine.state.eq("stopped").sum()), int(mine.state.eq("diverged").sum())]
     seconds = float(mine.seconds.sum())
-    numbers = [size, *counts, *([int(mine.epochs.sum())] if passes else []), seconds, seconds / counts[0]]
+    numbers = [size, *counts, *([int(mine.epochs.sum())] if passes else [])]
     chosen = mine[mine.chosen.astype(bool)]
-    return [figure(value, 0) for value in numbers] + [_choice(chosen[name], share) for name, share in shares.items()]
+    choices = [_choice(chosen[name], share) for name, share in shares.items()]
+    return [*(figure(value, 0) for value in numbers), figure(seconds, 1), figure(seconds / counts[0], 1), *choices]
 
 
 def _choice(chosen: pd.Series[float], share: bool) -> Cell:
