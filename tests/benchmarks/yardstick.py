@@ -11,14 +11,14 @@ import json
 import pickle
 import subprocess
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shipid.estimation import tuning
+from shipid.estimation import gradient, tuning
 from shipid.estimation.recipe import Recipe
 from shipid.estimation.training import use_threads
 from shipid.metrics import position_error, summary
@@ -70,7 +70,7 @@ def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, recipe: Recipe) -> dic
     mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
     windows = prepared.pool.select(mask)
     targets = {cell.model: windows.future - prepared.pool_paths[cell.model][:, mask]}
-    folds = prepared.folds(plan, batch, windows)
+    folds = prepared.folds(replace(plan, recipe=recipe), batch, windows)
     start = time.process_time()
     found = tuning.tune(windows.columns, prepared.commands, targets, folds, recipe, batch.seed)[cell.model]
     seconds = time.process_time() - start
@@ -103,7 +103,7 @@ def main() -> None:
 def _remember(folder: Path) -> list[float]:
     """Keep every network that `tune` trains, so that it is trained once; returns the core-seconds as they add up."""
     folder.mkdir(parents=True, exist_ok=True)
-    train = getattr(tuning._fit, "__wrapped__", tuning._fit)
+    train = getattr(gradient._fit, "__wrapped__", gradient._fit)
     spent: list[float] = []
 
     def kept(data: Any, stack: Any, recipe: Recipe, entropy: tuple[int, ...], device: str) -> Any:
@@ -118,7 +118,7 @@ def _remember(folder: Path) -> list[float]:
         return result
 
     kept.__wrapped__ = train  # type: ignore[attr-defined]
-    tuning._fit = kept
+    gradient._fit = kept
     return spent
 
 

@@ -185,12 +185,30 @@ def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     assert np.abs(plain.predict(mirrored(new)) - plain.predict(new) * [1.0, -1.0]).max() > 0.01
 
 
-def test_two_azimuths_that_act_as_one_are_mirrored_as_one(columns):
+def as_one(columns):
     for signal in ("n", "alpha"):
-        columns[f"starboard.{signal}"] = columns[f"port.{signal}"].copy()
+        columns[f"starboard.{signal}"] = columns[f"port.{signal}"]
+    return ["port.n", "port.alpha"]
+
+
+def at_one_speed(columns):
+    columns["starboard.n"] = columns["port.n"]
+    return ["port.n", "port.alpha", "starboard.alpha"]
+
+
+def toe_in(columns):
+    """Fixed a little inwards, each to its side: the mirror image is the ship itself."""
+    columns["port.alpha"], columns["starboard.alpha"] = np.full(120, 0.1), np.full(120, -0.1)
+    return ["port.n", "starboard.n"]
+
+
+@pytest.mark.parametrize("act", [as_one, at_one_speed, toe_in])
+def test_inputs_that_were_merged_or_dropped_are_mirrored_too(columns, act):
+    kept = act(columns)
     paths = np.random.default_rng(2).normal(size=(STEPS, len(ALL), 2))
     one = tuned(columns, {"any": paths}, recipe(mirror=1.0))["any"].compensator
-    assert list(one.networks[0].features) == ["u", "v", "r", "port.n", "port.alpha", "u_rw", "v_rw"]
+    assert list(one.networks[0].features) == ["u", "v", "r", *kept, "u_rw", "v_rw"]
+    assert one.hyperparameters["mirror"] == 1.0
     np.testing.assert_allclose(one.predict(mirrored(columns)), one.predict(columns) * [1.0, -1.0], atol=1e-12)
 
 
