@@ -136,7 +136,7 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"horizon": None}, "damaged"),
         ({"limits": {"u": [1.0]}}, "damaged"),
         ({"compensator": 3}, "damaged"),
-        ({"0.scale": None}, "missing in the saved compensator"),
+        ({"0.basis": None}, "missing in the saved compensator"),
         ({"0.mean": np.zeros(3)}, "do not fit together"),
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "dof: missing"),
     ],

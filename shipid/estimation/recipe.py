@@ -56,6 +56,14 @@ class Recipe(BaseModel):
         """Return what is to be searched: name -> (low, high)."""
         return {name: value for name in self.SEARCHED if isinstance(value := getattr(self, name), tuple)}
 
+    def varied(self) -> tuple[str, ...]:
+        """Name what may differ between trials."""
+        return tuple(self.ranges())
+
+    def num_chosen(self) -> int:
+        """Return how many of the best trials make the compensator, at most."""
+        return 1
+
 
 class GradientRecipe(Recipe):
     """Networks trained by Adam, searched by Optuna's TPE: what the paper does.
@@ -114,6 +122,14 @@ class RidgeRecipe(Recipe):
     terms: PositiveInt
     mirror: Probability
     averaged: PositiveInt
+
+    def varied(self) -> tuple[str, ...]:
+        """Name what may differ between trials."""
+        return (*self.ranges(), "mirror") if 0 < self.mirror < 1 else tuple(self.ranges())
+
+    def num_chosen(self) -> int:
+        """Return how many of the best trials make the compensator, at most."""
+        return self.averaged
 
     def points(self) -> list[dict[str, float]]:
         """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0."""

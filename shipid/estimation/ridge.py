@@ -110,10 +110,8 @@ def tune_ridge(
     names = [key for key, paths in targets.items() if np.isfinite(paths[:, windows]).all()]
     basis = smooth_basis(len(next(iter(targets.values()))), recipe.terms)
     paths = [np.tensordot(basis.T, targets[key][:, windows], 1) for key in names]
-    faster = [
-        np.square(targets[key][:, windows]).sum() - np.square(path).sum()
-        for key, path in zip(names, paths, strict=True)
-    ]
+    judged = np.concatenate([validation for _, validation in folds])
+    faster = [_faster(targets[key][:, judged], basis) for key in names]
     outputs = [_side(paths, axis, len(windows), device) for axis in (0, 1)]
     plain, mirrored = _inputs(table, device), _mirrored(table, device)
     searches = {key: _Search(recipe.averaged) for key in names}
@@ -124,11 +122,11 @@ def tune_ridge(
         seen = mirrored if point["mirror"] and mirrored is not None else plain
         hidden = _draw(seen, point, recipe.units, seed_of(seed, number))
         parts = _parts(seen, hidden, outputs, device)
-        errors = _left_out(parts, ridges, blocks, len(names))
+        errors = _left_out(parts, ridges, blocks, basis.shape[1])
         for k, key in enumerate(names):
             ridge = ridges[errors[:, k].argmin()]
             params = {**point, "mirror": float(seen is mirrored), "ridge": ridge}
-            value = float(errors[:, k].min() + faster[k]) / (2 * len(basis) * len(windows))
+            value = float(errors[:, k].min() + faster[k]) / (2 * len(basis) * len(judged))
             mine = slice(k * basis.shape[1], (k + 1) * basis.shape[1])
             searches[key].record(number, params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
         seconds = (time.perf_counter() - start) / max(1, len(names))
@@ -151,6 +149,11 @@ def smooth_basis(horizon: int, terms: int) -> Array:
     powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
     basis: Array = np.linalg.qr(powers)[0]
     return basis
+
+
+def _faster(paths: Array, basis: Array) -> float:
+    """Sum of squares [m^2] of what the basis cannot follow in paths (T, S, 2)."""
+    return float(np.square(paths - np.tensordot(basis @ basis.T, paths, 1)).sum())
 
 
 def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[tuple[Tensor, Tensor]]:
@@ -230,10 +233,10 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _left_out(
-    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[tuple[Tensor, Tensor]], num_models: int
+    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[tuple[Tensor, Tensor]], terms: int
 ) -> Array:
-    """Sums of squared errors (ridges, K) [m^2] over all judged windows, each block predicted without itself."""
-    total = torch.zeros((len(ridges), num_models), dtype=torch.float64, device=parts[0].rotated.device)
+    """Sums of squared errors (ridges, K) [m^2] over judged windows, each block without itself; `terms` is r."""
+    total = parts[0].targets.new_zeros(len(ridges), parts[0].targets.shape[1] // terms)
     for part in parts:
         for out, judged in blocks:
             rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
@@ -245,7 +248,7 @@ def _left_out(
                 error = torch.linalg.solve(unit - weighted @ rows.mT, residual)
                 if judged.shape != out.shape:
                     error = error.take_along_dim(judged[:, :, None], dim=1)
-                total[i] += error.square().sum(dim=(0, 1)).view(num_models, -1).sum(dim=1)
+                total[i] += error.square().sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
     found: Array = total.cpu().numpy()
     return found
 

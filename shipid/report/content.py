@@ -110,8 +110,8 @@ class ReportContent:
     factors : one row per perturbed number of a model: model, path, group ("hull", "inertia", ...), factor [1]; a term
         that was removed has factor 0.
     trials : one row per trial of the search: cell, model, N_D, seed, number, state ("complete", "diverged",
-        "stopped"), value [m^2] (NaN where diverged), epochs, seconds, chosen, and one float column per searched
-        hyperparameter.
+        "stopped"), value [m^2] (NaN where diverged), epochs (0 in closed form), seconds, chosen (its network is in the
+        compensator), and one float column per searched hyperparameter; yes or no is 1 or 0.
     horizon : model, N_D, seed, source, ahead [s], mean, p90 [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
     commands : run, t [s], one column per command in sailors' units, the unit in brackets: "port shaft [rpm]".

@@ -18,8 +18,9 @@ from shipid.report.wording import counted, number
 
 MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
-BINS = 8  # of the middle line
-WIDE = 10.0  # largest / smallest value from which an axis is logarithmic
+BINS = 9  # of the middle line
+WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
+MOST_DECADES = 5.0  # with a tick each
 CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
 
@@ -40,20 +41,15 @@ def search(content: ReportContent) -> Figure | None:
         title="What the search tried",
         takeaway=_takeaway(frame, names),
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
-        f"{_thinned(frame)}those beyond {CEILING:g} times lie at the upper edge, those that diverged above it. The "
-        "line joins the medians of all that ended. Rank correlation (Spearman) is taken within each cell, then "
-        "averaged over cells: it sees what rises or falls throughout, not an optimum in the middle.",
+        f"{_thinned(frame)}diamonds are those whose networks the cell uses; those beyond {CEILING:g} times lie at the "
+        "upper edge, those that diverged above it. The line joins the medians of all that ended. Rank correlation "
+        "(Spearman) is taken within each cell, then averaged over cells: it sees what rises or falls throughout, not "
+        "an optimum in the middle.",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
         views=views,
         controls=[Control("Manoeuvres, N_D", ["all", *map(str, counts)])] if counts else [],
-        chips=[
-            Chip("state:complete", "trial", MUTED, "none", symbol="circle"),
-            Chip("state:stopped", "stopped early", category(4), "none", symbol="triangle-up"),
-            Chip("state:diverged", "diverged", "var(--bad)", "none", symbol="x"),
-            Chip("chosen", "chosen", category(0), "none", symbol="diamond"),
-            Chip("median", "median", INK),
-        ],
+        chips=_chips(frame),
     )
 
 
@@ -62,17 +58,25 @@ def table(content: ReportContent) -> Table | None:
     frame, names = content.trials, searched(content)
     if frame.empty:
         return None
-    rows = [_row(int(str(size)), mine, names) for size, mine in frame.groupby("N_D", sort=True)]
-    chosen = [f"chosen {name} [1]" for name in names]
-    headings = ["N_D [1]", "cells [1]", "trials [1]", "stopped [1]", "diverged [1]", "epochs [1]", "time [s]"]
-    headings += ["time per cell [s]", *chosen]
-    return Table("search-table", "The search by N_D", _counts(frame), headings, [True] * len(headings), rows)
+    passes = bool(frame.epochs.any())
+    shares = {name: _yes_or_no(frame[name]) for name in names}
+    rows = [_row(int(str(size)), mine, shares, passes) for size, mine in frame.groupby("N_D", sort=True)]
+    chosen = [f"{'share of ' if share else ''}chosen {spoken(name)} [1]" for name, share in shares.items()]
+    headings = ["N_D [1]", "cells [1]", "trials [1]", "stopped [1]", "diverged [1]"]
+    headings += [*(["epochs [1]"] if passes else []), "time [s]", "time per cell [s]", *chosen]
+    takeaway = " ".join(part for part in (_counts(frame), _tried(frame, names)) if part)
+    return Table("search-table", "The search by N_D", takeaway, headings, [True] * len(headings), rows)
 
 
 def searched(content: ReportContent) -> list[str]:
     """Names of the searched hyperparameters: further columns of the trials that take more than one value."""
     frame = content.trials
     return [str(name) for name in frame.columns if name not in TRIAL and frame[name].nunique() > 1]
+
+
+def spoken(name: str) -> str:
+    """Name a hyperparameter as in a sentence."""
+    return name.replace("_", " ")
 
 
 def importance(frame: pd.DataFrame, name: str) -> float:
@@ -88,6 +92,17 @@ def _relative(trials: pd.DataFrame) -> pd.DataFrame:
     """Trials with `ratio` [1]: the root of the value over the best of the cell."""
     good = trials.value.where(trials.state.ne("diverged")).astype(float)
     return trials.assign(value=good, ratio=np.sqrt(good / good.groupby(trials.cell).transform("min")))
+
+
+def _chips(frame: pd.DataFrame) -> list[Chip]:
+    """What is drawn; no chip for what never happened."""
+    states = {
+        "complete": Chip("state:complete", "trial", MUTED, "none", symbol="circle"),
+        "stopped": Chip("state:stopped", "stopped early", category(4), "none", symbol="triangle-up"),
+        "diverged": Chip("state:diverged", "diverged", "var(--bad)", "none", symbol="x"),
+    }
+    chips = [chip for state, chip in states.items() if frame.state.eq(state).any()]
+    return [*chips, Chip("chosen", "chosen", category(0), "none", symbol="diamond"), Chip("median", "median", INK)]
 
 
 def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
@@ -116,7 +131,7 @@ def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dic
     y = mine.ratio.clip(upper=CEILING).fillna(FAILED).to_numpy(dtype=float)
     trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
     known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
-    trace.hovertemplate = f"{label(what)}: {label(name)} %{{x:.3g}}{known}<extra></extra>"
+    trace.hovertemplate = f"{label(what)}: {label(spoken(name))} %{{x:.3g}}{known}<extra></extra>"
     return trace
 
 
@@ -143,12 +158,17 @@ def _medians(frame: pd.DataFrame, name: str) -> Floats:
 
 def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
     low, high = float(every.min()), float(every.max())
-    title = f"{label(name)} [1]"
+    title = f"{label(spoken(name))} [1]"
     room = 0.04
-    if low > 0 and high / low > WIDE:
+    if _yes_or_no(every):
+        x = axis(label(spoken(name)), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
+    elif low > 0 and high / low > WIDE:
         ends = np.log10([low, high])
-        span = [float(ends[0] - room * np.ptp(ends)), float(ends[1] + room * np.ptp(ends))]
-        x = logarithmic(title, (1,) if np.ptp(ends) > 1.5 else (1, 2, 5), range=span)
+        decades = float(np.ptp(ends))
+        span = [float(ends[0] - room * decades), float(ends[1] + room * decades)]
+        x = logarithmic(title, (1,) if decades > 1.5 else (1, 2, 3, 5), range=span)
+        if decades > MOST_DECADES:
+            x |= {name: x[name][::2] for name in ("tickvals", "ticktext")}
     else:
         x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
     ticks: dict[str, Any] = {
@@ -164,11 +184,23 @@ def _caption(frame: pd.DataFrame, name: str) -> str:
     return f"rank correlation {number(round(found, 2) + 0.0)}" if math.isfinite(found) else "no rank correlation"
 
 
+def _yes_or_no(values: pd.Series[float]) -> bool:
+    return set(values.dropna()) == {0.0, 1.0}
+
+
 def _counts(frame: pd.DataFrame) -> str:
-    states = {name: int(frame.state.eq(name).sum()) for name in ("stopped", "diverged")}
-    said = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {states['stopped']:,} stopped "
-    said += f"early, {states['diverged']:,} diverged"
-    return f"{said}; {duration(float(frame.seconds.sum()))} of training."
+    stopped, diverged = (int(frame.state.eq(name).sum()) or "none" for name in ("stopped", "diverged"))
+    said = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
+    return f"{said}{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
+
+
+def _tried(frame: pd.DataFrame, names: list[str]) -> str:
+    """Say from where to where the search went."""
+    said = []
+    for name in names:
+        low, high = float(frame[name].min()), float(frame[name].max())
+        said.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{low:.2g} to {high:.2g}'}")
+    return f"Tried: {', '.join(said)}." if said else ""
 
 
 def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
@@ -180,21 +212,25 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     found = {name: value for name, value in found.items() if math.isfinite(value)}
     if found:
         most = max(found, key=lambda name: abs(found[name]))
-        text += f"; {most} goes with it most, rank correlation {number(found[most])}"
+        text += f"; {spoken(most)} goes with it most, rank correlation {number(found[most])}"
     return f"{text}."
 
 
-def _row(size: int, mine: pd.DataFrame, names: list[str]) -> list[Cell]:
+def _row(size: int, mine: pd.DataFrame, shares: dict[str, bool], passes: bool) -> list[Cell]:
     counts = [mine.cell.nunique(), len(mine), int(mine.state.eq("stopped").sum()), int(mine.state.eq("diverged").sum())]
     seconds = float(mine.seconds.sum())
-    numbers = [size, *counts, int(mine.epochs.sum()), seconds, seconds / counts[0]]
+    numbers = [size, *counts, *([int(mine.epochs.sum())] if passes else [])]
     chosen = mine[mine.chosen.astype(bool)]
-    return [figure(value, 0) for value in numbers] + [_range(chosen[name].astype(float).dropna()) for name in names]
+    choices = [_choice(chosen[name], share) for name, share in shares.items()]
+    return [*(figure(value, 0) for value in numbers), figure(seconds, 1), figure(seconds / counts[0], 1), *choices]
 
 
-def _range(values: pd.Series[float]) -> Cell:
-    """Smallest, middle and largest chosen value."""
+def _choice(chosen: pd.Series[float], share: bool) -> Cell:
+    """Smallest, middle and largest chosen value, or the share of yes."""
+    values = chosen.astype(float).dropna()
     if values.empty:
         return text(None)
+    if share:
+        return figure(values.mean(), 2)
     low, middle, high = (float(value) for value in values.quantile([0.0, 0.5, 1.0]))
     return Cell(" / ".join(f"{value:.2g}" for value in (low, middle, high)), middle)

@@ -268,15 +268,16 @@ def factors_frame(results: Results) -> pd.DataFrame:
 
 
 def trials_frame(results: Results) -> pd.DataFrame:
-    """One row per trial of the search, value [m^2], with a column per searched hyperparameter; `chosen` is the best."""
-    searched, rows = list(results.plan.recipe.ranges()), []
+    """One row per trial of the search, value [m^2], with a column for all that varies; the best trials are `chosen`."""
+    recipe = results.plan.recipe
+    searched, rows = list(recipe.varied()), []
     for cell in results.rows:
         done = [trial for trial in cell["trials"] if trial["state"] == "complete"]
-        best = min(done, key=lambda trial: trial["value"], default=None)
+        best = sorted(done, key=lambda trial: trial["value"])[: recipe.num_chosen()]
         for trial in cell["trials"]:
             row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
             row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
-            row |= {"chosen": trial is best, **{name: trial["params"].get(name) for name in searched}}
+            row |= {"chosen": trial in best, **{name: trial["params"].get(name) for name in searched}}
             rows.append(row)
     columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
     return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))

@@ -138,7 +138,7 @@ def run_batch(
             row |= {"status": "failed", "sentence": "no training converged"}
         else:
             chosen = found.compensator.hyperparameters
-            searched = {name: chosen[name] for name in plan.recipe.ranges() if name in chosen}
+            searched = {name: chosen[name] for name in plan.recipe.varied() if name in chosen}
             row["hyperparameters"] = ", ".join(f"{name} {value:.3g}" for name, value in searched.items())
             predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
             if usable[model.name]:

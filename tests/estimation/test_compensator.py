@@ -35,7 +35,7 @@ def compensator(columns):
     for fold in range(2):
         layers = tuple((rng.normal(size=(i, o)), rng.normal(size=o)) for i, o in ((7, 5), (5, 5), (5, 8)))
         seen = {name: values[fold::2] for name, values in table.items()}
-        networks.append(Network(features, Normaliser.fit(seen, tuple(features)), rng.uniform(1, 9, (4, 2)), layers))
+        networks.append(Network(features, Normaliser.fit(seen, tuple(features)), rng.normal(size=(6, 4)), layers))
     return Compensator(COMMANDS, tuple(networks), {"layers": 2, "units": 5, "learning_rate": 0.01})
 
 
@@ -103,7 +103,7 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
             h = torch.nn.functional.linear(h, torch.tensor(weight.T.copy()), torch.tensor(bias))
             h = h.tanh() if i < 2 else h
         x, y = h[:, :4].numpy().T, h[:, 4:].numpy().T  # (12): all dx, then all dy
-        expected.append(np.stack([x, y], axis=-1) * network.scale[:, None])
+        expected.append(np.stack([network.basis @ x, network.basis @ y], axis=-1))
     np.testing.assert_allclose(compensator.predict(columns), np.mean(expected, axis=0), atol=1e-10)
 
 
@@ -136,3 +136,5 @@ def test_damaged_arrays_are_refused(compensator):
         Compensator.from_arrays(header, arrays | {"0.weight.1": np.zeros((5, 6))})
     with pytest.raises(ResultError, match="do not fit"):
         Compensator.from_arrays(header, arrays | {"0.mean": np.zeros(3)})
+    with pytest.raises(ResultError, match="do not fit"):
+        Compensator.from_arrays(header, arrays | {"0.basis": np.zeros((6, 3))})

@@ -9,7 +9,9 @@ from shipid.estimation.tuning import tune
 
 torch.set_num_threads(1)
 COMMANDS = ("port.n", "port.delta", "starboard.n", "starboard.delta")
-SMALL = {"trials": 3, "units": 16, "layers": 1, "epochs": 10, "min_steps": 100}
+SMALL = Recipe.preset("paper", trials=3, units=16, layers=1, learning_rate=1e-2, epochs=40, patience=0)
+SEARCHED = Recipe.preset("paper", trials=3, epochs=20)
+DRAWN = Recipe.preset("fast", trials=3, units=32, terms=4)
 FOLD = (np.arange(40, 200), np.arange(40))
 
 
@@ -33,7 +35,7 @@ def same(a, b):
     return a.header() == b.header() and all(np.array_equal(v, b.arrays()[k]) for k, v in a.arrays().items())
 
 
-@pytest.mark.parametrize("recipe", [Recipe.preset("fast", **SMALL), Recipe.preset("paper", trials=3, epochs=20)])
+@pytest.mark.parametrize("recipe", [DRAWN, SEARCHED])
 def test_the_same_seed_gives_the_same_numbers(columns, targets, recipe):
     first, again = (tune(columns, COMMANDS, targets, [FOLD], recipe, seed=4) for _ in range(2))
     other = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=5)
@@ -43,7 +45,7 @@ def test_the_same_seed_gives_the_same_numbers(columns, targets, recipe):
         assert [row["value"] for row in first[key].trials] == [row["value"] for row in again[key].trials]
 
 
-@pytest.mark.parametrize("recipe", [Recipe.preset("fast", **SMALL), Recipe.preset("paper", trials=3, epochs=20)])
+@pytest.mark.parametrize("recipe", [DRAWN, SEARCHED])
 def test_a_model_does_not_notice_its_company(columns, targets, recipe):
     together = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=4)
     alone = tune(columns, COMMANDS, {"none": targets["none"]}, [FOLD], recipe, seed=4)
@@ -53,12 +55,12 @@ def test_a_model_does_not_notice_its_company(columns, targets, recipe):
 
 
 def test_the_residual_is_learned(columns, targets):
-    recipe = Recipe.preset("fast", **SMALL | {"units": 32, "min_steps": 1000})
-    for key, tuned in tune(columns, COMMANDS, targets, [FOLD], recipe, seed=0).items():
+    kept = {"trials": 1, "input_dropout": 0.0, "hidden_dropout": 0.0, "learning_rate": 0.03, "epochs": 400}
+    for key, tuned in tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=kept), seed=0).items():
         unseen = np.arange(200, 240)
         predicted = tuned.compensator.predict({name: values[unseen] for name, values in columns.items()})
         left = np.square(predicted - targets[key][:, unseen]).mean()
-        assert left < 0.2 * np.square(targets[key][:, unseen]).mean()
+        assert left < 0.5 * np.square(targets[key][:, unseen]).mean()
 
 
 def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
@@ -68,18 +70,17 @@ def test_equal_architectures_train_as_one_stack_and_others_alone(columns, target
         stacks.append(len(targets))
         return train(inputs, targets, *args, **kwargs)
 
-    monkeypatch.setattr("shipid.estimation.tuning.train", counted)
-    tune(columns, COMMANDS, targets, [FOLD], Recipe.preset("fast", **SMALL, refit=1), seed=4)
-    assert stacks == [2] * 4  # three trials and the refit
+    monkeypatch.setattr("shipid.estimation.gradient.train", counted)
+    tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
+    assert stacks == [2] * 3
     stacks.clear()
-    tune(columns, COMMANDS, targets, [FOLD], Recipe.preset("paper", trials=3, epochs=2), seed=4)
+    tune(columns, COMMANDS, targets, [FOLD], SEARCHED.model_copy(update={"epochs": 2}), seed=4)
     assert stacks == [1] * 6
 
 
 def test_the_objective_is_the_mean_loss_of_the_folds(columns, targets):
-    recipe = Recipe.preset("fast", **SMALL, refit=0)
     folds = [(np.arange(80, 240), np.arange(80)), (np.arange(160), np.arange(160, 240))]
-    tuned = tune(columns, COMMANDS, targets, folds, recipe, seed=1)["none"]
+    tuned = tune(columns, COMMANDS, targets, folds, SMALL, seed=1)["none"]
     best = min(tuned.trials, key=lambda row: row["value"])
     assert tuned.compensator.hyperparameters == best["params"]
     losses = []
@@ -91,43 +92,26 @@ def test_the_objective_is_the_mean_loss_of_the_folds(columns, targets):
 
 
 def test_the_statistics_are_those_of_the_training_windows(columns, targets):
-    recipe = Recipe.preset("fast", **SMALL, refit=0)
-    before = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=1)["none"].compensator.networks[0]
+    before = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].compensator.networks[0]
     columns["u"][3] = 1e6  # a validation window
     columns["starboard.n"][5] = -40.0  # equal to port in training all the same
     targets["none"][:, 7] = 1e4
-    after = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=1)["none"].compensator.networks[0]
+    after = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].compensator.networks[0]
     np.testing.assert_array_equal(after.normaliser.mean, before.normaliser.mean)
     np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
-    np.testing.assert_array_equal(after.scale, before.scale)
     assert after.features == before.features
     assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
-
-
-def test_a_refit_sees_all_windows_of_the_folds_and_no_other(columns, targets):
-    tuned = tune(columns, COMMANDS, targets, [FOLD], Recipe.preset("fast", **SMALL, refit=2), seed=1)["none"]
-    assert len(tuned.compensator.networks) == 2
-    for network in tuned.compensator.networks:
-        assert network.normaliser.mean[0] == pytest.approx(columns["u"][:200].mean())
 
 
 def test_the_paper_recipe_keeps_metres(columns, targets):
     recipe = Recipe.preset("paper", trials=1, epochs=2)
     (network,) = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=1)["none"].compensator.networks
-    assert (network.scale == 1.0).all()
+    np.testing.assert_array_equal(network.basis, np.eye(6))  # an output per step
     assert list(network.features) == ["u", "v", "r", "port.n", "port.delta", "u_rw", "v_rw"]  # (13)
 
 
-def test_the_scale_follows_the_size_of_the_targets(columns, targets):
-    ten = {"none": 10.0 * targets["none"]}
-    recipe = Recipe.preset("fast", **SMALL | {"trials": 1}, refit=0)
-    one, other = (tune(columns, COMMANDS, t, [FOLD], recipe, seed=1)["none"] for t in (targets, ten))
-    np.testing.assert_allclose(other.compensator.networks[0].scale, 10.0 * one.compensator.networks[0].scale)
-    assert other.trials[0]["value"] == pytest.approx(100.0 * one.trials[0]["value"], rel=1e-3)
-
-
-def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets):
-    recipe = Recipe.preset("fast", **SMALL)
+@pytest.mark.parametrize("recipe", [DRAWN, SMALL])
+def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets, recipe):
     good = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=1)
     targets["high-1"] = np.full_like(targets["high-1"], np.nan)
     bad = tune(columns, COMMANDS, targets, [FOLD], recipe, seed=1)
@@ -138,15 +122,9 @@ def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets):
     )
 
 
-def test_a_model_that_misses_nothing_needs_no_luck(columns, targets):
-    targets["exact"] = np.zeros_like(targets["none"])
-    tuned = tune(columns, COMMANDS, targets, [FOLD], Recipe.preset("fast", **SMALL), seed=1)["exact"]
-    assert np.abs(tuned.compensator.predict(columns)).max() < 0.1
-
-
-def test_rows_seconds_and_progress(columns, targets):
+@pytest.mark.parametrize(("recipe", "epochs"), [(DRAWN, 0), (SMALL, 40)])
+def test_rows_seconds_and_progress(columns, targets, recipe, epochs):
     calls = []
-    recipe = Recipe.preset("fast", **SMALL)
     tuned = tune(
         columns, COMMANDS, targets, [FOLD], recipe, 1, on_trial=lambda done, total: calls.append((done, total))
     )
@@ -155,10 +133,13 @@ def test_rows_seconds_and_progress(columns, targets):
         assert [row["number"] for row in one.trials] == [0, 1, 2]
         assert {row["state"] for row in one.trials} == {"complete"}
         assert set(one.trials[0]["params"]) == set(one.compensator.hyperparameters)
-        assert one.seconds >= sum(row["seconds"] for row in one.trials) > 0
-        assert one.trials[0]["epochs"] == 34  # 100 steps of 3 batches
+        assert set(one.trials[0]) == {"number", "params", "value", "seconds", "epochs", "state"}
+        assert one.seconds == pytest.approx(sum(row["seconds"] for row in one.trials))
+        assert one.seconds > 0
+        assert {row["epochs"] for row in one.trials} == {epochs}
 
 
-def test_a_fold_without_windows_is_refused(columns, targets):
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_a_fold_without_windows_is_refused(columns, targets, name):
     with pytest.raises(DataError, match="manoeuvres"):
-        tune(columns, COMMANDS, targets, [(np.arange(9), np.arange(0))], Recipe.preset("fast"), seed=1)
+        tune(columns, COMMANDS, targets, [(np.arange(9), np.arange(0))], Recipe.preset(name), seed=1)

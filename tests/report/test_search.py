@@ -18,14 +18,15 @@ def dots(panel):
 def test_a_panel_per_hyperparameter_that_varies(simulation):
     fixed = replace(simulation, trials=simulation.trials.assign(units=64.0))
     assert searched(simulation) == ["learning_rate", "weight_decay", "units"]
-    assert list(panels(fixed)) == ["learning_rate", "weight_decay"]
-    assert panels(simulation)["learning_rate"].figure.layout.xaxis.type == "log"
-    assert panels(simulation)["units"].figure.layout.xaxis.type is None
+    assert list(panels(fixed)) == ["learning rate", "weight decay"]
+    assert panels(simulation)["learning rate"].figure.layout.xaxis.type == "log"
+    dropped = replace(simulation, trials=simulation.trials.assign(hidden_dropout=simulation.trials.number / 20))
+    assert panels(dropped)["hidden dropout"].figure.layout.xaxis.type is None
 
 
 def test_dots_are_relative_to_the_best_of_their_cell(simulation):
     trials = simulation.trials
-    drawn = dots(panels(simulation)["learning_rate"])
+    drawn = dots(panels(simulation)["learning rate"])
     assert sum(len(drawn[name].x) for name in ("complete", "stopped", "diverged", "chosen")) == len(trials)
     assert (np.asarray(drawn["diverged"].y) == np.float32(FAILED)).all()
     assert len(drawn["diverged"].x) == trials.state.eq("diverged").sum()
@@ -46,7 +47,7 @@ def test_views_hold_their_size(simulation):
 def test_of_many_trials_some_are_drawn(simulation):
     many = pd.concat([simulation.trials] * 5, ignore_index=True)
     content = replace(simulation, trials=many)
-    drawn = dots(panels(content)["weight_decay"])
+    drawn = dots(panels(content)["weight decay"])
     assert sum(len(trace.x) for name, trace in drawn.items() if name not in ("median", "chosen")) == 1200
     assert "at most 1,400 are drawn" in search(content).how
     assert "are drawn" not in search(simulation).how
@@ -64,7 +65,7 @@ def test_the_rank_correlation_is_within_cells():
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
     found = importance(simulation.trials, "learning_rate")
-    text = f"learning_rate goes with it most, rank correlation {found:.2f}.".replace("-", "−")
+    text = f"learning rate goes with it most, rank correlation {found:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
 
@@ -78,6 +79,27 @@ def test_the_table_sums_up_by_size(simulation):
     assert rows[30]["time per cell [s]"].key == pytest.approx(mine.seconds.sum() / 14)
     chosen = mine.units[mine.chosen]
     assert rows[30]["chosen units [1]"].text == f"{chosen.min():.2g} / {chosen.median():.2g} / {chosen.max():.2g}"
+
+
+def test_a_search_in_closed_form_says_what_there_was(simulation):
+    """No epochs, nothing stopped, and a choice of yes or no."""
+    trials = simulation.trials.drop(columns=["learning_rate", "weight_decay", "units"])
+    trials = trials.assign(state="complete", value=1.0 + trials.number, epochs=0, chosen=trials.number < 4)
+    trials = trials.assign(motion_scale=2.0 + trials.number, mirror=trials.number.mod(4).ne(0).astype(float))
+    content = replace(simulation, trials=trials)
+    drawn = panels(content)
+    assert list(drawn) == ["motion scale", "mirror"]
+    assert list(drawn["mirror"].figure.layout.xaxis.ticktext) == ["no", "yes"]
+    assert [chip.label for chip in search(content).chips] == ["trial", "chosen", "median"]
+    found = table(content)
+    assert "504 trials in 42 cells: none stopped early, none diverged" in found.takeaway
+    assert "Tried: motion scale 2 to 13, mirror yes or no." in found.takeaway
+    row = dict(zip(found.columns, found.rows[0], strict=True))
+    assert "epochs [1]" not in row
+    assert row["chosen motion scale [1]"].text == "2 / 3.5 / 5"
+    assert row["share of chosen mirror [1]"].text == "0.75"
+    assert "epochs [1]" in table(simulation).columns
+    assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
 
 
 def test_trials_that_all_diverged_stand(simulation):

@@ -54,7 +54,7 @@ BROKEN = {
     "no-test-run": ("split.test", "at least 1"),
     "named-test-of-a-truth": ("split.test", "give the number of test runs"),
     "unknown-recipe": ("recipe", "did you mean 'fast'?"),
-    "unknown-recipe-key": ("recipe.epoch", "did you mean 'epochs'?"),
+    "unknown-recipe-key": ("recipe.term", "did you mean 'terms'?"),
     "recipe-key-of-python": ("recipe.name", "unknown key"),
     "recipe-of-no-trials": ("recipe.trials", "greater than 0"),
     "claims-of-nobody": ("claims.accurate", "did you mean 'right'?"),

@@ -9,6 +9,7 @@ import pytest
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
+from shipid.estimation.recipe import Recipe, RidgeRecipe
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
@@ -58,7 +59,8 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     """19 models and the nominal one, N_D = 10, 20, ... 100, 50 trials per cell; the small one is a part of it."""
     full, small = read_plan("simulation"), read_plan("simulation-small")
     assert [batch.N_D for batch in full.batches] == list(range(100, 0, -10))
-    assert (full.recipe.trials, full.recipe.sampler, full.recipe.refit) == (50, "tpe", 0)
+    assert full.recipe == Recipe.preset("paper")
+    assert full.recipe.trials == small.recipe.trials == 50
     assert read_plan("simulation", {"recipe.kind": "fast"}).recipe == small.recipe
     assert small.study.truth == full.study.truth
     assert small.study.split == full.study.split
@@ -94,7 +96,7 @@ def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path:
             assert all(one.variant.values[path] != other.variant.values[path] for path in one.variant.values)
     assert there.digest != here.digest
     assert there.digest_in_any_world == here.digest_in_any_world
-    assert tiny_plan(tmp_path, {**changes, "recipe.epochs": 7}).digest_in_any_world != here.digest_in_any_world
+    assert tiny_plan(tmp_path, {**changes, "recipe.units": 7}).digest_in_any_world != here.digest_in_any_world
 
 
 def test_a_stored_world_is_the_same_world(tmp_path: Path) -> None:
@@ -114,9 +116,10 @@ def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
 
 
 def test_changes_reach_the_document(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "recipe.epochs": 7, "description": "new"})
+    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "recipe.units": 7, "description": "new"})
     assert [model.name for model in plan.models][1:6] == [f"wrong-{k}" for k in range(1, 6)]
-    assert (plan.batches[0].N_D, plan.recipe.epochs, plan.study.description) == (3, 7, "new")
+    assert isinstance(plan.recipe, RidgeRecipe)
+    assert (plan.batches[0].N_D, plan.recipe.units, plan.study.description) == (3, 7, "new")
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ import tomlkit
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DocumentError
+from shipid.estimation.recipe import Recipe
 from shipid.predictor import Predictor
 from shipid.simulation.rollout import rollout
 from shipid.study.envelope import envelope
@@ -68,8 +69,8 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
 @pytest.mark.parametrize("folds", [1, 2, 3])
 def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
     plan, _, prepared = tiny
-    plan = replace(plan, study=plan.study.model_copy(update={"split": plan.study.split.model_copy()}))
-    plan.study.split.folds = folds
+    split = plan.study.split.model_copy(update={"folds": folds})
+    plan = replace(plan, study=plan.study.model_copy(update={"split": split}), recipe=Recipe.preset("paper"))
     for batch in plan.batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
         pairs = prepared.folds(plan, batch, windows)
@@ -85,12 +86,26 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
             assert sorted(validated) == sorted(prepared.runs(plan, batch))
 
 
-def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+def test_a_recipe_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    plan, _, prepared = tiny
+    for batch in plan.batches:
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+        pairs = prepared.folds(plan, batch, windows)
+        assert len(pairs) == batch.N_D
+        for train, validation in pairs:
+            assert len(set(windows.run[validation])) == 1
+            assert sorted([*train, *validation]) == list(range(len(windows)))
+        assert sorted(index for _, validation in pairs for index in validation) == list(range(len(windows)))
+
+
+@pytest.mark.parametrize("kind", ["fast", "paper"])
+def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
     """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out, and told."""
     t = np.arange(21.0)
     runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
     dataset = logged(runs, t, clock="shared")
-    plan, _ = recorded(dataset, split={"test": ["r3"], "folds": 2}, grid={"N_D": [7]}, family=[ONE_FAMILY])
+    changes = {"split": {"test": ["r3"], "folds": 2}, "grid": {"N_D": [7]}, "family": [ONE_FAMILY]}
+    plan, _ = recorded(dataset, **changes, recipe={"kind": kind})
     prepared = prepare(plan, dataset)
     batch = plan.batches[0]
 

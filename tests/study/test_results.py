@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
+from shipid.estimation.recipe import RidgeRecipe
 from shipid.study import results as frames
 from shipid.study import store
 from shipid.study.plan import build_plan, read_plan
@@ -168,12 +169,14 @@ def test_trials_know_the_chosen_one(read: Results) -> None:
     frame = frames.trials_frame(read)
     assert len(frame) == 8
     assert frame["chosen"].all()
-    assert list(frame.columns[-1:]) == ["weight_decay"]
+    assert set(frame.columns[-6:]) == {*RidgeRecipe.SEARCHED, "mirror"}
     first = read.rows[0]
     two = [{**first["trials"][0], "number": k, "value": value} for k, value in enumerate((2.0, 1.0))]
     two.append({**two[0], "number": 2, "state": "diverged", "value": None})
-    frame = frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": two}])))
-    assert frame["chosen"].tolist() == [False, True, False]
+    for averaged, chosen in ((1, [False, True, False]), (8, [True, True, False])):
+        plan = replace(read.plan, recipe=read.plan.recipe.model_copy(update={"averaged": averaged}))
+        frame = frames.trials_frame(replace(read, plan=plan, cells=pd.DataFrame([{**first, "trials": two}])))
+        assert frame["chosen"].tolist() == chosen
     assert frame["value"].tolist() == pytest.approx([2.0, 1.0, np.nan], nan_ok=True)
     diverged = [{**trial, "state": "diverged", "value": None} for trial in two]
     assert not frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": diverged}])))["chosen"].any()

@@ -117,7 +117,7 @@ def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
         assert entry.unit == ("s" if entry.metric == "seconds" else "m")
     trials = pd.read_parquet(tiny_run / "trials.parquet")
     assert list(trials["cell"].value_counts().unique()) == [1]  # the recipe of the tiny study has one trial
-    assert {"value", "weight_decay", "state"} <= set(trials.columns)
+    assert {"value", "motion_scale", "mirror", "state"} <= set(trials.columns)
 
 
 def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Path) -> None:
