@@ -240,17 +240,29 @@ def _left_out(
     for part in parts:
         for out, judged in blocks:
             rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
-            unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
+            without = _few_rows if rows.shape[1] <= rows.shape[2] else _many_rows
             for i, ridge in enumerate(ridges):
-                shrunk = 1 / (part.eigenvalues + ridge)
-                weighted = rows * shrunk
-                residual = targets - weighted @ part.product
-                error = torch.linalg.solve(unit - weighted @ rows.mT, residual)
+                error = without(part, rows, targets, part.eigenvalues + ridge)
                 if judged.shape != out.shape:
                     error = error.take_along_dim(judged[:, :, None], dim=1)
                 total[i] += error.square().sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
     found: Array = total.cpu().numpy()
     return found
+
+
+def _few_rows(part: _Part, rows: Tensor, targets: Tensor, diagonal: Tensor) -> Tensor:
+    """Errors (folds, b, K r) of blocks without themselves by their part of the hat matrix, (b, b)."""
+    weighted = rows / diagonal
+    unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
+    error: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
+    return error
+
+
+def _many_rows(part: _Part, rows: Tensor, targets: Tensor, diagonal: Tensor) -> Tensor:
+    """The same by solving for the output weights without each block, (M, M)."""
+    others = torch.diag(diagonal) - rows.mT @ rows
+    weights: Tensor = torch.linalg.solve(others, part.product - rows.mT @ targets)
+    return targets - rows @ weights
 
 
 def _network(
