@@ -21,7 +21,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)

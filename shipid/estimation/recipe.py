@@ -164,10 +164,10 @@ PAPER: dict[str, Any] = {
 FAST: dict[str, Any] = {
     "trials": 50,
     "units": 256,
-    "motion_scale": (2.0, 16.0),
-    "command_scale": (2.0, 16.0),
+    "motion_scale": (1.0, 16.0),
+    "command_scale": (1.0, 16.0),
     "wind_scale": (4.0, 64.0),
-    "offset": (0.5, 2.0),
+    "offset": (0.5, 4.0),
     "ridge": (1e-5, 10.0),
     "terms": 8,
     "mirror": 0.75,
