@@ -117,7 +117,7 @@ def _check(given: Particulars) -> None:
         if not low <= value <= high:
             raise ShipidError(f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}")
     if _yaw_inertia(given) < LEAST_YAW:
-        raise ShipidError("so short and deep a hull has no added yaw inertia by Clarke's formula: take another vessel as base")
+        raise ShipidError("so short and deep a hull has no added yaw inertia by Clarke's formula")
 
 
 def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:

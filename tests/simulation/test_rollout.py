@@ -86,7 +86,7 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
 
 
 def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, seed: int = 7) -> np.ndarray:
-    """State after 8 s (of the ordinary ship) of smooth motion: one side of every kink (rates and drift keep their sign)."""
+    """State after 8 s of the ordinary ship: smooth, one side of every kink (rates and drift keep their sign)."""
     given, slow = draw_inputs(vessel, 3, seed), pace(vessel)
     given["start"] |= {"u": np.full(3, 3.0 * slow), "v": np.full(3, 0.4 * slow), "r": np.full(3, -0.05)}
     commands = {name: np.full(3, 0.6 if name.endswith("alpha") else 2.0) for name in given["commands"]}
