@@ -115,6 +115,38 @@ def vessel_show(
     _print(_table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
 
 
+@vessel_app.command("new")
+def vessel_new(
+    length: Annotated[float, typer.Option(help="m, between perpendiculars")],
+    beam: Annotated[float, typer.Option(help="m")],
+    draught: Annotated[float, typer.Option(help="m")],
+    block: Annotated[float, typer.Option(help="block coefficient")],
+    out: Annotated[Path, typer.Option(help="TOML file to write; one that is there stays as it is")],
+    speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
+    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth (two units)")] = "propeller-rudder",
+    ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
+    frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    name: Annotated[str | None, typer.Option(help="for people; default: first guess and length")] = None,
+) -> None:
+    """Write a first guess of a vessel from its main particulars: runnable, each number with its formula."""
+    if out.suffix != ".toml":
+        raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
+    if out.exists():
+        raise ShipidError("is there already: choose another name", file=out)
+    from shipid.vessel.template import Particulars, first_guess
+
+    given = Particulars(length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area)
+    found = first_guess(given, name or f"First guess, {length:g} m", str(out))
+    out.write_text(found.text, encoding="utf-8")
+    typer.echo(f"{len(found.vessel.parameters)} parameters by formula, none of them measured -> {out}")
+    typer.echo(f"{60 * found.n:.4g} rpm hold {given.service:.3g} m/s")
+    if found.growth < 0:
+        typer.echo("course-stable by these formulae")
+    else:
+        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / found.growth:.3g} s")
+
+
 @app.command("simulate")
 def simulate(
     study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],

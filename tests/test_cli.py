@@ -315,3 +315,25 @@ def test_public_names_load() -> None:
     with pytest.raises(AttributeError, match="public names: "):
         _ = shipid.nothing
     assert np.isfinite(len(shipid.__all__))
+
+
+def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
+    file = tmp_path / "my-ship.toml"
+    order = ("vessel", "new", "--length", 33.9, "--beam", 9.6, "--draught", 2.6, "--block", 0.61, "--out", file)
+    text = said(*order, "--propulsor", "azimuth", "--ship-type", "research", "--speed", 5)
+    assert "none of them measured" in text
+    assert "rpm hold 5 m/s" in text
+    assert "course-stable" in text
+    assert load_vessel(str(file)).parameters["thruster.port.y"] == pytest.approx(-2.688)
+    assert "First guess, 33.9 m" in said("vessel", "show", file)
+    written = file.read_text()
+    again = shell(*order)
+    assert (again.returncode, again.stderr) == (1, f"error: {file}: is there already: choose another name\n")
+    assert file.read_text() == written
+
+
+def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
+    sizes = ("--length", 100, "--beam", 5, "--draught", 2, "--block", 0.6)
+    found = shell("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
+    assert found.returncode == 1
+    assert found.stderr == "error: length / beam = 20: the formulae hold for 3 to 9\n"
