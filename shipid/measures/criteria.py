@@ -66,7 +66,9 @@ def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
     large = _wrong(measures, {"helm": 20.0, "execute_heading": 20.0})
     if not large:
         found = measures["overshoot_1"]
-        yield _judged("yaw checking: 20/20 first overshoot (5.3.3.3)", found.value, 25 * DEGREE, "rad", found.why, length)
+        yield _judged(
+            "yaw checking: 20/20 first overshoot (5.3.3.3)", found.value, 25 * DEGREE, "rad", found.why, length
+        )
     if small:
         return
     travelled = _lengths(measures, "initial_turning", length)

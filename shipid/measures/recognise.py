@@ -75,7 +75,11 @@ def kind_of(record: Record) -> tuple[str, str]:
     held = float(starboard[:released].mean()) if released else 0.0
     if held >= MOSTLY and released >= SHARE * len(share):
         turned = float(psi[-1] - psi[0])
-        return ("turning", "") if turned >= LEAST_TURN else ("", "the helm is held, but the ship turns by less than 90 deg")
+        return (
+            ("turning", "")
+            if turned >= LEAST_TURN
+            else ("", "the helm is held, but the ship turns by less than 90 deg")
+        )
     if held >= MOSTLY and released <= 0.8 * len(share) and float((np.abs(share[released:]) < 0.1).mean()) >= SHARE:
         return "pull-out", ""
     return "", "the helm is neither held to one side nor put over to either side in turn"

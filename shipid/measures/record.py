@@ -16,6 +16,7 @@ DEGREE = np.pi / 180
 POINTS = 4  # of the polynomial on which a value between samples lies
 HALVINGS = 60
 TOP = 0.1  # share of a rise that is its top
+DRIFT = 1.5  # tolerances by which a level differs from the next one at least
 STEADY = 0.05  # relative change over a stretch that counts as none
 
 
@@ -213,13 +214,19 @@ def helm_over(record: Record) -> tuple[float, float, float]:
 def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:
     """First and last rows of the stretches that end level: all within `tolerance` of their last value.
 
-    Stretches shorter than a quarter of the longest are passages between them and left out.
+    Left out are stretches shorter than a quarter of the longest, and those that drift into the next one.
     """
-    found, last = [], len(t) - 1
+    found: list[tuple[int, int]] = []
+    last = len(t) - 1
     while last > 0:
         off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
         first = int(off[-1]) + 1 if len(off) else 0
         found.append((first, last))
         last = first - 1
     longest = max((t[b] - t[a] for a, b in found), default=0.0)
-    return [(a, b) for a, b in reversed(found) if t[b] - t[a] >= longest / 4 > 0]
+    level = [(a, b) for a, b in reversed(found) if t[b] - t[a] >= longest / 4 > 0]
+    return [
+        (a, b)
+        for (a, b), (c, d) in zip(level, [*level[1:], (-1, -1)], strict=True)
+        if b + 1 != c or abs(values[d] - values[b]) > DRIFT * tolerance
+    ]

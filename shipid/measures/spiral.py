@@ -9,7 +9,7 @@ import numpy as np
 from shipid.measures.record import DEGREE, Array, Measures, Record, mean, plateaus, settled
 
 LEVEL_HELM = 0.5 * DEGREE  # under which two helm angles are one level
-LEVEL_RATE = 0.02  # of the greatest rate, under which two rates are one level
+LEVEL_RATE = 0.05  # of the greatest rate, under which two rates are one level
 NAN = float("nan")
 
 
@@ -39,10 +39,10 @@ def levels(record: Record) -> Levels:
 
 
 def rate_levels(record: Record) -> Levels:
-    """Yaw rate levels of a reverse spiral with the mean helm over the last half of each."""
+    """Yaw rate levels of a reverse spiral with the mean helm over the last quarter of each."""
     t, most = record.t, float(np.abs(record.r).max())
     stretches = [(float(t[a]), float(t[b])) for a, b in plateaus(t, record.r, LEVEL_RATE * most)] if most else []
-    means = [[mean(t, values, (a + b) / 2, b) for a, b in stretches] for values in (record.helm, record.r)]
+    means = [[mean(t, values, b - (b - a) / 4, b) for a, b in stretches] for values in (record.helm, record.r)]
     return Levels(np.array(means[0]), np.array(means[1]), 0)
 
 
@@ -71,7 +71,7 @@ def spiral(record: Record) -> Measures:
 
 
 def _at_zero(x: Array, y: Array) -> float:
-    """y where x first changes sign, linear between points; NaN if it does not."""
+    """Value y where x first changes sign, linear between points; NaN if it does not."""
     for i in range(len(x) - 1):
         if x[i] == 0 or x[i] * x[i + 1] < 0:
             return float(y[i] if x[i] == 0 else y[i] - x[i] * (y[i + 1] - y[i]) / (x[i + 1] - x[i]))

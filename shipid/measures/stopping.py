@@ -14,8 +14,9 @@ def stop(record: Record) -> Measures:
 
     Returns
     -------
-    Measures : `approach_speed` [m/s]; `stopping_time` [s]; `track_reach` along the path, `head_reach` along the heading
-        at the order, `lateral_deviation` to starboard of it [m]; `heading_change` [rad], > 0 to starboard.
+    Measures : `execute`, instant of the order [s]; `approach_speed` [m/s]; `stopping_time` [s]; `track_reach` along the
+        path, `head_reach` along the heading at the order, `lateral_deviation` to starboard of it [m]; `heading_change`
+        [rad], > 0 to starboard.
     """
     t, found, why = record.t, Measures(), "the shaft is not ordered to stop or astern"
     astern = np.flatnonzero(record.shaft <= 0) if record.shaft is not None else np.empty(0, dtype=int)
@@ -24,6 +25,7 @@ def stop(record: Record) -> Measures:
         start = departure(t, record.shaft, int(astern[0])) if astern[0] else float(t[0])
     ahead, aside = record.along(start)
     end = crossing(t, record.u, 0.0, start, rising=False)
+    found.add("execute", start, "s", why)
     if np.isfinite(start):
         found.add("approach_speed", float(np.interp(start, t, record.speed)), "m/s", why)
         why = "the ship still moves ahead when the log ends"

@@ -21,6 +21,7 @@ from shipid.measures.record import (
 )
 
 NAN = float("nan")
+STILL = "the helm is never moved"
 
 
 def turning(record: Record) -> Measures:
@@ -28,11 +29,11 @@ def turning(record: Record) -> Measures:
 
     Returns
     -------
-    Measures : `helm` [rad]; `approach_speed` [m/s]; `advance` and `transfer` where the heading has changed by 90 deg,
-        `tactical_diameter` by 180 deg, `greatest_advance`, `greatest_transfer` [m]; `time_to_90`, `time_to_180`,
-        `time_to_360` [s]; of the steady turn, means over the last 180 deg of heading: `steady_diameter` (2 V / r) [m],
-        `steady_speed` [m/s], `steady_rate` [rad/s], `steady_drift` (> 0: the bow points inwards) [rad], and
-        `speed_loss` (share of the approach speed).
+    Measures : `execute`, its instant [s]; `helm` [rad]; `approach_speed` [m/s]; `advance` and `transfer` where the
+        heading has changed by 90 deg, `tactical_diameter` by 180 deg, `greatest_advance`, `greatest_transfer` [m];
+        `time_to_90`, `time_to_180`, `time_to_360` [s]; of the steady turn, means over the last 180 deg of heading:
+        `steady_diameter` (2 V / r) [m], `steady_speed` [m/s], `steady_rate` [rad/s], `steady_drift` (> 0: the bow
+        points inwards) [rad], and `speed_loss` (share of the approach speed).
     """
     t, found = record.t, Measures()
     start, helm, side = helm_over(record)
@@ -42,8 +43,9 @@ def turning(record: Record) -> Measures:
     before = float(np.interp(start, t, record.speed)) if moving else NAN
     passed = {angle: crossing(t, turned, angle * DEGREE, start) for angle in (90, 180, 270, 360)}
     why = {angle: f"the heading changes by less than {angle} deg" for angle in passed}
-    found.add("helm", helm if helm else NAN, "rad", "the helm is never moved")
-    found.add("approach_speed", before, "m/s", "the helm is never moved")
+    found.add("execute", start, "s", STILL)
+    found.add("helm", helm if helm else NAN, "rad", STILL)
+    found.add("approach_speed", before, "m/s", STILL)
     found.add("advance", value_at(t, ahead, passed[90]), "m", why[90])
     found.add("transfer", side * value_at(t, aside, passed[90]), "m", why[90])
     found.add("tactical_diameter", side * value_at(t, aside, passed[180]), "m", why[180])
@@ -86,16 +88,17 @@ def pull_out(record: Record) -> Measures:
 
     Returns
     -------
-    Measures : `helm` [rad]; `turning_rate`, at the release, and `residual_rate`, settled at the end [rad/s], both > 0
-        to the side of the turn; `heading_change` from the release to the end [rad].
+    Measures : `execute`, its instant [s]; `helm` [rad]; `turning_rate`, at the release, and `residual_rate`, settled at
+        the end [rad/s], both > 0 to the side of the turn; `heading_change` from the release to the end [rad].
     """
     t, found = record.t, Measures()
     start, helm, side = helm_over(record)
-    back = np.flatnonzero((t > start) & (np.abs(record.helm) < helm / 2)) if helm else []
+    back = np.flatnonzero((t > start) & (np.abs(record.helm) < helm / 2))
     release = departure(t, record.helm, int(back[0])) if len(back) else NAN
     rate = side * float(np.interp(release, t, record.r)) if len(back) else NAN
     why = "the helm is not put amidships after the turn"
-    found.add("helm", helm if helm else NAN, "rad", "the helm is never moved")
+    found.add("execute", start, "s", STILL)
+    found.add("helm", helm if helm else NAN, "rad", STILL)
     found.add("turning_rate", rate, "rad/s", why)
     residual = side * settled(t, record.r, release, float(t[-1]), rate) if len(back) else NAN
     late = "the rate still changes over the last half of the log: let it run longer"

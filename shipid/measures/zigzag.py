@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from shipid.measures.record import (
@@ -17,6 +19,7 @@ from shipid.measures.record import (
 )
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
+MOST = 4  # overshoots that are measured: later ones repeat them
 LATE, EARLY = 1.5 * DEGREE, 0.5 * DEGREE  # how far a rudder may be reversed beyond and before the execute heading
 STILL = "the helm is never moved"
 
@@ -34,10 +37,11 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
 
     Returns
     -------
-    Measures : `helm`, `execute_heading` [rad], `approach_speed` [m/s]; `initial_turning` (track from first to second
-        execute [m]) and `initial_turning_time` [s]; `overshoot_1`, `overshoot_2`, ... [rad] and `time_to_check_1`, ...
-        [s] after the execute; `reach` (from the first execute until back on course) [s]; `period` (second to fourth
-        execute) [s]; `speed_loss` (greatest until the third execute, as a share of the approach speed).
+    Measures : `execute`, instant of the first one [s]; `helm`, `execute_heading` [rad]; `approach_speed` [m/s];
+        `initial_turning` (track from first to second execute [m]) and `initial_turning_time` [s]; `overshoot_1` to at
+        most `overshoot_4` [rad] and `time_to_check_1`, ... [s] after the execute; `reach` (from the first execute until
+        back on course) [s]; `period` (second to fourth execute) [s]; `speed_loss` (greatest until the third execute, as
+        a share of the approach speed).
     """
     t, found = record.t, Measures()
     start, helm, side = helm_over(record)
@@ -46,6 +50,7 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
     executes = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else float("nan")
+    found.add("execute", start, "s", STILL)
     found.add("helm", helm if helm else float("nan"), "rad", STILL)
     found.add("execute_heading", angle, "rad", "the helm is never reversed")
     found.add("approach_speed", before, "m/s", STILL)
@@ -83,7 +88,7 @@ def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
 
 def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
     """Each execute with the next one, or the end of the log; two at least, as the criteria ask for two overshoots."""
-    legs = list(zip(executes, [*executes[1:], end], strict=True))
+    legs = list(zip(executes, [*executes[1:], end], strict=True))[:MOST]
     return legs + [(float("nan"), float("nan"))] * (2 - len(legs))
 
 
@@ -95,7 +100,7 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
     """
     over = np.where(np.abs(record.helm) >= helm / 2, np.sign(record.helm), 0.0)
     rows = np.flatnonzero((over != 0) & (record.t >= start))
-    pairs = [(a, b) for a, b in zip(rows[:-1], rows[1:], strict=True) if over[a] != over[b]]
+    pairs = [(a, b) for a, b in pairwise(rows) if over[a] != over[b]]
     if not pairs:
         return float("nan")
     full = [int(np.flatnonzero(np.abs(record.helm[: a + 1]) >= 0.95 * helm)[-1]) for a, _ in pairs]
@@ -104,4 +109,4 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
     whole = round((low + high) / 2 / ROUND) * ROUND
     if whole > 0 and low - LATE <= whole <= high + EARLY:
         return whole
-    return max(np.floor(high / DEGREE + 0.25), 1.0) * DEGREE
+    return max(float(np.floor(high / DEGREE + 0.25)), 1.0) * DEGREE

@@ -30,6 +30,11 @@ ANCHORS = (
     "search",
     "cells",
     "provenance",
+    "track",
+    "histories",
+    "spiral",
+    "measures",
+    "criteria",
 )
 # Columns of a trial; whatever else its frame holds is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")

@@ -9,8 +9,8 @@ import pytest
 
 from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
-from shipid.measures.record import DEGREE, Record
 from shipid.measures.recognise import kind_of, record_of
+from shipid.measures.record import DEGREE
 
 # README beside the files; the tank repeats them to 0.2 to 0.5 deg
 READ_OFF = {
