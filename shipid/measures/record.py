@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 DEGREE = np.pi / 180
 POINTS = 4  # of the polynomial on which a value between samples lies
 HALVINGS = 60
-TOP = 0.1  # share of a rise that is its top
+TOP = 0.2  # share of a rise that is its top
 DRIFT = 1.5  # tolerances by which a level differs from the next one at least
 STEADY = 0.05  # relative change over a stretch that counts as none
 
@@ -135,7 +135,7 @@ def crossing(t: Array, values: Array, level: float, start: float, rising: bool =
 def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
     """Instant [s] and value of the greatest of values between two instants, on a quartic about it.
 
-    The quartic is the best through the samples that lie within a tenth of the rise since `start`, five at least: the
+    The quartic is the best through the samples within a fifth of the rise since `start`, five at least: the
     stretch does not depend on how often one samples, and noise is averaged where samples are many. NaN where the
     greatest lies at an end of the stretch: then it is none of the values' own.
     """

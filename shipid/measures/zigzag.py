@@ -88,7 +88,7 @@ def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
 
 def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
     """Each execute with the next one, or the end of the log; two at least, as the criteria ask for two overshoots."""
-    legs = list(zip(executes, [*executes[1:], end], strict=True))[:MOST]
+    legs = list(pairwise([*executes, end]))[:MOST]
     return legs + [(float("nan"), float("nan"))] * (2 - len(legs))
 
 

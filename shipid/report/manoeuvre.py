@@ -82,7 +82,7 @@ def write_manoeuvre(content: ManoeuvreContent, file: Path) -> Path:
 
 
 def _amount(value: float, unit: str) -> str:
-    return f"{number(value)} {unit}" if np.isfinite(value) else "not found"
+    return f"{number(round(value, 2) + 0.0)} {unit}" if np.isfinite(value) else "not found"
 
 
 def measures(content: ManoeuvreContent) -> Table:
@@ -90,16 +90,22 @@ def measures(content: ManoeuvreContent) -> Table:
     missing = bool(content.measures["note"].ne("").any())
     rows = []
     for row in content.measures.to_dict("records"):
-        numbers = [figure(row["value"], _decimals(row["value"])), text(row["unit"]), figure(row["lengths"], 2)]
+        numbers = [
+            figure(row["value"], _decimals(row["value"], row["unit"])),
+            text(row["unit"]),
+            figure(row["lengths"], 2),
+        ]
         note = [Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] if missing else []
         rows.append([text(row["measure"]), *numbers, *note])
     columns = ["measure", "value", "unit", "ship lengths", *["why missing"] * missing]
     return Table("measures", "Measures", "", columns, [False, True, False, True, *[False] * missing], rows)
 
 
-def _decimals(value: float) -> int:
-    """Three digits, no more than four decimals."""
-    return int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 4)) if np.isfinite(value) and value else 2
+def _decimals(value: float, unit: str) -> int:
+    """Three digits, no more than three decimals; a count has none."""
+    if not np.isfinite(value) or abs(value) < 1e-3:
+        return 2
+    return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
 
 
 def criteria(content: ManoeuvreContent) -> Table | None:
