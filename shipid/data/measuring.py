@@ -12,7 +12,7 @@ from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DataError, choices
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
-from shipid.measures.recognise import kind_of, record_of
+from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
 
 
@@ -50,13 +50,13 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
             left[name] = "it has one row"
             continue
         record = record_of({str(column): rows[column].to_numpy() for column in rows if column != "run"})
-        seen, why = kind_of(record) if kind is None else (kind, "")
-        if not seen:
+        kinds, why = kinds_of(record) if kind is None else ((kind,), "")
+        if not kinds:
             left[name] = why
-            continue
-        found = MEASURES[seen](record)
-        measures += [{"run": name, "kind": seen, **row} for row in measure_rows(found, length)]
-        judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, found, length))]
+        for seen in kinds:
+            found = MEASURES[seen](record)
+            measures += [{"run": name, "kind": seen, **row} for row in measure_rows(found, length)]
+            judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, found, length))]
     return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)
 
 

@@ -7,12 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from shipid.errors import DataError
-from shipid.measures.record import DEGREE, Array, Record, helm_over
+from shipid.measures.record import DEGREE, Array, Record, helm_over, plateaus, released
+from shipid.measures.turning import MIDSHIPS
+from shipid.measures.zigzag import last_over
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
 LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
+MANY, APART = 5, 2 * DEGREE  # levels of helm that make a spiral, and how far they are apart
 MOSTLY = 0.7  # of the time that a zigzag's helm is over, to either side
-SHARE = 0.9  # of the greatest helm that counts as over
+AMIDSHIPS = 0.2  # of the time of the turn that a pull-out's helm is amidships
+STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 
 
 def record_of(columns: Mapping[str, Array]) -> Record:
@@ -49,37 +53,41 @@ def _sense(angle: Array, r: Array) -> float:
     return float(np.sign(angle[:-1] @ np.diff(r)))
 
 
-def kind_of(record: Record) -> tuple[str, str]:
-    """Kind of manoeuvre, a key of `MEASURES`, or an empty one and a sentence why it is none.
+def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
+    """Kinds of manoeuvre that a run is, keys of `MEASURES`; where it is none, a sentence why.
 
-    A stop: the shaft turns from ahead to astern. Else by the helm, from where it is first put over: zigzag, over to
-    either side in turn, at least once reversed; pull-out, over to one side, then less than a tenth of it to the end,
-    which is at least a fifth of the time; turning, over to one side to the end, through 90 deg or more.
-    Spirals are not recognised.
+    A stop: the shaft turns from ahead to astern. Else by the helm, from where it is first put over, to a ship that goes
+    straight. Zigzag: over to either side in turn, at least once reversed, while the ship turns by less than 90 deg.
+    Turning: over to one side through 90 deg or more. Pull-out as well: then amidships for a fifth of the time of the
+    turn, or more. A helm of many levels is some spiral, and the user has to say which.
     """
-    shaft = record.shaft
+    shaft, over = record.shaft, helm_over(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():
-        return "stop", ""
-    start, helm, side = helm_over(record)
-    if helm < LEAST_HELM:
-        return "", f"the helm moves by less than {LEAST_HELM / DEGREE:g} deg, and the shafts are not reversed"
-    after = record.t >= start
-    share = side * record.helm[after] / helm
-    starboard, port = share >= SHARE, share <= -SHARE
-    if port.any():
-        both = float((starboard | port).mean())
-        good = both >= MOSTLY
-        return ("zigzag", "") if good else ("", f"the helm is over to either side for {both:.0%} of the time only")
-    psi = side * record.psi[after]
-    released = int(np.flatnonzero(starboard)[-1]) + 1 if starboard.any() else 0
-    held = float(starboard[:released].mean()) if released else 0.0
-    if held >= MOSTLY and released >= SHARE * len(share):
-        turned = float(psi[-1] - psi[0])
-        return (
-            ("turning", "")
-            if turned >= LEAST_TURN
-            else ("", "the helm is held, but the ship turns by less than 90 deg")
-        )
-    if held >= MOSTLY and released <= 0.8 * len(share) and float((np.abs(share[released:]) < 0.1).mean()) >= SHARE:
-        return "pull-out", ""
-    return "", "the helm is neither held to one side nor put over to either side in turn"
+        return ("stop",), ""
+    if over.angle < LEAST_HELM:
+        return (), f"the helm moves by less than {LEAST_HELM / DEGREE:g} deg, and the shafts are not reversed"
+    straight = abs(float(np.interp(over.start, record.t, record.r))) <= STRAIGHT * np.abs(record.r).max()
+    share = over.side * record.helm / over.angle
+    last = last_over(record, over) + 1
+    off = np.abs(record.psi - record.psi[over.row])
+    within = slice(over.row, last)
+    if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN:
+        both = float((np.abs(share[within]) >= 0.5).mean())
+        few = f"the helm is over to either side for {both:.0%} of the time only"
+        return (("zigzag",), "") if both >= MOSTLY else ((), few)
+    levels = {round(float(record.helm[b]) / APART) for _, b in plateaus(record.t, record.helm, APART / 4)}
+    if len(levels) >= MANY:
+        return (), f"the helm is held at {len(levels)} levels: say whether it is a spiral or a reverse-spiral"
+    if not straight:
+        return (), "the ship turns already where the helm is first put over"
+    row = released(record, over)
+    if off[: row + 1][-1] < LEAST_TURN:
+        return (), "the helm is let go before the ship has turned by 90 deg"
+    turn, rest = record.t[row - 1] - record.t[over.row], np.abs(share[row:]) < MIDSHIPS
+    amidships = row + np.flatnonzero(rest)
+    if not len(amidships):
+        return ("turning",), ""
+    moved = np.flatnonzero(~rest[amidships[0] - row :])
+    end = amidships[0] + int(moved[0]) - 1 if len(moved) else len(record.t) - 1
+    long = record.t[end] - record.t[amidships[0]] >= AMIDSHIPS * turn
+    return (("turning", "pull-out") if long else ("turning",)), ""

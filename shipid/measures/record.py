@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,13 @@ class Record:
     def speed(self) -> Array:
         """Speed over ground (N,) [m/s]."""
         return np.hypot(self.u, self.v)
+
+    def upto(self, row: int) -> Record:
+        """The rows before one, two at least."""
+        cut = slice(0, max(row, 2))
+        names = ("t", "north", "east", "psi", "u", "v", "r", "helm")
+        given = {name: getattr(self, name)[cut] for name in names}
+        return replace(self, **given, shaft=None if self.shaft is None else self.shaft[cut])
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Place ahead and to starboard (N,) [m] of where the ship is at `start` [s], on her heading there."""
@@ -198,17 +205,48 @@ def departure(t: Array, order: Array, index: int) -> float:
     return float(np.clip(t[begin + 1] - moved[begin] / rate, t[begin], t[begin + 1]))
 
 
-def helm_over(record: Record) -> tuple[float, float, float]:
-    """Instant [s] at which the helm is first put over, its greatest angle [rad] and the side, +1 to starboard.
+@dataclass(frozen=True)
+class HelmOver:
+    """The helm as it is first put over.
 
-    NaN, 0, 1 where it is never moved. A helm that is over from the first row on was put over there.
+    Parameters
+    ----------
+    start : instant [s] at which it began to move; NaN where it never does.
+    row : first in which it is over by half.
+    angle, side : how far [rad], the median while it is over by half or more of the most, and +1 to starboard.
     """
-    most = float(np.abs(record.helm).max())
-    if most == 0:
-        return float("nan"), 0.0, 1.0
-    index = int(np.argmax(np.abs(record.helm) >= most / 2))
-    side = float(np.sign(record.helm[index]))
-    return (departure(record.t, record.helm, index) if index else float(record.t[0])), most, side
+
+    start: float
+    row: int
+    angle: float
+    side: float
+
+
+def helm_over(record: Record) -> HelmOver:
+    """How the helm is first put over.
+
+    One that is over from the first row on was put over there if the ship does not turn by then; else it is left from
+    before, and the next time counts.
+    """
+    size = np.abs(record.helm)
+    if not size.max() > 0:
+        return HelmOver(float("nan"), 0, 0.0, 1.0)
+    angle = float(np.median(size[size >= size.max() / 2]))
+    over = size >= angle / 2
+    if over[0] and abs(record.r[0]) > STEADY * np.abs(record.r).max():
+        same = np.sign(record.helm) == np.sign(record.helm[0])
+        over &= np.logical_or.accumulate(~(over & same))  # what is left from before ends where it is first let go
+    if not over.any():
+        return HelmOver(float("nan"), 0, 0.0, 1.0)
+    row = int(np.argmax(over))
+    start = departure(record.t, record.helm, row) if row else float(record.t[0])
+    return HelmOver(start, row, angle, float(np.sign(record.helm[row])))
+
+
+def released(record: Record, over: HelmOver) -> int:
+    """First row after the helm is put over in which it is back by half; the number of rows if it is held to the end."""
+    back = np.flatnonzero(over.side * record.helm[over.row :] < over.angle / 2)
+    return over.row + int(back[0]) if over.angle and len(back) else len(record.t)
 
 
 def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:

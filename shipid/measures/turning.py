@@ -16,16 +16,20 @@ from shipid.measures.record import (
     helm_over,
     integral,
     mean,
+    released,
     settled,
     value_at,
 )
 
 NAN = float("nan")
+MIDSHIPS = 0.25  # of the helm in the turn, up to which it counts as amidships
 STILL = "the helm is never moved"
 
 
 def turning(record: Record) -> Measures:
-    """Measures of a turning circle; distances are of the logged point, in axes of the heading at the execute.
+    """Measures of a turning circle, up to where the helm is let go.
+
+    Distances are of the logged point, in axes of the heading at the execute.
 
     Returns
     -------
@@ -35,9 +39,10 @@ def turning(record: Record) -> Measures:
         `steady_diameter` (2 V / r) [m], `steady_speed` [m/s], `steady_rate` [rad/s], `steady_drift` (> 0: the bow
         points inwards) [rad], and `speed_loss` (share of the approach speed).
     """
-    t, found = record.t, Measures()
-    start, helm, side = helm_over(record)
-    moving = np.isfinite(start)
+    over, found = helm_over(record), Measures()
+    start, helm, side = over.start, over.angle, over.side
+    record = record.upto(released(record, over))
+    t, moving = record.t, np.isfinite(start)
     turned = side * (record.psi - value_at(t, record.psi, start)) if moving else np.zeros(len(t))
     ahead, aside = record.along(start)
     before = float(np.interp(start, t, record.speed)) if moving else NAN
@@ -91,17 +96,23 @@ def pull_out(record: Record) -> Measures:
     Measures : `execute`, its instant [s]; `helm` [rad]; `turning_rate`, at the release, and `residual_rate`, settled at
         the end [rad/s], both > 0 to the side of the turn; `heading_change` from the release to the end [rad].
     """
-    t, found = record.t, Measures()
-    start, helm, side = helm_over(record)
-    back = np.flatnonzero((t > start) & (np.abs(record.helm) < helm / 2))
-    release = departure(t, record.helm, int(back[0])) if len(back) else NAN
-    rate = side * float(np.interp(release, t, record.r)) if len(back) else NAN
+    over, found = helm_over(record), Measures()
+    row = released(record, over)
+    put = row < len(record.t)
+    release = departure(record.t, record.helm, row) if put else NAN
+    if put:  # the helm is left amidships until it is moved again
+        moved = np.flatnonzero(np.abs(record.helm[row:]) > MIDSHIPS * over.angle)
+        again = moved[np.append(True, np.diff(moved) == 1)] if len(moved) and moved[0] == 0 else moved[:0]
+        later = np.setdiff1d(moved, again)
+        record = record.upto(row + int(later[0]) if len(later) else len(record.t))
+    t, end = record.t, float(record.t[-1])
+    rate = over.side * float(np.interp(release, t, record.r)) if put else NAN
     why = "the helm is not put amidships after the turn"
-    found.add("execute", start, "s", STILL)
-    found.add("helm", helm if helm else NAN, "rad", STILL)
+    found.add("execute", over.start, "s", STILL)
+    found.add("helm", over.angle if over.angle else NAN, "rad", STILL)
     found.add("turning_rate", rate, "rad/s", why)
-    residual = side * settled(t, record.r, release, float(t[-1]), rate) if len(back) else NAN
+    residual = over.side * settled(t, record.r, release, end, rate) if put else NAN
     late = "the rate still changes over the last half of the log: let it run longer"
-    found.add("residual_rate", residual, "rad/s", late if len(back) else why)
-    found.add("heading_change", side * integral(t, record.r, release, float(t[-1])), "rad", why)
+    found.add("residual_rate", residual, "rad/s", late if put else why)
+    found.add("heading_change", over.side * integral(t, record.r, release, end), "rad", why)
     return found

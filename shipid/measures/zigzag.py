@@ -9,6 +9,7 @@ import numpy as np
 from shipid.measures.record import (
     DEGREE,
     Array,
+    HelmOver,
     Measures,
     Record,
     crossing,
@@ -20,7 +21,7 @@ from shipid.measures.record import (
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
 MOST = 4  # overshoots that are measured: later ones repeat them
-LATE, EARLY = 1.5 * DEGREE, 0.5 * DEGREE  # how far a rudder may be reversed beyond and before the execute heading
+NEAR = 1.5 * DEGREE  # how far from the execute heading a rudder may be seen to be reversed
 STILL = "the helm is never moved"
 
 
@@ -28,7 +29,8 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     """Measures of a zigzag.
 
     The n-th execute after the first is where the heading passes the execute heading, whatever the rudder does by then;
-    the n-th overshoot is what the heading goes beyond it before it turns back.
+    the n-th overshoot is what the heading goes beyond it before it turns back. The zigzag ends where the helm is let
+    go for longer than it was ever over.
 
     Parameters
     ----------
@@ -43,10 +45,12 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
         back on course) [s]; `period` (second to fourth execute) [s]; `speed_loss` (greatest until the third execute, as
         a share of the approach speed).
     """
-    t, found = record.t, Measures()
-    start, helm, side = helm_over(record)
+    over, found = helm_over(record), Measures()
+    start, helm = over.start, over.angle
+    record = record.upto(last_over(record, over) + 1)
+    t = record.t
     around = value_at(t, record.psi, start) if course is None else course
-    off = side * (record.psi - around)
+    off = over.side * (record.psi - around)
     angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
     executes = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else float("nan")
@@ -72,6 +76,17 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
         slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
     found.add("speed_loss", 1 - slowest / before if before else float("nan"), "-", missing("third"))
     return found
+
+
+def last_over(record: Record, over: HelmOver) -> int:
+    """Row in which the helm of a zigzag is last over to a side: then it is let go for longer than it was ever over."""
+    rows = np.flatnonzero(np.abs(record.helm) >= over.angle / 2)
+    rows = rows[rows >= over.row] if over.angle else rows[-1:]
+    gaps = np.flatnonzero(np.diff(rows) > 1)
+    begins, ends = rows[np.append(0, gaps + 1)], rows[np.append(gaps, len(rows) - 1)]
+    longest = float((record.t[ends] - record.t[begins]).max())
+    long = np.flatnonzero(record.t[begins[1:]] - record.t[ends[:-1]] > longest)
+    return int(ends[long[0]] if len(long) else ends[-1])
 
 
 def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
@@ -103,10 +118,16 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
     pairs = [(a, b) for a, b in pairwise(rows) if over[a] != over[b]]
     if not pairs:
         return float("nan")
-    full = [int(np.flatnonzero(np.abs(record.helm[: a + 1]) >= 0.95 * helm)[-1]) for a, _ in pairs]
+    full = [_last_full(np.abs(record.helm[: a + 1]), helm) for a, _ in pairs]
     low = float(np.median(np.abs(off[full])))
     high = float(np.median([np.abs(off[row + 1]) for row in full]))
     whole = round((low + high) / 2 / ROUND) * ROUND
-    if whole > 0 and low - LATE <= whole <= high + EARLY:
+    if whole > 0 and low - NEAR <= whole <= high + NEAR:
         return whole
     return max(float(np.floor(high / DEGREE + 0.25)), 1.0) * DEGREE
+
+
+def _last_full(size: Array, helm: float) -> int:
+    """Last row in which the helm is fully over, of those up to the one before it passes half."""
+    full = np.flatnonzero(size >= 0.95 * helm)
+    return int(full[-1]) if len(full) else len(size) - 1

@@ -9,7 +9,7 @@ import pytest
 
 from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
-from shipid.measures.recognise import kind_of, record_of
+from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.record import DEGREE
 
 # README beside the files; the tank repeats them to 0.2 to 0.5 deg
@@ -41,7 +41,7 @@ def test_overshoots_are_those_of_the_readme(shared_data: Path, name: str) -> Non
     record = record_of(columns_of(shared_data, name))
     exact, found = zigzag(record, course=0.0), zigzag(record)
     assert found["execute_heading"].value == pytest.approx(10 * DEGREE)
-    assert found["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.02 * DEGREE)
+    assert found["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
     for number, angle in enumerate(READ_OFF[name], start=1):
         assert exact[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.03)
         assert found[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.1)
@@ -62,7 +62,7 @@ def test_a_run_at_1_hz_says_the_same(shared_data: Path, name: str) -> None:
 @pytest.mark.parametrize(("name", "heading"), [("05_01", 1), ("10_05", 5), ("15_01", 1), ("20_05", 5), ("35_05", 5)])
 def test_every_zigzag_is_recognised_with_its_execute_heading(shared_data: Path, name: str, heading: int) -> None:
     record = record_of(columns_of(shared_data, name))
-    assert kind_of(record) == ("zigzag", "")
+    assert kinds_of(record) == (("zigzag",), "")
     assert zigzag(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
 
 
