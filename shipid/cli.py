@@ -391,7 +391,8 @@ def manoeuvre(
         source = f"simulated: {ship.name}, {chosen.title}"
         typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
     content = _manoeuvre_content(ship, chosen, record, rows, judged)
-    typer.echo(f"page -> {write_manoeuvre(content, out or Path(f'{Path(vessel).stem}-{name}.html'))}")
+    page = out or Path(f"{Path(vessel).name.removesuffix('.toml')}-{name}.html")
+    typer.echo(f"page -> {write_manoeuvre(content, page)}")
 
 
 def _manoeuvre_content(

@@ -26,7 +26,7 @@ from shipid.vessel.load import Vessel
 
 FROUDE, GRAVITY = 0.2, 9.81  # speed where none is asked for: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log in the time that the ship takes for her length, steps a row
-HALVINGS, MOST_RPM = 60, 60000.0
+HALVINGS, MOST_RPM = 60, 6000.0
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
 # in ship lengths at the speed of the approach: the log ahead of the execute, and what each kind takes
 LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
@@ -110,7 +110,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
 
     Raises
     ------
-    ShipidError : the speed is not positive, or no shaft speed up to 60000 rpm gives it.
+    ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
     """
     if speed <= 0:
         raise ShipidError(f"a speed of {speed:g} m/s is no approach: it must be positive", path="--speed")
