@@ -215,8 +215,10 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
 @data_app.command("measures")
 def data_measures(
     dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
-    manoeuvre: Annotated[str | None, typer.Option(help="of every run; default: what is recognised")] = None,
-    length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars [m], for criteria")] = None,
+    manoeuvre: Annotated[
+        str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
+    ] = None,
+    length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars in m, for criteria")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
@@ -349,12 +351,15 @@ def manoeuvre(
     name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
     angles: Annotated[
         list[float] | None,
-        typer.Argument(help="helm [deg], of a zigzag also execute heading [deg]", metavar="[ANGLES]..."),
+        typer.Argument(
+            help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
+            metavar="[ANGLES]...",
+        ),
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="of the approach [m/s]; default: Froude number 0.2")] = None,
+    speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
     side: Annotated[str, typer.Option(help="starboard or port: where she turns first")] = "starboard",
-    duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level [s]")] = None,
-    step: Annotated[float | None, typer.Option(help="of the integration [s]; ten make a row of the log")] = None,
+    duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
+    step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
     log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,

@@ -1,4 +1,4 @@
-"""IMO criteria of ship manoeuvrability: resolution MSC.137(76), annex, 5.3, with the conditions of 3 and 4."""
+"""IMO criteria of ship manoeuvrability: resolution MSC.137(76), annex, 5.3."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Criterion:
 def criteria(kind: str, measures: Measures, length: float | None) -> list[Criterion]:
     """Judge a manoeuvre of a ship of a length between perpendiculars [m]; empty for kinds without a criterion.
 
-    The test speed (90 % of that at 85 % of the greatest engine power, or more), full load, deep calm water and a
-    reference point at midships are for the user to see to.
+    The test speed (90 % of that at 85 % of the greatest engine power, or more), full load, deep calm water (5.2) and a
+    logged point at midships are for the user to see to.
     """
     if kind == "turning":
         return list(_turning(measures, length))

@@ -68,7 +68,10 @@ class ManoeuvreContent:
         judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
         if len(judged):
             met = int((judged["verdict"] == "met").sum())
-            sentences.append(Sentence(f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met.", "criteria"))
+            notes = {str(note) for note in judged["note"]}
+            said_of_all = f"; {notes.pop()}" if len(notes) == 1 and "" not in notes else ""
+            words = f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met{said_of_all}."
+            sentences.append(Sentence(words, "criteria"))
         return sentences
 
 
