@@ -12,11 +12,16 @@ import typer
 from shipid.errors import DocumentError, ShipidError
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from rich.table import Table
 
+    from shipid.measures.record import Record
     from shipid.report import ReportContent
+    from shipid.report.manoeuvre import ManoeuvreContent
+    from shipid.simulation.standard import Standard
     from shipid.study.results import Results
     from shipid.study.run import Event
+    from shipid.vessel.load import Vessel
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -239,6 +244,32 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
         raise typer.Exit(1)
 
 
+@data_app.command("measures")
+def data_measures(
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
+    manoeuvre: Annotated[
+        str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
+    ] = None,
+    length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars in m, for criteria")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+) -> None:
+    """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
+    from shipid.data.dataset import read_dataset
+    from shipid.data.measuring import measure_dataset
+
+    found = measure_dataset(read_dataset(dataset), manoeuvre, length)
+    if len(found.measures):
+        _print(_measure_table(found.measures.to_dict("records"), ["run", "kind"]))
+    if len(found.criteria):
+        _print(_criterion_table(found.criteria.to_dict("records"), ["run"]))
+    if found.left:
+        _print(_table(["run", "not measured, because"], found.left.items()))
+    measured = found.measures["run"].nunique() if len(found.measures) else 0
+    typer.echo(f"{measured} runs measured, {len(found.left)} not")
+    if csv is not None:
+        _write_csv(found.measures, csv)
+
+
 @study_app.command("list")
 def study_list() -> None:
     """List the bundled studies."""
@@ -397,6 +428,144 @@ def predict(
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
         typer.echo(f"{outside:.0%} of the instants lie outside what the compensator was trained on (column `outside`)")
+
+
+@app.command("manoeuvre")
+def manoeuvre(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
+    angles: Annotated[
+        list[float] | None,
+        typer.Argument(
+            help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
+            metavar="[ANGLES]...",
+        ),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
+    side: Annotated[str, typer.Option(help="starboard or port: where she turns first")] = "starboard",
+    duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
+    step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+    log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
+) -> None:
+    """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
+    from shipid.data.dataset import Dataset, write_dataset
+    from shipid.measures import MEASURES
+    from shipid.measures.criteria import criteria
+    from shipid.measures.recognise import record_of
+    from shipid.measures.rows import criterion_rows, measure_rows
+    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.simulation.perform import perform
+    from shipid.simulation.standard import length_of, standard
+    from shipid.vessel.load import load_vessel
+
+    if log is not None and log.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
+    ship = load_vessel(vessel)
+    chosen = standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
+    frame = perform(ship, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
+    record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
+    found, length = MEASURES[chosen.kind](record), length_of(ship)
+    rows, judged = measure_rows(found, length), criterion_rows(criteria(chosen.kind, found, length))
+    typer.echo(f"{ship.name}: {chosen.title}, approach at {chosen.speed:.3g} m/s ({chosen.manoeuvre.n_rpm:.4g} rpm)")
+    _print(_measure_table(rows, []))
+    if judged:
+        _print(_criterion_table(judged, []))
+    if csv is not None:
+        import pandas as pd
+
+        _write_csv(pd.DataFrame(rows), csv)
+    if log is not None:
+        source = f"simulated: {ship.name}, {chosen.title}"
+        typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
+    content = _manoeuvre_content(ship, chosen, record, rows, judged)
+    page = out or Path(f"{Path(vessel).name.removesuffix('.toml')}-{name}.html")
+    typer.echo(f"page -> {write_manoeuvre(content, page)}")
+
+
+def _manoeuvre_content(
+    ship: Vessel, chosen: Standard, record: Record, rows: list[dict[str, Any]], judged: list[dict[str, Any]]
+) -> ManoeuvreContent:
+    import shlex
+
+    import numpy as np
+    import pandas as pd
+
+    from shipid import __version__
+    from shipid.measures.spiral import Levels, levels, rate_levels
+    from shipid.report.manoeuvre import ManoeuvreContent
+    from shipid.study.results import ship_outline
+
+    columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
+    shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
+    points = {"spiral": levels, "reverse-spiral": rate_levels}.get(chosen.kind)
+    steady = points(record) if points else Levels(np.empty(0), np.empty(0), 0)
+    particulars = ship.document["particulars"]
+    return ManoeuvreContent(
+        title=f"{ship.name}: {chosen.title}",
+        name=chosen.kind,
+        kind=chosen.kind,
+        log=pd.DataFrame({**columns, "shaft": shaft}),
+        measures=pd.DataFrame(rows),
+        criteria=pd.DataFrame(judged),
+        outline=ship_outline(
+            particulars.get("L_oa", particulars["L_pp"]), particulars.get("B", particulars["L_pp"] / 6)
+        ),
+        levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
+        provenance={
+            "Vessel": f"{ship.name}, digest {ship.digest}",
+            "Approach": f"{chosen.speed:.4g} m/s at {chosen.manoeuvre.n_rpm:.5g} rpm, calm deep water, no wind",
+            "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
+            "shipid": __version__,
+        },
+        command=shlex.join(["shipid", *sys.argv[1:]]),
+    )
+
+
+def _write_csv(frame: DataFrame, file: Path) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    frame.to_csv(file, index=False)
+    typer.echo(f"measures -> {file}")
+
+
+def _measure_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of measures; `first` are columns that come before."""
+    rows = list(rows)
+    missing = any(row["note"] for row in rows)
+    body = [
+        [
+            *(row[key] for key in first),
+            row["measure"],
+            _digits(row["value"]),
+            row["unit"],
+            "" if row["lengths"] != row["lengths"] else f"{row['lengths']:.2f}",
+            *[row["note"]] * missing,
+        ]
+        for row in rows
+    ]
+    return _table([*first, "measure", "value", "unit", "ship lengths", *["why missing"] * missing], body)
+
+
+def _criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of criteria; `first` are columns that come before."""
+    body = [
+        [
+            *(row[key] for key in first),
+            row["criterion"],
+            *(_digits(row[key]) for key in ("value", "limit")),
+            row["unit"],
+            row["verdict"],
+            row["note"],
+        ]
+        for row in rows
+    ]
+    return _table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
+
+
+def _digits(value: float) -> str:
+    return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
 
 
 def _run(plan: Any, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:

@@ -65,13 +65,40 @@ def test_help_and_version_are_light() -> None:
 
 def test_help_names_every_command() -> None:
     for group, commands in (
-        ([], ("vessel", "data", "study", "predict")),
-        (["vessel"], ("list", "show")),
-        (["data"], ("import", "check", "fetch")),
+        ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre")),
+        (["vessel"], ("list", "show", "new")),
+        (["data"], ("import", "check", "fetch", "measures")),
         (["study"], ("list", "variants", "screen", "run", "resume", "report")),
     ):
         text = said(*group, "--help")
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
+
+
+def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Table, page, CSV and log of one run; the log measures the same."""
+    monkeypatch.chdir(tmp_path)
+    text = said("manoeuvre", "gunnerus-28.9", "zigzag", 20, 10, "--csv", "z.csv", "--log", "z.parquet", "--speed", 4)
+    assert "approach at 4 m/s" in text
+    assert "zigzag 20/10, first to starboard" in text
+    assert Path("gunnerus-28.9-zigzag.html").is_file()
+    table = pd.read_csv("z.csv").set_index("measure")
+    assert table.loc["execute heading", "value"] == pytest.approx(10)
+    assert f"{table.loc['overshoot 1', 'value']:.3g}" in text
+    text = said("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
+    assert "1 runs measured, 0 not" in text
+    again = pd.read_csv("again.csv").set_index("measure")
+    pd.testing.assert_series_equal(again["value"], table["value"])
+
+
+def test_manoeuvres_that_cannot_be() -> None:
+    for arguments, expected in (
+        (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
+        (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
+    ):
+        result = shell(*arguments)
+        assert result.returncode == 1
+        assert result.stderr.startswith(expected)
+        assert result.stderr.count("\n") == 1
 
 
 def test_vessels() -> None:
