@@ -25,7 +25,12 @@ REQUIRED = {"t": "s", "north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": 
 OPTIONAL = {"z": "m", "phi": "rad", "theta": "rad", "w": "m/s", "p": "rad/s", "q": "rad/s"} | {
     "V_w": "m/s",
     "beta_w": "rad",
+    "std_u": "m/s",
+    "std_v": "m/s",
+    "std_r": "rad/s",
 }
+STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
+"""State -> column of its standard deviation, where it was estimated instead of measured."""
 SIGNALS = {"n": "rev/s", "alpha": "rad", "delta": "rad"}
 ANGLES = ("psi", "phi", "theta", "beta_w")
 BREAK = "break"
