@@ -17,7 +17,7 @@ from shipid.data.dataset import Array, cumulative_integral
 
 Complex = NDArray[np.complex128]
 GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
-WINDOW, STEPS, MOST = 10.0, 4, 4000  # s; steps and windows
+WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
 FEW = 30  # values: fewer may be round by chance
 NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
@@ -72,7 +72,9 @@ def fit(seen: NDArray[np.generic], integrated: NDArray[np.generic]) -> Fit:
     if power <= 0.0 or total <= 0.0:
         return Fit(0.0, np.inf, 1.0)
     scale = float(np.real(np.vdot(integrated, seen))) / power
-    parts = [slice(a, b) for a, b in zip(*(np.linspace(0, len(seen), 21).astype(int)[i:] for i in (0, 1)), strict=False)]
+    parts = [
+        slice(a, b) for a, b in zip(*(np.linspace(0, len(seen), 21).astype(int)[i:] for i in (0, 1)), strict=False)
+    ]
     powers = [float(np.sum(np.abs(integrated[part]) ** 2)) for part in parts]
     scales = [
         float(np.real(np.vdot(integrated[part], seen[part]))) / size
@@ -141,14 +143,14 @@ def _at(t: Array, values: NDArray[np.generic], instants: Array) -> Complex:
     return np.interp(instants, t, np.real(values)) + 1j * np.interp(instants, t, np.imag(values))
 
 
-def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float]:
-    """Arm x + i y [m] by which the position's point lies off that of the velocities, and its standard error.
+def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
+    """Arm x + i y [m] of the position's point off that of the velocities, its standard error, share of misfit explained.
 
     Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
     """
     power = float(np.sum(np.abs(turned) ** 2))
     if power < 1e-3 * len(turned):
-        return 0j, np.inf
+        return 0j, np.inf, 0.0
     parts = np.array_split(np.arange(len(seen)), 10)
     whole = np.vdot(turned, seen - integrated) / power
     found = [
@@ -157,7 +159,8 @@ def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, f
         if np.sum(np.abs(turned[part]) ** 2) > 0.02 * power / 10
     ]
     error = 1.25 * float(np.std(found)) / np.sqrt(len(found)) if len(found) > 3 else np.inf
-    return complex(whole), error
+    explained = abs(whole) ** 2 * power / max(float(np.sum(np.abs(seen - integrated) ** 2)), 1e-30)
+    return complex(whole), error, float(explained)
 
 
 def effect(t: Array, r: Array, order: Array) -> float:
@@ -191,7 +194,8 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
     drift = position - integrated
     miss = np.abs(drift[reach:] - drift[:-reach])
     limit = max(5.0 * float(np.percentile(miss, 98)), 2.0 * usual)
-    wild = miss > limit
+    holes = np.append(0, np.cumsum(np.diff(t) > GAP * usual))
+    wild = (miss > limit) & (holes[reach:] == holes[:-reach])
     if not wild.any() or wild.mean() > 0.05:
         return []
     edges = np.flatnonzero(wild)
@@ -201,7 +205,9 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
         start, end = max(0, group[0] - 1), min(len(t) - 1, group[-1] + reach + 1)
         around = 3 * reach
         before, after = drift[max(0, start - around) : start + 1], drift[end : end + around + 1]
-        stays = abs(np.median(after.real) - np.median(before.real) + 1j * (np.median(after.imag) - np.median(before.imag)))
+        stays = abs(
+            np.median(after.real) - np.median(before.real) + 1j * (np.median(after.imag) - np.median(before.imag))
+        )
         found.append((float(t[start]), float(t[end]), float(stays)))
     return found
 
@@ -212,6 +218,12 @@ def straight(r: Array, t: Array) -> NDArray[np.bool_]:
     width = max(3, round(30.0 / usual))
     calm = pd.Series(np.abs(r)).rolling(width, center=True, min_periods=width // 2).max().to_numpy()
     return np.asarray(calm < max(np.radians(0.3), 0.1 * float(np.percentile(np.abs(r), 95))))
+
+
+def visits(values: Array) -> int:
+    """How often a signal comes to its largest value."""
+    top = values == values.max()
+    return int(np.sum(np.diff(top.astype(int)) == 1))
 
 
 def between_rows(values: Array) -> float:
@@ -232,11 +244,13 @@ def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
     are whole multiples of the quantum, and about N^-1/2 else. Only values that stand still for two rows are asked,
     which no later interpolation has made; if there are few, all.
     """
-    still = np.unique(values[1:][np.diff(values) == 0.0])
-    asked = still if len(still) >= FEW else np.unique(values)[:5000]
+    still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
+    asked = still if len(still) >= FEW else np.unique(values)[:400]
     if len(asked) < FEW or _roundness(asked, 1.0, 1e-4) > 0.8:  # round as they stand: nothing was converted
         return 0.0, 0.0, len(asked)
     for quantum in (0.1, 0.01, 0.001):
+        if low * float(np.ptp(asked)) < 20 * quantum:
+            continue  # too few multiples to be missed
         multipliers = np.arange(low, high, quantum / 8 / float(np.abs(asked).max()))
         sizes = [_roundness(asked, k, quantum) for k in multipliers]
         best = int(np.argmax(sizes))

@@ -58,6 +58,7 @@ UNIT_WORDS = {
 }
 SIDES = r"(port|starboard|stbd|stern|bow|fore|aft|main)"
 CLEAR, SURE, LIKELY = 1.5, 0.95, 0.6
+VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 
 
@@ -135,7 +136,12 @@ class _State:
         self.suggestions.append(Suggestion(name, source, unit, round(confidence, 2), why, extra))
 
     def find(
-        self, kind: str, columns: tuple[str, ...], confidence: float, sentence: str, repair: dict[str, Any] | None = None
+        self,
+        kind: str,
+        columns: tuple[str, ...],
+        confidence: float,
+        sentence: str,
+        repair: dict[str, Any] | None = None,
     ) -> None:
         """Note a finding."""
         self.findings.append(Finding(kind, columns, round(confidence, 2), sentence, repair))
@@ -156,7 +162,9 @@ def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
     sniffed = sniff(Path(file), names)
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     state = _State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t))
-    for name in [name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])]:
+    for name in [
+        name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
+    ]:
         state.taken.add(name)  # numbers of rows
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows: too few to tell anything from", file=file)
@@ -184,7 +192,9 @@ def _unit_said(name: str, si: str) -> str | None:
     inside = re.search(r"[\[(]([^\])]*)[\])]", name)
     words = inside.group(1) if inside else name.rpartition("_")[2] if "_" in name else name if si == "rev/s" else ""
     said = words.strip().lower()
-    return next((unit for unit, expected in UNIT_WORDS.items() if unit in UNITS[si] and re.fullmatch(expected, said)), None)
+    return next(
+        (unit for unit, expected in UNIT_WORDS.items() if unit in UNITS[si] and re.fullmatch(expected, said)), None
+    )
 
 
 def _pose(state: _State, file: str | Path) -> None:
@@ -293,7 +303,9 @@ def _velocities(state: _State) -> None:
             best = better[0]
     if not named and best[0].left > 0.1:
         return
-    runner = next((entry for entry in ranked if entry[3] != best[3] and {entry[1], entry[2]} == {best[1], best[2]}), None)
+    runner = next(
+        (entry for entry in ranked if entry[3] != best[3] and {entry[1], entry[2]} == {best[1], best[2]}), None
+    )
     _take_velocities(state, best, runner[0] if runner else None, seen)
 
 
@@ -341,7 +353,9 @@ def _take_velocities(state: _State, best: Hypothesis, runner: Fit | None, seen: 
     if frame == "earth":
         extra = {"frame": "earth"}
         if first in _all_called(state, "u"):
-            sentence = f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
+            sentence = (
+                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
+            )
             state.find("earth-fixed velocities", (first, second), confidence, sentence)
     else:
         extra = {}
@@ -350,7 +364,9 @@ def _take_velocities(state: _State, best: Hypothesis, runner: Fit | None, seen: 
             state.find("wrong sign of v", (second,), confidence, sentence)
             extra_v = {"sign": -1}
         if first in _all_called(state, "v") and second in _all_called(state, "u"):
-            state.find("u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it")
+            state.find(
+                "u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it"
+            )
     state.suggest("u", first, unit, confidence, why, **extra)
     state.suggest("v", second, unit, confidence, why, **extra, **extra_v)
     pair = in_unit[0] + 1j * in_unit[1] * (-1 if frame == "mirrored" else 1)
@@ -387,8 +403,10 @@ def _factor(state: _State, remains: bool, fit: Fit, sources: tuple[str, str], un
     if found and unit != "kn":
         multiplier, _, count = max(found, key=lambda entry: entry[2])
         factor = multiplier / per_knot
-        if abs(factor - 1.0) > 1e-3:
-            sentence = f"{count} values are round in knots if these were divided by {multiplier:.4f}, not {per_knot:.4f}"
+        if abs(factor - fit.scale) < max(0.03, 3 * fit.error) and abs(factor - 1.0) > 1e-3:
+            sentence = (
+                f"{count} values are round in knots if these were divided by {multiplier:.4f}, not {per_knot:.4f}"
+            )
             sentence += f" (the track says {fit.scale:.3f} +- {fit.error:.3f})"
             repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(factor, 4)}
             state.find("factor", sources, 0.95, sentence, repair)
@@ -469,9 +487,15 @@ def _orders(state: _State) -> None:
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
     angles = [(name, signal) for signal in ("alpha", "delta") for name in state.called(signal)]
     if numbered and r is not None:
-        small = [name for name in state.free() if 0 < np.abs(state.columns[name]).max() < 95 and np.ptp(state.columns[name]) > 0]
+        small = [
+            name
+            for name in state.free()
+            if 0 < np.abs(state.columns[name]).max() < 95 and np.ptp(state.columns[name]) > 0
+        ]
         # an order stands out among what merely answers, such as roll, by reaching where it was held
-        strength = {name: evidence.effect(state.t, r, state.columns[name]) * _held(state.columns[name]) for name in small}
+        strength = {
+            name: evidence.effect(state.t, r, state.columns[name]) * _held(state.columns[name]) for name in small
+        }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > 4 else []
     azimuth = any(signal == "alpha" for _, signal in angles)
@@ -540,16 +564,20 @@ def _defects_of_rows(state: _State, sniffed: Sniffed) -> None:
     if moving:
         same = np.all([np.diff(state.columns[name]) == 0 for name in moving], axis=0)
         if same.mean() > 0.02:
-            state.find("frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before")
+            state.find(
+                "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
+            )
         share = float(np.median([evidence.between_rows(state.columns[name]) for name in moving]))
         if share > 0.2:
-            sentence = f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
+            sentence = (
+                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
+            )
             state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
     for column in state.suggestions:
         if column.name.endswith(".n"):
             values = state.columns[column.source]
             top = float(np.mean(values == values.max()))
-            if 0.05 < top < 0.9 and len(np.unique(values)) > 100:
+            if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS:
                 sentence = f"{100 * top:.0f} % of the rows have exactly the largest value, {values.max():g}"
                 state.find("clipped", (column.source,), 0.7, sentence)
     steps = np.diff(sniffed.t)
@@ -559,47 +587,78 @@ def _defects_of_rows(state: _State, sniffed: Sniffed) -> None:
         state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
     if missing:
-        state.find("missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}")
+        state.find(
+            "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
+        )
 
 
 def _defects_of_motion(state: _State) -> None:
     """What position, heading, velocity and yaw rate say about each other."""
-    if state.psi is not None and state.r is not None:
-        _late(state, "late heading", state.psi, evidence.integral(state.t, state.r), "psi", "yaw rate")
-    if state.velocity is None or state.position is None or state.psi is None or state.body is None:
+    if state.psi is None:
+        return
+    if state.r is not None:
+        delay, explained = _delay(state, state.psi, evidence.integral(state.t, state.r))
+        if delay:
+            _find_late(state, "heading", "yaw rate", delay, explained)
+            state.psi = np.interp(state.t + delay, state.t, state.psi)  # else what follows finds it once more
+            if state.body is not None and not _is_earth_fixed(state):
+                state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
+    if state.velocity is None or state.position is None or state.body is None:
         return
     path = evidence.integral(state.t, state.velocity)
-    late = _late(state, "late position", state.position, path, "position", "velocity")
-    _jumps(state, path)
+    _jumps(state, _arm_or_delay(state, path))
+    _heading_offset(state)
+
+
+def _is_earth_fixed(state: _State) -> bool:
+    return any(
+        column.name in ("u", "speed") and (column.name == "speed" or column.extra) for column in state.suggestions
+    )
+
+
+def _arm_or_delay(state: _State, path: Complex) -> Complex:
+    """A position ahead of its velocities: of another point of the ship, or of another time, whichever explains more.
+
+    Returns the path of the velocities with that put right, so that nothing is found twice.
+    """
+    assert state.position is not None
+    assert state.psi is not None
     seen = np.asarray(state.chosen.change(state.position), dtype=complex)
     ran = np.asarray(state.chosen.change(path), dtype=complex)
     keep = evidence.robust(seen, ran)
     turned = np.asarray(state.chosen.change(np.exp(1j * state.psi)), dtype=complex)
     scale = evidence.fit(seen[keep], ran[keep]).scale
-    off, error = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
-    miss = float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left))
-    if not late and miss > JITTER:
+    off, error, by_arm = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
+    delay, by_delay = _delay(state, state.position, path)
+    if delay and by_delay > by_arm:
+        _find_late(state, "position", "velocity", delay, by_delay)
+        moved = [np.interp(state.t - delay, state.t, part) for part in (path.real, path.imag)]
+        return np.asarray(moved[0] + 1j * moved[1])
+    if abs(off) > max(ARM, 5 * error):
+        sentence = (
+            f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
+        )
+        repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
+        state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
+        return np.asarray(path + off * np.exp(1j * state.psi))
+    if float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
         far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
         sentence = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS): take the path of the velocities"
         state.find("position jitter", (), 0.8, sentence)
-    if not late and abs(off) > max(ARM, 5 * error):
-        sentence = f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
-        repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
-        state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
-    _heading_offset(state)
+    return path
 
 
-def _late(
-    state: _State, kind: str, seen: Array | Complex, integrated: Complex, what: str, against: str
-) -> bool:
+def _delay(state: _State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:
+    """Seconds by which one comes later than the other, 0 if that explains little; and the share that it explains."""
     usual = float(np.median(np.diff(state.t)))
     delay, explained = evidence.shift(state.t, seen, integrated, max(3.0, 3 * usual))
-    if abs(delay) < max(0.3, 0.75 * usual) or explained < 0.35:
-        return False
+    return (delay, explained) if abs(delay) > max(0.3, 0.75 * usual) and explained > 0.35 else (0.0, 0.0)
+
+
+def _find_late(state: _State, what: str, against: str, delay: float, explained: float) -> None:
     word = "later" if delay > 0 else "earlier"
     sentence = f"{what} comes {abs(delay):.2g} s {word} than the {against} says ({100 * explained:.0f} % of the misfit)"
-    state.find(kind, (what,), float(np.clip(explained, 0, 0.95)), sentence)
-    return True
+    state.find(f"late {what}", (what,), float(np.clip(explained, 0.2, 0.95)), sentence)
 
 
 def _jumps(state: _State, path: Complex) -> None:

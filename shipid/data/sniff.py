@@ -124,7 +124,9 @@ def cells(line: str, separator: str) -> list[str]:
 
 def _number_share(row: list[str], decimal: str) -> float:
     """Share of cells that are numbers; an empty one is neither."""
-    said = [cell.replace(",", ".") if decimal == "," else cell for cell in row if cell.lower() not in _WORDS_FOR_NOTHING]
+    said = [
+        cell.replace(",", ".") if decimal == "," else cell for cell in row if cell.lower() not in _WORDS_FOR_NOTHING
+    ]
     return sum(map(_is_number, said)) / len(said) if said else 0.0
 
 
@@ -167,7 +169,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     found = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
     found = found or rising
     if not found:
-        said = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
+        said = (
+            f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
+        )
         raise DataError(f"no column can be the clock: {said}", file=file)
     t = columns[found[0]]
     name = plain(found[0])
