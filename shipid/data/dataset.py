@@ -6,7 +6,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -196,14 +196,19 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
+    write_whole(target, lambda part: pyarrow.parquet.write_table(table, part, compression="zstd"))
+    return target
+
+
+def write_whole(target: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file that appears whole or not at all; raises DataError if the place cannot be written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
-            pyarrow.parquet.write_table(table, Path(folder) / target.name, compression="zstd")
+            write(Path(folder) / target.name)
             os.replace(Path(folder) / target.name, target)
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
-    return target
 
 
 def read_dataset(file: str | os.PathLike[str]) -> Dataset:

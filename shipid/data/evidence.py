@@ -246,23 +246,25 @@ def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
     """
     still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
     asked = still if len(still) >= FEW else np.unique(values)[:400]
-    if len(asked) < FEW or _roundness(asked, 1.0, 1e-4) > 0.8:  # round as they stand: nothing was converted
+    if len(asked) < FEW or _roundness(asked, np.ones(1), 1e-4)[0] > 0.8:  # round as they stand: nothing was converted
         return 0.0, 0.0, len(asked)
-    for quantum in (0.1, 0.01, 0.001):
+    for quantum in (0.1, 0.01):
         if low * float(np.ptp(asked)) < 20 * quantum:
             continue  # too few multiples to be missed
-        multipliers = np.arange(low, high, quantum / 8 / float(np.abs(asked).max()))
-        sizes = [_roundness(asked, k, quantum) for k in multipliers]
-        best = int(np.argmax(sizes))
-        if sizes[best] > 0.8:
-            near = multipliers[best] + np.linspace(-1, 1, 101) * quantum / 8 / float(np.abs(asked).max())
-            finer = [_roundness(asked, k, quantum) for k in near]
-            return float(near[int(np.argmax(finer))]), float(max(finer)), len(asked)
+        step = quantum / 8 / float(np.abs(asked).max())
+        multipliers = np.arange(low, high, step)
+        best = multipliers[np.argmax(_roundness(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
+        finer = best + np.linspace(-step, step, 101)
+        sizes = _roundness(asked, finer, quantum)
+        if sizes.max() > 0.8:
+            return float(finer[np.argmax(sizes)]), float(sizes.max()), len(asked)
     return 0.0, 0.0, len(asked)
 
 
-def _roundness(values: Array, multiplier: float, quantum: float) -> float:
-    return float(abs(np.mean(np.exp(2j * np.pi * multiplier / quantum * values))))
+def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
+    """R for every multiplier, (K,)."""
+    phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
+    return np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1))
 
 
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
