@@ -9,8 +9,9 @@ from typing import Any
 
 import tomlkit
 
+from shipid.data.clues import Finding, Suggestion
 from shipid.data.dataset import write_whole
-from shipid.data.guess import LIKELY, Finding, Guess, Suggestion
+from shipid.data.guess import LIKELY, Guess
 from shipid.data.importing import import_log, sha256_of
 from shipid.data.mapping import Mapping, Segment, read_mapping, to_si
 from shipid.data.segmentation import manoeuvres
@@ -28,7 +29,14 @@ QUESTIONS = (
 
 def draft_mapping(found: Guess) -> str:
     """Text of a mapping: columns with how sure they are, repairs, and the manoeuvres if it can be imported as it is."""
-    text = "\n".join([*_head(found), *_columns(found), *_estimate(found), *_repairs(found)]) + "\n"
+    parts = [*_head(found), *_columns(found), *_estimate(found), *_repairs(found)]
+    text = (
+        "\n".join(
+            "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
+            for part in parts
+        )
+        + "\n"
+    )
     try:
         segments = segment_log(_read(text), found.file)
     except ShipidError as error:

@@ -30,9 +30,10 @@ class Windows:
     first: NDArray[np.intp]
     last: NDArray[np.intp]
 
-    def change(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def change(self, values: NDArray[np.generic]) -> Complex:
         """Value at the end less value at the start."""
-        return values[self.last] - values[self.first]  # type: ignore[no-any-return, operator]
+        plane = np.asarray(values, dtype=np.complex128)
+        return np.asarray(plane[self.last] - plane[self.first])
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,8 @@ def integral(t: Array, rate: NDArray[np.generic]) -> Complex:
     return cumulative_integral(t, np.real(rate)) + 1j * cumulative_integral(t, np.imag(rate))
 
 
-def fit(seen: NDArray[np.generic], integrated: NDArray[np.generic]) -> Fit:
+def fit(seen: Complex, integrated: Complex) -> Fit:
     """Least squares with one real scale; the error from the scatter of the scale between twenty parts of the log."""
-    seen, integrated = np.asarray(seen, dtype=complex), np.asarray(integrated, dtype=complex)
     power = float(np.sum(np.abs(integrated) ** 2))
     total = float(np.sum(np.abs(seen) ** 2))
     if power <= 0.0 or total <= 0.0:
@@ -140,11 +140,12 @@ def shift(t: Array, seen: NDArray[np.generic], integrated: NDArray[np.generic], 
 
 
 def _at(t: Array, values: NDArray[np.generic], instants: Array) -> Complex:
-    return np.interp(instants, t, np.real(values)) + 1j * np.interp(instants, t, np.imag(values))
+    real, imaginary = (np.interp(instants, t, part) for part in (np.real(values), np.imag(values)))
+    return np.asarray(real + 1j * imaginary, dtype=complex)
 
 
 def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
-    """Arm x + i y [m] of the position's point off that of the velocities, its standard error, share of misfit explained.
+    """Arm x + i y [m] of the position's point off that of the velocities, its error, and the share of misfit explained.
 
     Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
     """
@@ -170,10 +171,8 @@ def effect(t: Array, r: Array, order: Array) -> float:
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     if len(chosen.first) < 12 or np.ptp(order) == 0.0:
         return 0.0
-    design = np.stack(
-        [*(chosen.change(cumulative_integral(t, x)) for x in (order, r)), chosen.change(t)], axis=1
-    ).astype(float)
-    change = np.asarray(chosen.change(r), dtype=float)
+    columns = [chosen.change(x).real for x in (cumulative_integral(t, order), cumulative_integral(t, r), t)]
+    design, change = np.stack(columns, axis=1), chosen.change(r).real
     sizes = np.linalg.norm(design, axis=0)
     if not np.all(sizes > 0):
         return 0.0
@@ -205,11 +204,13 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
         start, end = max(0, group[0] - 1), min(len(t) - 1, group[-1] + reach + 1)
         around = 3 * reach
         before, after = drift[max(0, start - around) : start + 1], drift[end : end + around + 1]
-        stays = abs(
-            np.median(after.real) - np.median(before.real) + 1j * (np.median(after.imag) - np.median(before.imag))
-        )
+        stays = abs(_middle(after) - _middle(before))
         found.append((float(t[start]), float(t[end]), float(stays)))
     return found
+
+
+def _middle(points: Complex) -> complex:
+    return complex(np.median(points.real), np.median(points.imag))
 
 
 def straight(r: Array, t: Array) -> NDArray[np.bool_]:
@@ -264,7 +265,7 @@ def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
 def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
     """R for every multiplier, (K,)."""
     phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
-    return np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1))
+    return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
 
 
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:

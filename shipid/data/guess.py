@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,74 +15,15 @@ import numpy as np
 from pymap3d import geodetic2ned
 
 from shipid.data import evidence
+from shipid.data.clues import SIDES, Finding, State, Suggestion, unit_said
 from shipid.data.dataset import Array
-from shipid.data.evidence import Complex, Fit, Windows
+from shipid.data.defects import defects_of_motion, defects_of_rows
+from shipid.data.evidence import Complex, Fit
 from shipid.data.mapping import UNITS, to_si
-from shipid.data.sniff import Sniffed, plain, sniff
+from shipid.data.sniff import Sniffed, sniff
 from shipid.errors import DataError
 
-NAMES: dict[str, str] = {
-    "north": r"n|north|northing|x0|x|xn|pos_?n|x_?earth|y_north",
-    "east": r"e|east|easting|y0|y|ye|pos_?e|y_?earth",
-    "latitude": r"lat|latitude",
-    "longitude": r"lon|long|lng|longitude",
-    "psi": r"psi|heading|hdg|hdt|head|yaw|true_?heading|gyro",
-    "u": r"u|surge|surge_?(speed|vel\w*)|vx|u_?b(ody)?|speed_?long\w*|dx0?",
-    "v": r"v|sway|sway_?(speed|vel\w*)|vy|v_?b(ody)?|speed_?(trans|lat)\w*|dy0?",
-    "r": r"r|rot|yaw_?rate|rate_?of_?turn|psi_?dot|dpsi\w*|wz",
-    "speed": r"sog|speed|spd|speed_?over_?ground",
-    "course": r"cog|course|track|course_?over_?ground",
-    "phi": r"phi|roll",
-    "theta": r"theta|pitch",
-    "p": r"p|roll_?rate",
-    "q": r"q|pitch_?rate",
-    "V_w": r"v_?w|(true_?)?wind_?(speed)?|tws",
-    "beta_w": r"beta_?w|(true_?)?wind_?(dir\w*|from|angle)|twd",
-    "n": r"n_?(port|stbd|starboard|stern|bow)?|rpm\w*|rev\w*|rps\w*|shaft\w*|\w+_(rpm|shaft|rev)|n_p|n_s",
-    "alpha": r"alpha\w*|azi\w*|\w+_(azi\w*|alpha)",
-    "delta": r"delta\w*|rud\w*|\w+_(rud\w*|delta)",
-}
-"""What a column may be -> how it is often called, in lower case, without its unit."""
-UNIT_WORDS = {
-    "kn": r"kn|kts?|knots?",
-    "m/s": r"mps|m/s|ms",
-    "km/h": r"kmh|km/h|kph",
-    "deg": r"degs?|°",
-    "rad": r"rads?",
-    "deg/s": r"deg/s|dps|degs?_?p?e?r?_?s(ec)?",
-    "deg/min": r"deg/min|dpm|deg_?p?e?r?_?min",
-    "rad/s": r"rad/s|rads|rad_?s",
-    "rpm": r"rpm|1/min|min-1",
-    "rev/s": r"rps|1/s|rev/s|hz",
-    "m": r"m|metres?|meters?",
-}
-SIDES = r"(port|starboard|stbd|stern|bow|fore|aft|main)"
-CLEAR, SURE, LIKELY = 1.5, 0.95, 0.6
-VISITS = 6  # to its largest value, before a signal counts as clipped
-ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
-
-
-@dataclass(frozen=True)
-class Suggestion:
-    """A column of the dataset: where from, how sure (0 to 1), why; `extra` holds further keys of the mapping."""
-
-    name: str
-    source: str
-    unit: str
-    confidence: float
-    evidence: str
-    extra: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A defect or a trap: its kind, the columns that have it, how sure, a sentence, and a repair that would mend it."""
-
-    kind: str
-    columns: tuple[str, ...]
-    confidence: float
-    sentence: str
-    repair: dict[str, Any] | None = None
+CLEAR, LIKELY = 1.5, 0.6
 
 
 @dataclass(frozen=True)
@@ -105,48 +46,6 @@ class Guess:
         return {finding.kind for finding in self.findings}
 
 
-@dataclass
-class _State:
-    """What is known so far; each step adds to it."""
-
-    t: Array
-    clock_unit: str
-    columns: dict[str, Array]
-    chosen: Windows
-    taken: set[str] = field(default_factory=set)
-    suggestions: list[Suggestion] = field(default_factory=list)
-    findings: list[Finding] = field(default_factory=list)
-    position: Complex | None = None
-    psi: Array | None = None
-    r: Array | None = None
-    velocity: Complex | None = None  # in the earth's frame
-    body: Complex | None = None
-
-    def free(self) -> list[str]:
-        """Columns that nothing claims yet."""
-        return [name for name in self.columns if name not in self.taken]
-
-    def called(self, meaning: str) -> list[str]:
-        """Free columns whose name says that they may be this."""
-        return [name for name in self.free() if re.fullmatch(NAMES[meaning], _stem(name))]
-
-    def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
-        """Claim a column."""
-        self.taken.add(source)
-        self.suggestions.append(Suggestion(name, source, unit, round(confidence, 2), why, extra))
-
-    def find(
-        self,
-        kind: str,
-        columns: tuple[str, ...],
-        confidence: float,
-        sentence: str,
-        repair: dict[str, Any] | None = None,
-    ) -> None:
-        """Note a finding."""
-        self.findings.append(Finding(kind, columns, round(confidence, 2), sentence, repair))
-
-
 def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
     """Guess the mapping of a log.
 
@@ -161,7 +60,7 @@ def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
     """
     sniffed = sniff(Path(file), names)
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
-    state = _State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t))
+    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t))
     for name in [
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     ]:
@@ -173,31 +72,13 @@ def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
     _yaw_rate(state)
     _orders(state)
     _others(state)
-    _defects_of_rows(state, sniffed)
-    _defects_of_motion(state)
+    defects_of_rows(state, sniffed)
+    defects_of_motion(state)
     left = tuple(state.free())
     return Guess(Path(file), sniffed, tuple(state.suggestions), tuple(state.findings), left)
 
 
-def _stem(name: str) -> str:
-    """A name without brackets and without a unit at its end."""
-    base = plain(name)
-    head, underscore, tail = base.rpartition("_")
-    is_unit = underscore and any(re.fullmatch(words, tail) for words in UNIT_WORDS.values())
-    return head if is_unit and tail != "rpm" else base
-
-
-def _unit_said(name: str, si: str) -> str | None:
-    """Unit that a name says, if a column of this SI unit can have it."""
-    inside = re.search(r"[\[(]([^\])]*)[\])]", name)
-    words = inside.group(1) if inside else name.rpartition("_")[2] if "_" in name else name if si == "rev/s" else ""
-    said = words.strip().lower()
-    return next(
-        (unit for unit, expected in UNIT_WORDS.items() if unit in UNITS[si] and re.fullmatch(expected, said)), None
-    )
-
-
-def _pose(state: _State, file: str | Path) -> None:
+def _pose(state: State, file: str | Path) -> None:
     """Position and heading: the pair and the angle whose course and heading agree best, names preferred."""
     pairs = [(n, e) for n in state.called("north") for e in state.called("east")]
     globe = [(n, e) for n in state.called("latitude") for e in state.called("longitude")]
@@ -213,7 +94,7 @@ def _pose(state: _State, file: str | Path) -> None:
     best: tuple[float, str, str, str, str, complex, complex] | None = None
     for north, east in pairs:
         position = _plane(state, north, east, (north, east) in globe)
-        track = np.asarray(state.chosen.change(position), dtype=complex)
+        track = state.chosen.change(position)
         for heading in headings:
             if heading in (north, east):
                 continue
@@ -221,7 +102,7 @@ def _pose(state: _State, file: str | Path) -> None:
                 psi, _ = evidence.heal(state.columns[heading], 2 * np.pi / to_si(unit, "psi"))
                 middle = to_si(unit, "psi") * psi[(state.chosen.first + state.chosen.last) // 2]
                 same, mirrored = evidence.agreement(track, middle), evidence.agreement(track, -middle)
-                said = _unit_said(heading, "rad")
+                said = unit_said(heading, "rad")
                 score = max(same.real, abs(mirrored) - 0.05) + 0.02 * (unit == (said or "deg"))
                 if best is None or score > best[0]:
                     best = (score, north, east, heading, unit, same, mirrored)
@@ -231,7 +112,7 @@ def _pose(state: _State, file: str | Path) -> None:
     _take_pose(state, *best[1:], on_globe=best[1:3] in globe)
 
 
-def _differentiated(state: _State) -> list[str]:
+def _differentiated(state: State) -> list[str]:
     """Columns of which another one is the rate: what may be a heading in a log without names."""
     found = []
     integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in state.free()}
@@ -243,7 +124,7 @@ def _differentiated(state: _State) -> list[str]:
     return found
 
 
-def _plane(state: _State, north: str, east: str, on_globe: bool) -> Complex:
+def _plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
     a, b = state.columns[north], state.columns[east]
     if on_globe:
         a, b, _ = geodetic2ned(a, b, 0.0, float(a[0]), float(b[0]), 0.0)
@@ -251,7 +132,7 @@ def _plane(state: _State, north: str, east: str, on_globe: bool) -> Complex:
 
 
 def _take_pose(
-    state: _State, north: str, east: str, heading: str, unit: str, same: complex, mirrored: complex, on_globe: bool
+    state: State, north: str, east: str, heading: str, unit: str, same: complex, mirrored: complex, on_globe: bool
 ) -> None:
     names = ("latitude", "longitude") if on_globe else ("north", "east")
     position = _plane(state, north, east, on_globe)
@@ -277,18 +158,19 @@ def _take_pose(
     own_turn = 2 * np.pi / to_si(unit, "psi")
     psi, false = evidence.heal(state.columns[heading], own_turn)
     if false.any():
-        sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {360 if unit == 'deg' else '2 pi'}"
+        across = "360" if unit == "deg" else "2 pi"
+        sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
         repair = {"kind": "wrap_interpolation", "columns": ["psi"], "threshold": 20.0, "unit": "deg"}
         state.find("interpolation across 360", (heading,), 0.98, sentence, repair)
     state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
     state.position, state.psi = position, psi * to_si(unit, "psi") * extra.get("sign", 1)
 
 
-def _velocities(state: _State) -> None:
+def _velocities(state: State) -> None:
     """The pair of columns, its frame, order and sign whose integral is the track; names preferred if nearly as good."""
     assert state.position is not None
     assert state.psi is not None
-    seen = np.asarray(state.chosen.change(state.position), dtype=complex)
+    seen = state.chosen.change(state.position)
     ranked = sorted(_hypotheses(state, seen), key=lambda entry: entry[0].left)
     if not ranked or ranked[0][0].left > 0.5:
         _speed_and_course(state, seen)
@@ -306,13 +188,13 @@ def _velocities(state: _State) -> None:
     runner = next(
         (entry for entry in ranked if entry[3] != best[3] and {entry[1], entry[2]} == {best[1], best[2]}), None
     )
-    _take_velocities(state, best, runner[0] if runner else None, seen)
+    _take_velocities(state, best, runner[0] if runner else None)
 
 
 Hypothesis = tuple[Fit, str, str, str, Complex]
 
 
-def _hypotheses(state: _State, seen: Complex) -> Iterator[Hypothesis]:
+def _hypotheses(state: State, seen: Complex) -> Iterator[Hypothesis]:
     """Every ordered pair of free columns as earth-fixed, body-fixed, and body-fixed with v to port."""
     assert state.psi is not None
     numbered = all(name.isdecimal() for name in state.columns)
@@ -331,28 +213,29 @@ def _hypotheses(state: _State, seen: Complex) -> Iterator[Hypothesis]:
                 ("body", body[first] + 1j * body[second]),
                 ("mirrored", body[first] - 1j * body[second]),
             ):
-                change = np.asarray(state.chosen.change(path), dtype=complex)
+                change = state.chosen.change(path)
                 keep = evidence.robust(seen, change)
                 found = evidence.fit(seen[keep], change[keep])
                 if found.scale > 0:
                     yield found, first, second, frame, path
 
 
-def _take_velocities(state: _State, best: Hypothesis, runner: Fit | None, seen: Complex) -> None:
-    fit, first, second, frame, path = best
+def _take_velocities(state: State, best: Hypothesis, runner: Fit | None) -> None:
+    fit, first, second, frame, _ = best
     assert state.psi is not None
     unit, rest = _speed_unit(fit, (first, second), state)
     factor = to_si(unit, "u")
     contrast = 1.0 - fit.left / runner.left if runner is not None and runner.left > 0 else 1.0
     confidence = float(np.clip(0.6 + 0.4 * contrast, 0.0, 0.99)) * (1 - min(0.5, fit.left))
-    why = f"integrated as {'earth' if frame == 'earth' else 'body'}-fixed [{unit}] they leave {100 * fit.left:.2g} % of the track unexplained"
+    fixed = "earth" if frame == "earth" else "body"
+    why = f"integrated as {fixed}-fixed [{unit}] they leave {100 * fit.left:.2g} % of the track unexplained"
     if runner is not None:
         why += f", otherwise {100 * runner.left:.2g} %"
     in_unit = state.columns[first] * factor, state.columns[second] * factor
     extra_v: dict[str, Any] = {}
     if frame == "earth":
         extra = {"frame": "earth"}
-        if first in _all_called(state, "u"):
+        if first in state.all_called("u"):
             sentence = (
                 f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
             )
@@ -363,7 +246,7 @@ def _take_velocities(state: _State, best: Hypothesis, runner: Fit | None, seen: 
             sentence = f"{second!r} is positive to port: the track is met with its sign changed"
             state.find("wrong sign of v", (second,), confidence, sentence)
             extra_v = {"sign": -1}
-        if first in _all_called(state, "v") and second in _all_called(state, "u"):
+        if first in state.all_called("v") and second in state.all_called("u"):
             state.find(
                 "u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it"
             )
@@ -376,15 +259,11 @@ def _take_velocities(state: _State, best: Hypothesis, runner: Fit | None, seen: 
     _factor(state, rest, Fit(fit.scale / factor, fit.error / factor, fit.left), (first, second), unit)
 
 
-def _all_called(state: _State, meaning: str) -> list[str]:
-    return [name for name in state.columns if re.fullmatch(NAMES[meaning], _stem(name))]
-
-
-def _speed_unit(fit: Fit, sources: tuple[str, str], state: _State) -> tuple[str, bool]:
+def _speed_unit(fit: Fit, sources: tuple[str, str], state: State) -> tuple[str, bool]:
     """Unit nearest to the scale, and whether a factor remains; a contradiction to what the name says is a finding."""
     units = UNITS["m/s"]
     unit = min(units, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
-    said = _unit_said(sources[0], "m/s")
+    said = unit_said(sources[0], "m/s")
     if unit != (said or "m/s") and abs(fit.scale / units[unit] - 1) < 0.08:
         word = "knots" if "kn" in (unit, said) else "speed unit"
         wanted = f"the name says {said}" if said else "nothing says so"
@@ -395,7 +274,7 @@ def _speed_unit(fit: Fit, sources: tuple[str, str], state: _State) -> tuple[str,
     return unit, abs(fit.scale / units[unit] - 1) > 0.004
 
 
-def _factor(state: _State, remains: bool, fit: Fit, sources: tuple[str, str], unit: str) -> None:
+def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], unit: str) -> None:
     """A factor that the unit leaves: by the rounding of the values, or if it stands out of its own scatter."""
     per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
     rounds = [evidence.lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
@@ -415,12 +294,13 @@ def _factor(state: _State, remains: bool, fit: Fit, sources: tuple[str, str], un
     if not remains or not np.isfinite(fit.error) or off < max(3 * fit.error, 0.004):
         return
     sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
-    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {sources[0]!r} and {sources[1]!r} in {unit}"
+    pair = f"{sources[0]!r} and {sources[1]!r} in {unit}"
+    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {pair}"
     repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(fit.scale, 4)}
     state.find("factor", sources, sure, sentence, repair)
 
 
-def _speed_and_course(state: _State, seen: Complex) -> bool:
+def _speed_and_course(state: State, seen: Complex) -> bool:
     """Take speed and course over ground, if the log has them, instead of velocities."""
     for speed in state.called("speed"):
         for course in state.called("course"):
@@ -440,11 +320,11 @@ def _speed_and_course(state: _State, seen: Complex) -> bool:
     return False
 
 
-def _yaw_rate(state: _State) -> None:
+def _yaw_rate(state: State) -> None:
     """The column whose integral is the heading; one that is named so is preferred if it is nearly as good."""
     assert state.psi is not None
     change = state.chosen.change(state.psi)
-    if float(np.std(np.asarray(change, dtype=float))) < np.radians(0.5):
+    if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
         return
     found = []
@@ -456,7 +336,7 @@ def _yaw_rate(state: _State) -> None:
     found.sort(key=lambda entry: entry[0].left)
     if not found:
         return
-    best, called = found[0], _all_called(state, "r")
+    best, called = found[0], state.all_called("r")
     named = [entry for entry in found if entry[1] in called and entry[0].left < CLEAR * best[0].left + 0.1]
     fit, name, unit = named[0] if named else best
     extra: dict[str, Any] = {}
@@ -468,20 +348,20 @@ def _yaw_rate(state: _State) -> None:
     if name not in called and not name.isdecimal():
         other = f", which {called[0]!r} is not" if called else ""
         state.find("yaw rate under another name", (name,), confidence, f"{name!r} is the rate of the heading{other}")
-    said = _unit_said(name, "rad/s")
+    said = unit_said(name, "rad/s")
     if said is not None and said != unit:
         state.find("unit of r", (name,), confidence, f"{name!r} says {said}, but is in {unit}")
     state.suggest("r", name, unit, confidence, why, **extra)
     state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
 
 
-def _rate_by_name(state: _State) -> None:
+def _rate_by_name(state: State) -> None:
     for name in state.called("r")[:1]:
-        unit = _unit_said(name, "rad/s") or "deg/s"
+        unit = unit_said(name, "rad/s") or "deg/s"
         state.suggest("r", name, unit, 0.4, "by its name; too straight a log to tell unit and sign")
 
 
-def _orders(state: _State) -> None:
+def _orders(state: State) -> None:
     """Rudder, azimuth and shaft by name; their sign by what they do to the yaw rate."""
     numbered = all(name.isdecimal() for name in state.columns)
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
@@ -502,7 +382,7 @@ def _orders(state: _State) -> None:
     used: dict[str, int] = {}
     for name, signal in angles:
         values = state.columns[name]
-        unit = _unit_said(name, "rad") or ("deg" if np.abs(values).max() > 1.6 else "rad")
+        unit = unit_said(name, "rad") or ("deg" if np.abs(values).max() > 1.6 else "rad")
         power = 0.0 if r is None else evidence.effect(state.t, r, values)
         extra: dict[str, Any] = {}
         why = "by its name; it is not seen to turn the ship"
@@ -518,7 +398,7 @@ def _orders(state: _State) -> None:
         state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     for name in state.called("n"):
         largest = float(np.abs(state.columns[name]).max())
-        said = _unit_said(name, "rev/s")
+        said = unit_said(name, "rev/s")
         unit = said or ("rpm" if largest > 25 or "rpm" in name.lower() else "rev/s")
         component = _component(name, "thruster" if azimuth else "propeller")
         why = f"by its name; up to {largest:.4g}"
@@ -541,154 +421,17 @@ def _unique(name: str, used: dict[str, int]) -> str:
     return name if used[name] == 1 else f"{component}_{used[name]}.{signal}"
 
 
-def _others(state: _State) -> None:
+def _others(state: State) -> None:
     """Roll, pitch and wind, by name alone."""
     for meaning in ("phi", "theta"):
         for name in state.called(meaning)[:1]:
-            unit = _unit_said(name, "rad") or ("deg" if np.abs(state.columns[name]).max() > 0.8 else "rad")
+            unit = unit_said(name, "rad") or ("deg" if np.abs(state.columns[name]).max() > 0.8 else "rad")
             state.suggest(meaning, name, unit, 0.5, "by its name; its sign cannot be told from the log")
     speeds, angles = state.called("V_w"), state.called("beta_w")
     if speeds and angles:
-        unit = _unit_said(speeds[0], "m/s") or "m/s"
+        unit = unit_said(speeds[0], "m/s") or "m/s"
         state.suggest("V_w", speeds[0], unit, 0.5, "by its name; true or apparent cannot be told from the log")
         said = "from" if "towards" not in angles[0].lower() else "towards"
         why = f"by its name; taken as {said!r}, as sailors say it"
-        turn = _unit_said(angles[0], "rad") or ("deg" if np.abs(state.columns[angles[0]]).max() > 7 else "rad")
+        turn = unit_said(angles[0], "rad") or ("deg" if np.abs(state.columns[angles[0]]).max() > 7 else "rad")
         state.suggest("beta_w", angles[0], turn, 0.5, why, direction=said, wrap=True)
-
-
-def _defects_of_rows(state: _State, sniffed: Sniffed) -> None:
-    """Rows that repeat, values that stop at a limit, and logs that were interpolated."""
-    sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
-    moving = [name for name in sources if np.ptp(state.columns[name]) > 0]
-    if moving:
-        same = np.all([np.diff(state.columns[name]) == 0 for name in moving], axis=0)
-        if same.mean() > 0.02:
-            state.find(
-                "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
-            )
-        share = float(np.median([evidence.between_rows(state.columns[name]) for name in moving]))
-        if share > 0.2:
-            sentence = (
-                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
-            )
-            state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
-    for column in state.suggestions:
-        if column.name.endswith(".n"):
-            values = state.columns[column.source]
-            top = float(np.mean(values == values.max()))
-            if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS:
-                sentence = f"{100 * top:.0f} % of the rows have exactly the largest value, {values.max():g}"
-                state.find("clipped", (column.source,), 0.7, sentence)
-    steps = np.diff(sniffed.t)
-    holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
-    if holes:
-        sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
-        state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
-    missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
-    if missing:
-        state.find(
-            "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
-        )
-
-
-def _defects_of_motion(state: _State) -> None:
-    """What position, heading, velocity and yaw rate say about each other."""
-    if state.psi is None:
-        return
-    if state.r is not None:
-        delay, explained = _delay(state, state.psi, evidence.integral(state.t, state.r))
-        if delay:
-            _find_late(state, "heading", "yaw rate", delay, explained)
-            state.psi = np.interp(state.t + delay, state.t, state.psi)  # else what follows finds it once more
-            if state.body is not None and not _is_earth_fixed(state):
-                state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
-    if state.velocity is None or state.position is None or state.body is None:
-        return
-    path = evidence.integral(state.t, state.velocity)
-    _jumps(state, _arm_or_delay(state, path))
-    _heading_offset(state)
-
-
-def _is_earth_fixed(state: _State) -> bool:
-    return any(
-        column.name in ("u", "speed") and (column.name == "speed" or column.extra) for column in state.suggestions
-    )
-
-
-def _arm_or_delay(state: _State, path: Complex) -> Complex:
-    """A position ahead of its velocities: of another point of the ship, or of another time, whichever explains more.
-
-    Returns the path of the velocities with that put right, so that nothing is found twice.
-    """
-    assert state.position is not None
-    assert state.psi is not None
-    seen = np.asarray(state.chosen.change(state.position), dtype=complex)
-    ran = np.asarray(state.chosen.change(path), dtype=complex)
-    keep = evidence.robust(seen, ran)
-    turned = np.asarray(state.chosen.change(np.exp(1j * state.psi)), dtype=complex)
-    scale = evidence.fit(seen[keep], ran[keep]).scale
-    off, error, by_arm = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
-    delay, by_delay = _delay(state, state.position, path)
-    if delay and by_delay > by_arm:
-        _find_late(state, "position", "velocity", delay, by_delay)
-        moved = [np.interp(state.t - delay, state.t, part) for part in (path.real, path.imag)]
-        return np.asarray(moved[0] + 1j * moved[1])
-    if abs(off) > max(ARM, 5 * error):
-        sentence = (
-            f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
-        )
-        repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
-        state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
-        return np.asarray(path + off * np.exp(1j * state.psi))
-    if float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
-        far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
-        sentence = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS): take the path of the velocities"
-        state.find("position jitter", (), 0.8, sentence)
-    return path
-
-
-def _delay(state: _State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:
-    """Seconds by which one comes later than the other, 0 if that explains little; and the share that it explains."""
-    usual = float(np.median(np.diff(state.t)))
-    delay, explained = evidence.shift(state.t, seen, integrated, max(3.0, 3 * usual))
-    return (delay, explained) if abs(delay) > max(0.3, 0.75 * usual) and explained > 0.35 else (0.0, 0.0)
-
-
-def _find_late(state: _State, what: str, against: str, delay: float, explained: float) -> None:
-    word = "later" if delay > 0 else "earlier"
-    sentence = f"{what} comes {abs(delay):.2g} s {word} than the {against} says ({100 * explained:.0f} % of the misfit)"
-    state.find(f"late {what}", (what,), float(np.clip(explained, 0.2, 0.95)), sentence)
-
-
-def _jumps(state: _State, path: Complex) -> None:
-    assert state.position is not None
-    unit = to_si(state.clock_unit, "t")
-    places = evidence.jumps(state.t, state.position, path)
-    stay = [place for place in places if place[2] > 5.0]
-    spikes = [place for place in places if place[2] <= 5.0]
-    if stay:
-        words = ", ".join(f"t = {start / unit:.6g} to {end / unit:.6g} ({far:.0f} m)" for start, end, far in stay[:6])
-        repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
-        state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
-    if spikes:
-        words = ", ".join(f"{(start + end) / 2 / unit:.6g}" for start, end, _ in spikes[:6])
-        repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
-        state.find("position spikes", (), 0.8, f"the position leaves and comes back near t = {words}", repair)
-
-
-def _heading_offset(state: _State) -> None:
-    """Drift in the straightest runs, where a ship makes none: median of arg(u + i v)."""
-    assert state.body is not None
-    assert state.psi is not None
-    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-    rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
-    if rows.mean() < 0.02:
-        return
-    drift = np.angle(state.body[rows])
-    angle = float(np.median(drift))
-    scatter = float(np.median(np.abs(drift - angle)))
-    if abs(angle) > max(OFFSET, 1.5 * scatter):
-        sentence = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg: heading off, or wind and current"
-        repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
-        state.find("heading offset", ("psi",), 0.6, sentence, repair)

@@ -26,7 +26,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.data.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
-from shipid.data.readers import Format, TextFormat, read_table
+from shipid.data.readers import Format, TextFormat, read_table, seconds
 from shipid.data.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.errors import DataError, choices
 
@@ -202,10 +202,7 @@ def _passed_over(table: pd.DataFrame) -> Records:
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """Time of every row [s]; raises unless it is there and rises."""
     if clock.unit == "date":
-        column = _column(log, clock.source, file, f"{path}.from")
-        dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
-        since = (dates - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
-        t = since.to_numpy(dtype=np.float64)
+        t = seconds(_column(log, clock.source, file, f"{path}.from"))
     else:
         t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
@@ -233,7 +230,7 @@ def _common_clock(
     slack = clock_slack(t)
     if step is not None:
         count = max(0, int(np.floor((last - first + slack) / step)) + 1)
-        t = first + step * np.arange(count, dtype=np.float64)
+        t = np.asarray(first + step * np.arange(count), dtype=np.float64)
     shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))

@@ -17,6 +17,7 @@ import pyarrow
 import pyarrow.parquet
 from pydantic import Field, field_validator
 
+from shipid.data.dataset import Array
 from shipid.data.repairs import Strict
 from shipid.errors import DataError
 
@@ -89,6 +90,13 @@ def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
     if len(table) < 2:
         raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     return table
+
+
+def seconds(dates: pd.Series[Any]) -> Array:
+    """Dates in ISO 8601 or of pandas as seconds since 1970 (UTC where no zone is said); NaN where there is none."""
+    moments = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
+    since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
+    return np.array(since, dtype=np.float64)
 
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -38,7 +39,8 @@ def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     """
     found = []
     for _, rows in pieces(dataset):
-        found += [(kind, *(float(rows["t"].iloc[end]) / unit for end in span)) for kind, span in _of_stretch(rows)]
+        t = rows["t"].to_numpy() / unit
+        found += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}
     segments = []
     for kind, start, end in found:
@@ -99,7 +101,7 @@ def _legs(helm: Array, t: Array) -> list[Leg]:
     short = min(SHORT, (t[-1] - t[0]) / 50)
     legs: list[Leg] = []
     edges = [0, *(np.flatnonzero(np.diff(side)) + 1), len(side)]
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
+    for first, end in pairwise(edges):
         last = min(end, len(t) - 1)
         if legs and (t[last] - t[first] < short or legs[-1].side == side[first]):
             legs[-1] = Leg(legs[-1].side, legs[-1].first, last)

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Array
-from shipid.data.readers import FORMATS, read_table
+from shipid.data.readers import FORMATS, read_table, seconds
 from shipid.errors import DataError
 
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
@@ -100,7 +100,8 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
         for decimal in (".", ",") if separator != "," else (".",):
             share = float(np.mean([_number_share(row, decimal) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
-            best = max(best, (score, separator, decimal))
+            if score > best[0]:  # the first of equals: tabs are blanks, too
+                best = (score, separator, decimal)
     score, separator, decimal = best
     if score < NUMERIC / 2:
         raise DataError("no table of numbers, whichever separator: export it as CSV", file=file)
@@ -161,8 +162,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     rising = [name for name, values in columns.items() if np.isfinite(values).all() and np.all(np.diff(values) > 0)]
     called = [name for name in columns if CLOCK_WORDS.match(plain(name))]
     for name in [name for name in map(str, table.columns) if CLOCK_WORDS.match(plain(name)) and name not in columns]:
-        dates = pd.to_datetime(table[name], format="ISO8601", utc=True, errors="coerce")
-        since = (dates - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
+        since = seconds(table[name])
         if np.isfinite(since).all() and np.all(np.diff(since) > 0):
             return {"from": name, "unit": "date"}, since
         called.append(name)
@@ -173,10 +173,12 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
             f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
         )
         raise DataError(f"no column can be the clock: {said}", file=file)
-    t = columns[found[0]]
+    t: Array = columns[found[0]]
     name = plain(found[0])
     milliseconds = name.endswith("ms") or (np.median(np.diff(t)) >= 20 and not np.any(t % 1))
-    return {"from": found[0], "unit": "ms" if milliseconds else "s"}, t * (1e-3 if milliseconds else 1.0)
+    return {"from": found[0], "unit": "ms" if milliseconds else "s"}, np.asarray(
+        t * (1e-3 if milliseconds else 1.0), dtype=np.float64
+    )
 
 
 def _counts(values: Array) -> bool:

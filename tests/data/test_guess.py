@@ -9,7 +9,7 @@ import pytest
 
 from shipid.data.guess import Guess, guess
 from shipid.errors import DataError
-from tests.data.simulated import KNOT, Change, as_bridge, motion, si_log
+from tests.data.simulated import KNOT, Change, as_bridge, si_log
 
 
 def guessed(log: pd.DataFrame, folder: Path) -> Guess:
@@ -176,3 +176,130 @@ def test_a_defect_is_named(name: str, tmp_path: Path) -> None:
     finding = next(entry for entry in found.findings if entry.kind == kind)
     assert 0.2 <= finding.confidence <= 1.0
     assert "\n" not in finding.sentence
+
+
+def test_gunnerus(gunnerus_log: Path) -> None:
+    """Every trap of the description that a log can betray: places as it gives them, sizes within its own scatter."""
+    found = guess(gunnerus_log)
+    columns = told(found)
+    assert columns["psi"] == ("psi", "deg", 1, "body")
+    assert columns["u"] == ("u", "m/s", 1, "body")
+    assert columns["r"] == ("r", "deg/s", 1, "body")
+    assert columns["thruster.alpha"] == ("Azi", "deg", 1, "body")  # positive turns to port
+    findings = {finding.kind: finding for finding in found.findings}
+    assert set(findings) == {
+        "interpolation across 360",
+        "factor",
+        "interpolated from a slower log",
+        "clipped",  # at 205 rpm
+        "position jumps",
+        "position jitter",
+        "heading offset",
+    }
+    assert findings["interpolation across 360"].sentence.startswith("77 steps")
+    repairs = {kind: finding.repair or {} for kind, finding in findings.items()}
+    assert repairs["factor"]["factor"] == 1.0204  # 1.9834 / 1.9438
+    assert repairs["heading offset"]["offset"] == pytest.approx(0.040, abs=0.01)
+    inside = repairs["position jumps"]["intervals"]
+    assert [[start <= at <= end for start, end in inside] for at in (2699.0, 4213.5)] == [[True, False], [False, True]]
+
+
+HSVA = "time,x0,y0,psi,u,v,p,r,delta,rev,thrust,torque"
+RUNS = [
+    "05_01",
+    "10_01",
+    "10_05",
+    "10_10_P",
+    "10_10_S",
+    "15_01",
+    "15_05",
+    "20_05",
+    "20_10_P",
+    "20_10_S",
+    "25_05",
+    "30_05",
+    "35_05",
+]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_hsva(run: str, data_folder: Path) -> None:
+    """The names of the publication are seen through, and the same columns found where there are no names at all."""
+    log = data_folder / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat"
+    if not log.is_file():
+        pytest.skip(f"no {log.name} in the data folder")
+    found = guess(log, tuple(HSVA.split(",")))
+    assert found.sniffed.form["encoding"] == "cp1252"
+    assert (found.sniffed.form["separator"], found.sniffed.form["skip_rows"]) == ("whitespace", 4)
+    columns = told(found)
+    assert columns["u"] == ("u", "m/s", 1, "earth")
+    assert columns["v"] == ("v", "m/s", 1, "earth")
+    assert columns["r"] == ("p", "deg/s", 1, "body")
+    assert columns["rudder.delta"] == ("delta", "deg", 1, "body")  # positive to port already
+    assert columns["propeller.n"] == ("rev", "rev/s", 1, "body")
+    assert found.kinds == {"earth-fixed velocities", "yaw rate under another name"}
+    if run not in RUNS[::3]:
+        return
+    numbered = {name: entry[0] for name, entry in told(guess(log)).items()}
+    assert numbered == {"north": "2", "east": "3", "psi": "4", "u": "5", "v": "6", "r": "7", "rudder.delta": "9"}
+
+
+WRITTEN: dict[str, tuple[Callable[[pd.DataFrame, Path], object], dict[str, object]]] = {
+    "tabs": (lambda f, p: f.to_csv(p, sep="\t", index=False), {"separator": "\t"}),
+    "semicolons, commas": (
+        lambda f, p: f.to_csv(p, sep=";", decimal=",", index=False),
+        {"separator": ";", "decimal": ","},
+    ),
+    "blanks": (lambda f, p: p.write_text(f.to_string(index=False)), {"separator": "whitespace"}),
+    "utf-16": (lambda f, p: f.to_csv(p, index=False, encoding="utf-16"), {"encoding": "utf-16"}),
+    "cp1252 above": (
+        lambda f, p: p.write_bytes("Kurs in °\nFähre\n".encode("cp1252") + f.to_csv(index=False).encode()),
+        {"encoding": "cp1252", "skip_rows": 2},
+    ),
+    "parquet": (lambda f, p: f.to_parquet(p), {"kind": "parquet"}),
+    "numbers of rows": (lambda f, p: f.to_csv(p), {"separator": ","}),
+    "dates": (
+        lambda f, p: f.assign(time=pd.Timestamp("2022-10-27") + pd.to_timedelta(f["time"], "s")).to_csv(p, index=False),
+        {"separator": ","},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_how_it_is_written(name: str, tmp_path: Path) -> None:
+    write, form = WRITTEN[name]
+    write(as_bridge(si_log()).iloc[:1200], tmp_path / "log.csv")
+    found = guess(tmp_path / "log.csv")
+    assert {key: found.sniffed.form[key] for key in form} == form
+    assert told(found) == CLEAN
+    assert found.findings == ()
+
+
+def test_position_on_the_earth_with_speed_and_course(tmp_path: Path) -> None:
+    log = as_bridge(si_log())
+    course = np.degrees(np.arctan2(si_log()["v"], si_log()["u"])) + log["psi"]
+    globe = pd.DataFrame(
+        {
+            "time": log["time"],
+            "lat": 63.4 + log["N"] / 111_400.0,
+            "lon": 10.4 + log["E"] / 111_400.0 / np.cos(np.radians(63.4)),
+            "sog_kn": np.hypot(log["u"], log["v"]) / KNOT,
+            "cog": course % 360.0,
+            "heading": log["psi"],
+            "rot": log["r"] * 60.0,
+        }
+    )
+    columns = {name: entry[:2] for name, entry in told(guessed(globe, tmp_path)).items()}
+    assert columns == {
+        "latitude": ("lat", "deg"),
+        "longitude": ("lon", "deg"),
+        "psi": ("heading", "deg"),
+        "speed": ("sog_kn", "kn"),
+        "course": ("cog", "deg"),
+        "r": ("rot", "deg/min"),
+    }
+
+
+def test_a_log_without_a_heading_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no column can be the heading"):
+        guessed(as_bridge(si_log()).drop(columns="psi"), tmp_path)
