@@ -14,6 +14,7 @@ from shipid.errors import DocumentError, ShipidError
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from shipid.data.dataset import Dataset
     from shipid.report import ReportContent
     from shipid.study.results import Results
     from shipid.study.run import Event
@@ -225,12 +226,20 @@ def data_segment(
 
 
 @data_app.command("check")
-def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")]) -> None:
+def data_check(
+    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
+) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 
-    checks = check_dataset(read_dataset(dataset))
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    log = read_dataset(dataset)
+    checks = check_dataset(log)
+    if html is not None:
+        _check_page(html, dataset.stem, log, checks)
     ok = checks["ok"].astype(bool)
     counts = (
         (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
@@ -244,6 +253,21 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
     typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
     if failed:
         raise typer.Exit(1)
+
+
+def _check_page(file: Path, name: str, log: Dataset, checks: Any) -> None:
+    import pandas as pd
+
+    from shipid.data.checks import check_series
+    from shipid.report.checks import write_checks
+
+    tracks = log.frame[["run", "north", "east"]].assign(set="runs")
+    repairs = pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"])
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    provenance = {"log": words, "vessel": str(log.metadata.get("vessel") or "not said"), "rows": str(len(log.frame))}
+    written = write_checks(file, name, checks, check_series(log), tracks, repairs, provenance)
+    typer.echo(f"plots: {written}")
 
 
 @study_app.command("list")

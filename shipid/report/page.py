@@ -48,8 +48,12 @@ def sections(content: ReportContent) -> list[Section]:
 
 
 def render(content: ReportContent) -> str:
-    """Write the page as text."""
-    parts = sections(content)
+    """Write the report of a study as text."""
+    return page(content, sections(content), "study")
+
+
+def page(content: ReportContent, parts: list[Section], kicker: str) -> str:
+    """Write sections as one page; `kicker` says above the title what it is."""
     anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
     windows = paths.window_data(content) if content.snapshots else None
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -57,6 +61,7 @@ def render(content: ReportContent) -> str:
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
+        kicker=kicker,
         sections=parts,
         anchors=anchors,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
