@@ -261,7 +261,7 @@ def _check_page(file: Path, name: str, log: Dataset, checks: Any) -> None:
     from shipid.data.checks import check_series
     from shipid.report.checks import write_checks
 
-    tracks = log.frame[["run", "north", "east"]].assign(set="runs")
+    tracks = log.frame[["run", "north", "east"]].assign(set="the log")
     repairs = pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"])
     source = log.metadata.get("source", "")
     words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())

@@ -20,6 +20,9 @@ LOOKED_AT = 300  # lines
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 CLOCK_WORDS = re.compile(r"^(t|tvec|time.*|timestamp|stamp|clock|sec|seconds|date.*|utc.*|.*_time|ms|zeit)$")
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
+_UNIT = re.compile(
+    r"[\[(]?(s|ms|m|km|deg|°|rad|m/s|kn|kts|knots|km/h|deg/s|deg/min|rad/s|rpm|1/s|hz|nm?|kw|%|-|)[\])]?$"
+)
 _WORDS_FOR_NOTHING = ("", "nan", "null", "none", "n/a", "na", "-", "--")
 
 
@@ -110,7 +113,10 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
     data = next(i for i, row in enumerate(rows) if len(row) == width and _number_share(row, decimal) >= NUMERIC / 2)
     above = rows[data - 1] if data else []
     form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
-    if len(above) == width and not names:
+    named = rows[data - 2] if data > 1 else []
+    if len(above) == len(named) == width and not names and all(_UNIT.match(cell.lower()) for cell in above):
+        form |= {"skip_rows": data, "names": [f"{name} [{unit}]" for name, unit in zip(named, above, strict=True)]}
+    elif len(above) == width and not names:
         form["skip_rows"] = data - 1
     else:
         form["skip_rows"] = data

@@ -208,6 +208,22 @@ class TestHsva:
             found = sorted([-psi.min() - 10.0, psi.max() - 10.0])
             np.testing.assert_allclose(found, sorted(expected), atol=0.05)
 
+    def test_velocities_left_out_are_estimated(self, folder: Path, tmp_path: Path) -> None:
+        """From position and heading alone: within 1 % of what each varies by, and no further off than it says."""
+        text = (Path(__file__).parents[2] / "studies" / "mappings" / "kvlcc2-hsva.toml").read_text()
+        head, *blocks = text.replace("Z_*.dat", "Z_20_10_*.dat").split("[columns.")
+        head = "\n".join(line for line in head.splitlines() if not line.startswith("sha256"))
+        kept = [f"[columns.{block}" for block in blocks if block.partition("]")[0] not in ("u", "v", "r")]
+        noise = "position = 0.001\nheading_deg = 0.02\nacceleration = 0.01\nangular_acceleration_deg = 0.3\n"
+        (tmp_path / "m.toml").write_text(f"{head}\n{''.join(kept)}\n[estimate]\n{noise}")
+        found = import_log(read_mapping(tmp_path / "m.toml"), folder).frame
+        whole = import_log(read_mapping("kvlcc2-hsva"), folder).frame
+        logged = whole[whole["run"].str.startswith("20_10")].reset_index(drop=True)
+        for name in ("u", "v", "r"):
+            error = found[name] - logged[name]
+            assert np.sqrt((error**2).mean()) < 0.01 * logged[name].std()
+            assert (error.abs() < 3 * found[f"std_{name}"]).mean() > 0.99
+
     def test_the_names_of_the_publication_fail_them(self, folder: Path, tmp_path: Path) -> None:
         """Before the repairs of names: u, v taken as body velocities, and the roll angle as the yaw rate."""
         text = (Path(__file__).parents[2] / "studies" / "mappings" / "kvlcc2-hsva.toml").read_text()
