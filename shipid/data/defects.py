@@ -46,7 +46,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
         sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
         state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
-    if missing:
+    if missing and sniffed.form.get("kind") != "nmea":  # no sentence says everything
         state.find(
             "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
         )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 
 from shipid.data.clues import Finding, Suggestion
@@ -92,8 +93,13 @@ def _head(found: Guess) -> Iterator[str]:
     yield from _lines(found.sniffed.form)
     yield "\n[clock]"
     yield from _lines(found.sniffed.clock)
-    if found.kinds & {"holes in time", "missing values"}:
-        usual = float((found.sniffed.t[1:] - found.sniffed.t[:-1]).min())
+    scattered = found.sniffed.form.get("kind") == "nmea"
+    source = found.columns[0].source
+    steps = np.diff(found.sniffed.t[np.isfinite(found.sniffed.columns[source])] if scattered else found.sniffed.t)
+    usual = float(np.median(steps))
+    if scattered:
+        yield f"step = {usual:g}    # s: every sentence has its own instants; that of the position"
+    if scattered or found.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {max(3.0, 5 * usual):g}    # s: shorter gaps are interpolated, longer ones break the run"
 
 

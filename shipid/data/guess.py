@@ -427,6 +427,10 @@ def _others(state: State) -> None:
         for name in state.called(meaning)[:1]:
             unit = unit_said(name, "rad") or ("deg" if np.abs(state.columns[name]).max() > 0.8 else "rad")
             state.suggest(meaning, name, unit, 0.5, "by its name; its sign cannot be told from the log")
+    if {"apparent_angle", "apparent_speed"} <= set(state.free()):
+        why = "the sentence says that it is relative to the bow"
+        state.suggest("V_w", "apparent_speed", "m/s", 0.9, why)
+        state.suggest("beta_w", "apparent_angle", "deg", 0.9, why, direction="from", relative=True, wrap=True)
     speeds, angles = state.called("V_w"), state.called("beta_w")
     if speeds and angles:
         unit = unit_said(speeds[0], "m/s") or "m/s"

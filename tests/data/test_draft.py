@@ -12,6 +12,7 @@ from shipid.data.importing import import_log, read_mapping
 from shipid.data.segmentation import kind_of
 from shipid.errors import DataError
 from tests.data.simulated import KNOT, SCHEDULE, as_bridge, si_log
+from tests.data.test_readers import bridge_log
 
 
 def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
@@ -106,3 +107,16 @@ def test_hostile_names_stay_in_their_strings(name: str, tmp_path: Path) -> None:
     log.to_parquet(tmp_path / "log.parquet")
     mapping = write_new(draft_mapping(guess(tmp_path / "log.parquet")), tmp_path / "draft.toml")
     assert len(import_log(read_mapping(mapping), tmp_path / "log.parquet").frame) > 2000
+
+
+def test_sentences_of_nmea(tmp_path: Path) -> None:
+    """A bridge log is known by itself: its draft imports, with steps of its fixes and true wind."""
+    text, motion = bridge_log("fix", 0.0, si_log(0, 10))
+    (tmp_path / "bridge.nmea").write_text(text)
+    found = guess(tmp_path / "bridge.nmea")
+    assert found.findings == ()
+    mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
+    frame = import_log(read_mapping(mapping).model_copy(update={"segment": ()}), tmp_path / "bridge.nmea").frame
+    assert len(frame) == len(motion)
+    np.testing.assert_allclose(frame["u"], motion["u"], atol=1e-4)
+    np.testing.assert_allclose(frame["V_w"], 8.0, atol=1e-3)

@@ -168,9 +168,8 @@ sign = -1
 """
 
 
-def bridge_log(time: str, midnight: float) -> tuple[str, pd.DataFrame]:
+def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, pd.DataFrame]:
     """Sentences of a ship in a steady turn in a wind of 8 m/s towards the east; 2 of them are damaged."""
-    motion = turning(T)
     radius = 6378137.0  # m; close enough to the ellipsoid's for a check to 1 %
     lines = ["!AIVDM,1,1,,A,14eG;o@034o8sd<L9i:a;WF>062D,0*7D", "$GPRMC,noise"]
     course = np.degrees(motion["psi"] + np.arctan2(motion["v"], motion["u"])) % 360
@@ -199,7 +198,7 @@ def bridge_log(time: str, midnight: float) -> tuple[str, pd.DataFrame]:
 
 @pytest.mark.parametrize(("time", "midnight"), [("fix", 0.0), ("fix", 86400.0 - 30.0), ("line", 0.0)])
 def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
-    text, motion = bridge_log(time, midnight)
+    text, motion = bridge_log(time, midnight, turning(T))
     if time == "line":
         text = "\n".join(text.splitlines()[2:])
     (tmp_path / "bridge.nmea").write_text(text)
