@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from rich.table import Table
 
+    from shipid.data.dataset import Dataset
     from shipid.measures.record import Record
     from shipid.report import ReportContent
     from shipid.report.manoeuvre import ManoeuvreContent
@@ -197,14 +198,23 @@ def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as g
 
 @data_app.command("import")
 def data_import(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Parquet file to write; default: beside you, named like the mapping")
+        Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: beside you")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
+    guess: Annotated[Path | None, typer.Option(help="draft a mapping of this log instead of importing it")] = None,
+    names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    if guess is not None:
+        if mapping or log or without:
+            raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
+        _draft(guess, tuple(filter(None, names.split(","))), out or Path(f"{guess.stem}.toml"))
+        return
+    if not mapping:
+        raise ShipidError("name a mapping, or draft one with --guess LOG")
     from shipid.data.catalogue import fetch
     from shipid.data.dataset import write_dataset
     from shipid.data.importing import import_log
@@ -222,13 +232,51 @@ def data_import(
     typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
 
 
+def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
+    from shipid.data.draft import draft_mapping, write_new
+    from shipid.data.guess import guess
+
+    found = guess(log, names)
+    file = write_new(draft_mapping(found), out)
+    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in found.columns)
+    _print(_table(["column", "from", "unit", "sure", "why"], rows))
+    if found.findings:
+        _print(_table(["found", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in found.findings)))
+    typer.echo(f"draft -> {file}: read it before you import with it")
+
+
+@data_app.command("segment")
+def data_segment(
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
+    out: Annotated[Path | None, typer.Option(help="TOML file to write; default: beside you")] = None,
+) -> None:
+    """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
+    from shipid.data.catalogue import fetch
+    from shipid.data.draft import segment_log, segments_text, write_new
+    from shipid.data.mapping import read_mapping
+
+    found = segment_log(read_mapping(mapping), log or fetch(mapping))
+    file = write_new(segments_text(found), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    _print(_table(["run", "start", "end"], ((s.run, f"{s.start:g}", f"{s.end:g}") for s in found)))
+    typer.echo(f"{len(found)} segments -> {file}")
+
+
 @data_app.command("check")
-def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")]) -> None:
+def data_check(
+    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
+) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 
-    checks = check_dataset(read_dataset(dataset))
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    log = read_dataset(dataset)
+    checks = check_dataset(log)
+    if html is not None:
+        _check_page(html, dataset.stem, log, checks)
     ok = checks["ok"].astype(bool)
     counts = (
         (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
@@ -242,6 +290,21 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
     typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
     if failed:
         raise typer.Exit(1)
+
+
+def _check_page(file: Path, name: str, log: Dataset, checks: Any) -> None:
+    import pandas as pd
+
+    from shipid.data.checks import check_series
+    from shipid.report.checks import write_checks
+
+    tracks = log.frame[["run", "north", "east"]].assign(set="the log")
+    repairs = pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"])
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    provenance = {"log": words, "vessel": str(log.metadata.get("vessel") or "not said"), "rows": str(len(log.frame))}
+    written = write_checks(file, name, checks, check_series(log), tracks, repairs, provenance)
+    typer.echo(f"plots: {written}")
 
 
 @data_app.command("measures")

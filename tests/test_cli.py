@@ -21,6 +21,7 @@ from shipid.document import bundled, bundled_folder
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
+from tests.data.simulated import as_bridge, si_log
 from tests.study.tiny import TINY
 
 BAD = Path(__file__).parent / "bad"
@@ -67,7 +68,7 @@ def test_help_names_every_command() -> None:
     for group, commands in (
         ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre")),
         (["vessel"], ("list", "show", "new")),
-        (["data"], ("import", "check", "fetch", "measures")),
+        (["data"], ("import", "check", "fetch", "segment", "measures")),
         (["study"], ("list", "variants", "screen", "run", "resume", "report")),
     ):
         text = said(*group, "--help")
@@ -145,6 +146,25 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
     result = CliRunner().invoke(app, ["data", "check", str(file)])
     assert result.exit_code == 1
     assert re.search(r"M001 +heading", result.output), "failures are listed by run"
+
+
+def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    as_bridge(si_log()).to_csv("trial.csv", index=False)
+    text = said("data", "import", "--guess", "trial.csv")
+    assert "draft -> trial.toml" in text
+    assert "positive turns the ship to port" in text
+    said("data", "import", "trial.toml", "trial.csv")
+    assert "7 segments -> trial-segments.toml" in said("data", "segment", "trial.toml", "trial.csv")
+    assert "checks passed" in said("data", "check", "trial.parquet", "--html", "deep/page.html")
+    assert Path("deep/page.html").stat().st_size > 1_000_000
+    for arguments, remedy in {
+        ("import", "--guess", "trial.csv"): "not written over",
+        ("import", "trial.toml", "--guess", "trial.csv"): "give neither mapping nor repairs",
+        ("import",): "draft one with --guess",
+        ("check", "trial.parquet", "--html", "page.pdf"): "end in .html",
+    }.items():
+        assert remedy in str(CliRunner().invoke(app, ["data", *arguments]).exception)
 
 
 def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 
 from shipid.report.content import Finding, Floats, Sentence
 from shipid.report.figure import Chip, Figure, Panel, axis, layout, line, plane
-from shipid.report.page import Section, fill, write
+from shipid.report.page import Section, page, write
 from shipid.report.palette import GRID, MUTED, category
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import distance, number
@@ -81,7 +81,7 @@ def write_manoeuvre(content: ManoeuvreContent, file: Path) -> Path:
         Section("results", "What was measured", (measures(content), criteria(content))),
         Section("motion", "What the ship did", (track(content), histories(content), spiral(content))),
     ]
-    return write(fill(content, parts, "shipid manoeuvre"), file)
+    return write(page(content, parts, "manoeuvre"), file)
 
 
 def _amount(value: float, unit: str) -> str:

@@ -90,11 +90,11 @@ class Shown(Protocol):
 def render(content: ReportContent) -> str:
     """Write the page of a study as text."""
     windows = paths.window_data(content) if content.snapshots else None
-    return fill(content, sections(content), "shipid study", windows)
+    return page(content, sections(content), "study", windows)
 
 
-def fill(content: Shown, parts: Sequence[Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
-    """Fill the template: `kicker` says above the title what the page is about; `windows` is what page.js browses."""
+def page(content: Shown, parts: Sequence[Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
+    """Write sections as one page: `kicker` says above the title what it is; `windows` is what page.js browses."""
     anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "bound": bound}
