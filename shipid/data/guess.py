@@ -389,10 +389,11 @@ def _orders(state: State) -> None:
         confidence = 0.4 if numbered else 0.5
         if abs(power) > 4:
             confidence = 0.95
-            why = f"positive turns the ship to {'starboard' if power > 0 else 'port'} (t value {abs(power):.0f})"
-            if power > 0:
+            sides = ("port", "starboard") if power > 0 else ("starboard", "port")  # where it does not turn her, and does
+            why = f"positive turns the ship to {sides[1]} (t value {abs(power):.0f})"
+            if (power > 0) != (signal == "delta"):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1
-                sentence = f"{name!r} is positive to starboard (t value {power:.0f}); here positive turns to port"
+                sentence = f"positive {name!r} turns to {sides[1]} (t value {abs(power):.0f}); here to {sides[0]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
         component = _component(name, "rudder" if signal == "delta" else "thruster")
         state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)

@@ -66,6 +66,6 @@ def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
             "v": frame["v"],
             "r": np.degrees(frame["r"]),
             "rpm": frame["n"] * 60.0,
-            "rudder": np.degrees(frame["alpha"]),
+            "rudder": -np.degrees(frame["alpha"]),  # > 0 to starboard
         }
     )

@@ -199,7 +199,7 @@ class TestHsva:
         assert len(dataset.runs) == 13
         assert len(dataset.frame) == 42413
         assert check_dataset(dataset)["ok"].all()
-        assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] < -0.3  # positive to port
+        assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.3  # positive to starboard
         first = dataset.frame.groupby("run")["u"].first()
         assert first.between(1.15, 1.20).all()  # U0 = 1.179 m/s
         overshoots = {"10_10_P": (9.73, 17.77), "10_10_S": (9.69, 20.54)}

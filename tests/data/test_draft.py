@@ -41,7 +41,7 @@ def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
     mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
     dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
     assert check_dataset(dataset)["ok"].all()
-    assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] < -0.8
+    assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.8
 
 
 def test_segments_are_the_schedule(tmp_path: Path) -> None:

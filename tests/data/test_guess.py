@@ -235,9 +235,9 @@ def test_hsva(run: str, data_folder: Path) -> None:
     assert columns["u"] == ("u", "m/s", 1, "earth")
     assert columns["v"] == ("v", "m/s", 1, "earth")
     assert columns["r"] == ("p", "deg/s", 1, "body")
-    assert columns["rudder.delta"] == ("delta", "deg", 1, "body")  # positive to port already
+    assert columns["rudder.delta"] == ("delta", "deg", -1, "body")  # positive to port there
     assert columns["propeller.n"] == ("rev", "rev/s", 1, "body")
-    assert found.kinds == {"earth-fixed velocities", "yaw rate under another name"}
+    assert found.kinds == {"earth-fixed velocities", "yaw rate under another name", "wrong sign of rudder"}
     if run not in RUNS[::3]:
         return
     numbered = {name: entry[0] for name, entry in told(guess(log)).items()}

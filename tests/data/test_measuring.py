@@ -17,7 +17,7 @@ def rows_of(kind: str, run: str) -> pd.DataFrame:
     record = every(SAILED[kind](), 0.5)
     states = {name: getattr(record, name) for name in ("t", "north", "east", "psi", "u", "v", "r")}
     shaft = np.full(len(record.t), 2.0) if record.shaft is None else record.shaft
-    return pd.DataFrame({"run": run, **states, "rudder.delta": -record.helm, "main.n": shaft, "flags": 0})
+    return pd.DataFrame({"run": run, **states, "rudder.delta": record.helm, "main.n": shaft, "flags": 0})
 
 
 @pytest.fixture(scope="module")

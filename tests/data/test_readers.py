@@ -164,7 +164,6 @@ wrap = true
 [columns."rudder.delta"]
 from = "rudder"
 unit = "deg"
-sign = -1
 """
 
 
@@ -214,7 +213,7 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
         np.testing.assert_allclose(frame[name], motion[name], atol=0.01 * extent, err_msg=name)
     np.testing.assert_allclose(frame["V_w"], 8.0, atol=1e-3)
     np.testing.assert_allclose(np.sin(frame["beta_w"]), 1.0, atol=1e-3)
-    np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), -10.0)
+    np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), 10.0)
     counted = [record["count"] for record in dataset.metadata["repairs"] if record["kind"] == "unreadable"]
     assert counted == ([2] if time == "fix" else [])
     assert dataset.metadata["origin"] == {"latitude": 63.45, "longitude": 10.4}

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from shipid.data.importing import import_log
+from shipid.data.mapping import read_mapping
 from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
@@ -21,18 +25,16 @@ READ_OFF = {
 }
 
 
+@cache
+def imported(folder: Path) -> pd.DataFrame:
+    return import_log(read_mapping("kvlcc2-hsva"), folder).frame
+
+
 def columns_of(folder: Path, name: str) -> dict[str, np.ndarray]:
-    """As the kinematics say: columns 5 and 6 are earth-fixed velocities, 7 the yaw rate, 9 a rudder > 0 to port."""
-    file = folder / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{name}.dat"
-    if not file.is_file():
-        pytest.skip(f"no {file.name} in the folder of recorded data")
-    t, north, east, psi, north_dot, east_dot, r, _, delta = np.genfromtxt(
-        file, skip_header=4, encoding="cp1252", usecols=range(9)
-    ).T
-    psi, r, delta = psi * DEGREE, r * DEGREE, delta * DEGREE
-    u, v = np.cos(psi) * north_dot + np.sin(psi) * east_dot, np.cos(psi) * east_dot - np.sin(psi) * north_dot
-    states = {"t": t, "north": north, "east": east, "psi": psi, "u": u, "v": v, "r": r}
-    return {**states, "rudder.delta": delta}
+    if not (folder / "kvlcc2_hsva").is_dir():
+        pytest.skip("no kvlcc2_hsva in the folder of recorded data")
+    frame = imported(folder / "kvlcc2_hsva")
+    return {str(column): values.to_numpy() for column, values in frame[frame["run"] == name].items()}
 
 
 @pytest.mark.parametrize("name", READ_OFF)
