@@ -153,7 +153,7 @@ def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
     as_bridge(si_log()).to_csv("trial.csv", index=False)
     text = said("data", "import", "--guess", "trial.csv")
     assert "draft -> trial.toml" in text
-    assert "positive turns the ship to port" in text
+    assert "positive turns the ship to starboard" in text
     said("data", "import", "trial.toml", "trial.csv")
     assert "7 segments -> trial-segments.toml" in said("data", "segment", "trial.toml", "trial.csv")
     assert "checks passed" in said("data", "check", "trial.parquet", "--html", "deep/page.html")

@@ -389,7 +389,9 @@ def _orders(state: State) -> None:
         confidence = 0.4 if numbered else 0.5
         if abs(power) > 4:
             confidence = 0.95
-            sides = ("port", "starboard") if power > 0 else ("starboard", "port")  # where it does not turn her, and does
+            sides = (
+                ("port", "starboard") if power > 0 else ("starboard", "port")
+            )  # where it does not turn her, and does
             why = f"positive turns the ship to {sides[1]} (t value {abs(power):.0f})"
             if (power > 0) != (signal == "delta"):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1

@@ -109,6 +109,12 @@ DEFECTS: dict[str, tuple[Change, str, str | None, tuple[object, ...] | None]] = 
         "rudder.delta",
         ("rudder", "deg", -1, "body"),
     ),
+    "azimuth": (  # > 0 to starboard here; a unit aft turns the ship to port
+        lambda f: f.rename(columns={"rudder": "azimuth"}),
+        "wrong sign of rudder",
+        "thruster.alpha",
+        ("azimuth", "deg", -1, "body"),
+    ),
     "knots": (lambda f: f.assign(u=f["u"] / KNOT, v=f["v"] / KNOT), "knots", "u", ("u", "kn", 1, "body")),
     "km/h": (lambda f: f.assign(u=f["u"] * 3.6, v=f["v"] * 3.6), "speed unit", "u", ("u", "km/h", 1, "body")),
     "slip of knots": (
