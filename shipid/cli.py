@@ -12,11 +12,17 @@ import typer
 from shipid.errors import DocumentError, ShipidError
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from rich.table import Table
 
+    from shipid.data.dataset import Dataset
+    from shipid.measures.record import Record
     from shipid.report import ReportContent
+    from shipid.report.manoeuvre import ManoeuvreContent
+    from shipid.simulation.standard import Standard
     from shipid.study.results import Results
     from shipid.study.run import Event
+    from shipid.vessel.load import Vessel
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -115,6 +121,38 @@ def vessel_show(
     _print(_table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
 
 
+@vessel_app.command("new")
+def vessel_new(
+    length: Annotated[float, typer.Option(help="m, between perpendiculars")],
+    beam: Annotated[float, typer.Option(help="m")],
+    draught: Annotated[float, typer.Option(help="m")],
+    block: Annotated[float, typer.Option(help="block coefficient")],
+    out: Annotated[Path, typer.Option(help="TOML file to write; one that is there stays as it is")],
+    speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
+    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth (two units)")] = "propeller-rudder",
+    ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
+    frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    name: Annotated[str | None, typer.Option(help="for people; default: first guess and length")] = None,
+) -> None:
+    """Write a first guess of a vessel from its main particulars: runnable, each number with its formula."""
+    if out.suffix != ".toml":
+        raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
+    if out.exists():
+        raise ShipidError("is there already: choose another name", file=out)
+    from shipid.vessel.template import Particulars, first_guess
+
+    given = Particulars(length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area)
+    found = first_guess(given, name or f"First guess, {length:g} m", str(out))
+    out.write_text(found.text, encoding="utf-8")
+    typer.echo(f"{len(found.vessel.parameters)} parameters by formula, none of them measured -> {out}")
+    typer.echo(f"{60 * found.n:.4g} rpm hold {given.service:.3g} m/s")
+    if found.growth < 0:
+        typer.echo("course-stable by these formulae")
+    else:
+        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / found.growth:.3g} s")
+
+
 @app.command("simulate")
 def simulate(
     study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
@@ -160,14 +198,23 @@ def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as g
 
 @data_app.command("import")
 def data_import(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Parquet file to write; default: beside you, named like the mapping")
+        Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: beside you")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
+    guess: Annotated[Path | None, typer.Option(help="draft a mapping of this log instead of importing it")] = None,
+    names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    if guess is not None:
+        if mapping or log or without:
+            raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
+        _draft(guess, tuple(filter(None, names.split(","))), out or Path(f"{guess.stem}.toml"))
+        return
+    if not mapping:
+        raise ShipidError("name a mapping, or draft one with --guess LOG")
     from shipid.data.catalogue import fetch
     from shipid.data.dataset import write_dataset
     from shipid.data.importing import import_log
@@ -185,13 +232,51 @@ def data_import(
     typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
 
 
+def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
+    from shipid.data.draft import draft_mapping, write_new
+    from shipid.data.guess import guess
+
+    found = guess(log, names)
+    file = write_new(draft_mapping(found), out)
+    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in found.columns)
+    _print(_table(["column", "from", "unit", "sure", "why"], rows))
+    if found.findings:
+        _print(_table(["found", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in found.findings)))
+    typer.echo(f"draft -> {file}: read it before you import with it")
+
+
+@data_app.command("segment")
+def data_segment(
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
+    out: Annotated[Path | None, typer.Option(help="TOML file to write; default: beside you")] = None,
+) -> None:
+    """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
+    from shipid.data.catalogue import fetch
+    from shipid.data.draft import segment_log, segments_text, write_new
+    from shipid.data.mapping import read_mapping
+
+    found = segment_log(read_mapping(mapping), log or fetch(mapping))
+    file = write_new(segments_text(found), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    _print(_table(["run", "start", "end"], ((s.run, f"{s.start:g}", f"{s.end:g}") for s in found)))
+    typer.echo(f"{len(found)} segments -> {file}")
+
+
 @data_app.command("check")
-def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")]) -> None:
+def data_check(
+    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
+) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 
-    checks = check_dataset(read_dataset(dataset))
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    log = read_dataset(dataset)
+    checks = check_dataset(log)
+    if html is not None:
+        _check_page(html, dataset.stem, log, checks)
     ok = checks["ok"].astype(bool)
     counts = (
         (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
@@ -205,6 +290,47 @@ def data_check(dataset: Annotated[Path, typer.Argument(help="dataset written by 
     typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
     if failed:
         raise typer.Exit(1)
+
+
+def _check_page(file: Path, name: str, log: Dataset, checks: Any) -> None:
+    import pandas as pd
+
+    from shipid.data.checks import check_series
+    from shipid.report.checks import write_checks
+
+    tracks = log.frame[["run", "north", "east"]].assign(set="the log")
+    repairs = pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"])
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    provenance = {"log": words, "vessel": str(log.metadata.get("vessel") or "not said"), "rows": str(len(log.frame))}
+    written = write_checks(file, name, checks, check_series(log), tracks, repairs, provenance)
+    typer.echo(f"plots: {written}")
+
+
+@data_app.command("measures")
+def data_measures(
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
+    manoeuvre: Annotated[
+        str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
+    ] = None,
+    length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars in m, for criteria")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+) -> None:
+    """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
+    from shipid.data.dataset import read_dataset
+    from shipid.data.measuring import measure_dataset
+
+    found = measure_dataset(read_dataset(dataset), manoeuvre, length)
+    if len(found.measures):
+        _print(_measure_table(found.measures.to_dict("records"), ["run", "kind"]))
+    if len(found.criteria):
+        _print(_criterion_table(found.criteria.to_dict("records"), ["run"]))
+    if found.left:
+        _print(_table(["run", "not measured, because"], found.left.items()))
+    measured = found.measures["run"].nunique() if len(found.measures) else 0
+    typer.echo(f"{measured} runs measured, {len(found.left)} not")
+    if csv is not None:
+        _write_csv(found.measures, csv)
 
 
 @study_app.command("list")
@@ -365,6 +491,144 @@ def predict(
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
         typer.echo(f"{outside:.0%} of the instants lie outside what the compensator was trained on (column `outside`)")
+
+
+@app.command("manoeuvre")
+def manoeuvre(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
+    angles: Annotated[
+        list[float] | None,
+        typer.Argument(
+            help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
+            metavar="[ANGLES]...",
+        ),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
+    side: Annotated[str, typer.Option(help="starboard or port: where she turns first")] = "starboard",
+    duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
+    step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+    log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
+) -> None:
+    """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
+    from shipid.data.dataset import Dataset, write_dataset
+    from shipid.measures import MEASURES
+    from shipid.measures.criteria import criteria
+    from shipid.measures.recognise import record_of
+    from shipid.measures.rows import criterion_rows, measure_rows
+    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.simulation.perform import perform
+    from shipid.simulation.standard import length_of, standard
+    from shipid.vessel.load import load_vessel
+
+    if log is not None and log.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
+    ship = load_vessel(vessel)
+    chosen = standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
+    frame = perform(ship, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
+    record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
+    found, length = MEASURES[chosen.kind](record), length_of(ship)
+    rows, judged = measure_rows(found, length), criterion_rows(criteria(chosen.kind, found, length))
+    typer.echo(f"{ship.name}: {chosen.title}, approach at {chosen.speed:.3g} m/s ({chosen.manoeuvre.n_rpm:.4g} rpm)")
+    _print(_measure_table(rows, []))
+    if judged:
+        _print(_criterion_table(judged, []))
+    if csv is not None:
+        import pandas as pd
+
+        _write_csv(pd.DataFrame(rows), csv)
+    if log is not None:
+        source = f"simulated: {ship.name}, {chosen.title}"
+        typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
+    content = _manoeuvre_content(ship, chosen, record, rows, judged)
+    page = out or Path(f"{Path(vessel).name.removesuffix('.toml')}-{name}.html")
+    typer.echo(f"page -> {write_manoeuvre(content, page)}")
+
+
+def _manoeuvre_content(
+    ship: Vessel, chosen: Standard, record: Record, rows: list[dict[str, Any]], judged: list[dict[str, Any]]
+) -> ManoeuvreContent:
+    import shlex
+
+    import numpy as np
+    import pandas as pd
+
+    from shipid import __version__
+    from shipid.measures.spiral import Levels, levels, rate_levels
+    from shipid.report.manoeuvre import ManoeuvreContent
+    from shipid.study.results import ship_outline
+
+    columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
+    shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
+    points = {"spiral": levels, "reverse-spiral": rate_levels}.get(chosen.kind)
+    steady = points(record) if points else Levels(np.empty(0), np.empty(0), 0)
+    particulars = ship.document["particulars"]
+    return ManoeuvreContent(
+        title=f"{ship.name}: {chosen.title}",
+        name=chosen.kind,
+        kind=chosen.kind,
+        log=pd.DataFrame({**columns, "shaft": shaft}),
+        measures=pd.DataFrame(rows),
+        criteria=pd.DataFrame(judged),
+        outline=ship_outline(
+            particulars.get("L_oa", particulars["L_pp"]), particulars.get("B", particulars["L_pp"] / 6)
+        ),
+        levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
+        provenance={
+            "Vessel": f"{ship.name}, digest {ship.digest}",
+            "Approach": f"{chosen.speed:.4g} m/s at {chosen.manoeuvre.n_rpm:.5g} rpm, calm deep water, no wind",
+            "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
+            "shipid": __version__,
+        },
+        command=shlex.join(["shipid", *sys.argv[1:]]),
+    )
+
+
+def _write_csv(frame: DataFrame, file: Path) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    frame.to_csv(file, index=False)
+    typer.echo(f"measures -> {file}")
+
+
+def _measure_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of measures; `first` are columns that come before."""
+    rows = list(rows)
+    missing = any(row["note"] for row in rows)
+    body = [
+        [
+            *(row[key] for key in first),
+            row["measure"],
+            _digits(row["value"]),
+            row["unit"],
+            "" if row["lengths"] != row["lengths"] else f"{row['lengths']:.2f}",
+            *[row["note"]] * missing,
+        ]
+        for row in rows
+    ]
+    return _table([*first, "measure", "value", "unit", "ship lengths", *["why missing"] * missing], body)
+
+
+def _criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of criteria; `first` are columns that come before."""
+    body = [
+        [
+            *(row[key] for key in first),
+            row["criterion"],
+            *(_digits(row[key]) for key in ("value", "limit")),
+            row["unit"],
+            row["verdict"],
+            row["note"],
+        ]
+        for row in rows
+    ]
+    return _table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
+
+
+def _digits(value: float) -> str:
+    return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
 
 
 def _run(plan: Any, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:

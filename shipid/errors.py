@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from os import PathLike
 
+LONGEST = 500  # characters of one part of a message
+
 
 class ShipidError(Exception):
     """Something the user can mend: where it stands, what is wrong, what would be right.
@@ -25,7 +27,7 @@ class ShipidError(Exception):
 
     def __str__(self) -> str:
         parts = [part for part in (self.file, self.path, self.message) if part]
-        return ": ".join(" ".join(part.split()) for part in parts)
+        return ": ".join(_legible(" ".join(part.split())) for part in parts)
 
     def __reduce__(self) -> tuple[object, ...]:  # workers send errors home
         return (_rebuild, (type(self), self.message, self.file, self.path))
@@ -45,6 +47,12 @@ class ResultError(ShipidError):
 
 def _rebuild(cls: type[ShipidError], message: str, file: str | None, path: str | None) -> ShipidError:
     return cls(message, file=file, path=path)
+
+
+def _legible(text: str) -> str:
+    """One printable line: what a file holds must neither steer a terminal nor flood it."""
+    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+    return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 
 def choices(value: str, valid: Iterable[str], limit: int = 12) -> str:

@@ -73,15 +73,26 @@ ENVELOPE = {
 }
 
 
+SPEEDS = ("u", "v", "w", "V_c")
+ORDINARY = 28.9  # m: the ship whose envelope this is
+
+
+def pace(vessel: Vessel) -> float:
+    """Speeds, and times, of a model smaller than the ordinary ship over hers, by Froude."""
+    return float(min(vessel.document["particulars"]["L_pp"] / ORDINARY, 1.0) ** 0.5)
+
+
 @pytest.fixture(scope="session")
 def draw_inputs() -> Callable[[Vessel, int], Inputs]:
     """Start, commands and environment of a rollout, drawn from the envelope of the vessels."""
 
     def draw(vessel: Vessel, num_samples: int, seed: int = 7) -> Inputs:
         rng, model = np.random.default_rng(seed), dynamics(vessel)
+        slow = pace(vessel)
 
         def group(names: tuple[str, ...]) -> dict[str, np.ndarray]:
-            return {name: rng.uniform(*ENVELOPE[name.rsplit(".", 1)[-1]], num_samples) for name in names}
+            drawn = {name: rng.uniform(*ENVELOPE[name.rsplit(".", 1)[-1]], num_samples) for name in names}
+            return {name: slow * x if name in SPEEDS else x for name, x in drawn.items()}
 
         return {
             "start": group(model.state),

@@ -21,6 +21,7 @@ from shipid.document import bundled, bundled_folder
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
+from tests.data.simulated import as_bridge, si_log
 from tests.study.tiny import TINY
 
 BAD = Path(__file__).parent / "bad"
@@ -65,13 +66,40 @@ def test_help_and_version_are_light() -> None:
 
 def test_help_names_every_command() -> None:
     for group, commands in (
-        ([], ("vessel", "data", "study", "predict")),
-        (["vessel"], ("list", "show")),
-        (["data"], ("import", "check", "fetch")),
+        ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre")),
+        (["vessel"], ("list", "show", "new")),
+        (["data"], ("import", "check", "fetch", "segment", "measures")),
         (["study"], ("list", "variants", "screen", "run", "resume", "report")),
     ):
         text = said(*group, "--help")
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
+
+
+def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Table, page, CSV and log of one run; the log measures the same."""
+    monkeypatch.chdir(tmp_path)
+    text = said("manoeuvre", "gunnerus-28.9", "zigzag", 20, 10, "--csv", "z.csv", "--log", "z.parquet", "--speed", 4)
+    assert "approach at 4 m/s" in text
+    assert "zigzag 20/10, first to starboard" in text
+    assert Path("gunnerus-28.9-zigzag.html").is_file()
+    table = pd.read_csv("z.csv").set_index("measure")
+    assert table.loc["execute heading", "value"] == pytest.approx(10)
+    assert f"{table.loc['overshoot 1', 'value']:.3g}" in text
+    text = said("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
+    assert "1 runs measured, 0 not" in text
+    again = pd.read_csv("again.csv").set_index("measure")
+    pd.testing.assert_series_equal(again["value"], table["value"])
+
+
+def test_manoeuvres_that_cannot_be() -> None:
+    for arguments, expected in (
+        (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
+        (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
+    ):
+        result = shell(*arguments)
+        assert result.returncode == 1
+        assert result.stderr.startswith(expected)
+        assert result.stderr.count("\n") == 1
 
 
 def test_vessels() -> None:
@@ -118,6 +146,25 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
     result = CliRunner().invoke(app, ["data", "check", str(file)])
     assert result.exit_code == 1
     assert re.search(r"M001 +heading", result.output), "failures are listed by run"
+
+
+def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    as_bridge(si_log()).to_csv("trial.csv", index=False)
+    text = said("data", "import", "--guess", "trial.csv")
+    assert "draft -> trial.toml" in text
+    assert "positive turns the ship to starboard" in text
+    said("data", "import", "trial.toml", "trial.csv")
+    assert "7 segments -> trial-segments.toml" in said("data", "segment", "trial.toml", "trial.csv")
+    assert "checks passed" in said("data", "check", "trial.parquet", "--html", "deep/page.html")
+    assert Path("deep/page.html").stat().st_size > 1_000_000
+    for arguments, remedy in {
+        ("import", "--guess", "trial.csv"): "not written over",
+        ("import", "trial.toml", "--guess", "trial.csv"): "give neither mapping nor repairs",
+        ("import",): "draft one with --guess",
+        ("check", "trial.parquet", "--html", "page.pdf"): "end in .html",
+    }.items():
+        assert remedy in str(CliRunner().invoke(app, ["data", *arguments]).exception)
 
 
 def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -315,3 +362,25 @@ def test_public_names_load() -> None:
     with pytest.raises(AttributeError, match="public names: "):
         _ = shipid.nothing
     assert np.isfinite(len(shipid.__all__))
+
+
+def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
+    file = tmp_path / "my-ship.toml"
+    order = ("vessel", "new", "--length", 33.9, "--beam", 9.6, "--draught", 2.6, "--block", 0.61, "--out", file)
+    text = said(*order, "--propulsor", "azimuth", "--ship-type", "research", "--speed", 5)
+    assert "none of them measured" in text
+    assert "rpm hold 5 m/s" in text
+    assert "course-stable" in text
+    assert load_vessel(str(file)).parameters["thruster.port.y"] == pytest.approx(-2.688)
+    assert "First guess, 33.9 m" in said("vessel", "show", file)
+    written = file.read_text()
+    again = shell(*order)
+    assert (again.returncode, again.stderr) == (1, f"error: {file}: is there already: choose another name\n")
+    assert file.read_text() == written
+
+
+def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
+    sizes = ("--length", 100, "--beam", 5, "--draught", 2, "--block", 0.6)
+    found = shell("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
+    assert found.returncode == 1
+    assert found.stderr == "error: length / beam = 20: the formulae hold for 3 to 9\n"

@@ -29,6 +29,7 @@ ALL = pytest.mark.parametrize("key", list(TERMS))
 DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
 
 VECTORS = ("eta", "nu", "nu_r")
+WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of what a rudder stands in
 STATE = 0.5  # range of what a term remembers
 MOTION_RANGE = np.array([6.0, 1.5, 0.3, 0.1, 0.05, 0.15])  # m/s, rad/s; surge is drawn from -1/3 of it
 RANGES = {
@@ -81,7 +82,7 @@ def example(key: str) -> Example:
     term = TERMS[key]
     columns = _columns(key, block)
     names = tuple(name for name in signals(term.function) if name not in columns)
-    sizes = {**dict.fromkeys(VECTORS, 6), "state": len(term.states(block)) if term.states else 0}
+    sizes = {**dict.fromkeys(VECTORS, 6), "wash": 3, "state": len(term.states(block)) if term.states else 0}
     inputs = {name: ca.SX.sym(name, sizes.get(name, 1)) for name in names}
     own = {parameter.name for parameter in parameters(term.function)}
     only_rates = {parameter.name for parameter in parameters(term.rates)} - own if term.rates else set()
@@ -178,6 +179,8 @@ def random_signals(found: Example, seed: int) -> dict[str, Any]:
     def one(name: str) -> Any:
         if name in VECTORS:
             return rng.uniform(low, MOTION_RANGE)
+        if name == "wash":
+            return rng.uniform(*WASH)
         return rng.uniform(-STATE, STATE, found.sizes[name]) if name == "state" else rng.uniform(*RANGES[name])
 
     return {name: one(name) for name in found.signals}
@@ -188,6 +191,8 @@ def envelope(draw: st.DrawFn, found: Example) -> dict[str, Any]:
     """Signals anywhere in the envelope; hypothesis likes its corners and zeros."""
 
     def one(name: str) -> Any:
+        if name == "wash":
+            return np.array([draw(st.floats(*limits)) for limits in WASH.T])
         if name in found.sizes:
             limits = MOTION_RANGE if name in VECTORS else np.full(found.sizes[name], STATE)
             return np.array([draw(st.floats(-limit, limit)) for limit in limits])
@@ -210,9 +215,18 @@ def jacobian_at(key: str, drawn: Mapping[str, Any]) -> np.ndarray:
 
 
 def test_the_signals_of_every_term_are_declared() -> None:
-    declared = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment}
+    declared = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment, *SIGNALS.given}
     assert {name for key in TERMS for name in example(key).signals} <= declared
-    assert declared <= {*VECTORS, *RANGES, "state"}, "a new signal needs a range here"
+    assert declared <= {*VECTORS, *RANGES, "state", "wash"}, "a new signal needs a range here"
+
+
+@pytest.mark.parametrize("key", [key for key, term in TERMS.items() if term.gives])
+def test_what_a_term_gives_takes_its_own_signals_and_parameters(key: str) -> None:
+    term = TERMS[key]
+    for name, function in term.gives.items():
+        assert name in SIGNALS.given
+        assert set(signals(function)) <= set(signals(term.function))
+        assert set(parameters(function)) <= set(parameters(term.function))
 
 
 CALM = pytest.mark.parametrize("key", [key for key in TERMS if key not in DRAWN_COMPONENTS])
@@ -226,11 +240,17 @@ def test_mirror_port_starboard(key: str, seed: int) -> None:
     signs = {**MIRROR, **MIRROR_OF_A_TERM.get(key, {})}
     mirrored = {name: value * signs.get(name, 1) for name, value in drawn.items()}
     sideways = [path.endswith(".y") and unit == "m" for path, unit in zip(found.paths, found.units, strict=True)]
-    flipped = np.where(sideways, -found.values, found.values)
+    flipped = np.where(sideways, -found.values, found.values)[[_other_side(path, found.paths) for path in found.paths]]
     wrench = found.wrench(drawn)
     assert np.abs(wrench).max() > 0
     expected = MIRRORED_WRENCH * wrench
     np.testing.assert_allclose(found.wrench(mirrored, flipped), expected, rtol=1e-9, atol=1e-9 * np.abs(wrench).max())
+
+
+def _other_side(path: str, paths: tuple[str, ...]) -> int:
+    """Where the number of the other side stands: a screw that turns the other way has its wake and flow mirrored."""
+    turned = re.sub("_plus$|_minus$", lambda end: "_minus" if end[0] == "_plus" else "_plus", path)
+    return paths.index(turned)
 
 
 @CALM
@@ -309,11 +329,14 @@ def test_froude_scaling(key: str, seed: int) -> None:
     values = found.values * [factor(*_powers(unit)) for unit in found.units]
     motion = np.array([scale**0.5] * 3 + [scale**-0.5] * 3)
     signal = {"n": scale**-0.5, "V_w": scale**0.5, "V_c": scale**0.5, "nu": motion, "nu_r": motion}
+    signal |= {"wash": np.array([scale**0.5, scale**0.5, scale])}
     signal |= {"eta": scale ** np.array([1, 1, 1, 0, 0, 0]), "state": scale ** np.array(SCALE_OF_STATES.get(key, 0.0))}
     drawn = random_signals(found, seed)
     for name in VECTORS:
         if name in drawn:
             drawn[name][0] = abs(drawn[name][0]) + 2.0  # far above the floors of speed, which do not scale
+    if "wash" in drawn:
+        drawn["wash"][:2] = np.abs(drawn["wash"][:2]) + 2.0
     scaled = {name: value * signal.get(name, 1.0) for name, value in drawn.items()}
     expected = found.wrench(drawn) * scale ** np.array([3, 3, 3, 4, 4, 4])
     np.testing.assert_allclose(found.wrench(scaled, values), expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())

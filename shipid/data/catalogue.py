@@ -8,7 +8,7 @@ from pathlib import Path
 import pooch
 
 from shipid import document
-from shipid.data.importing import sha256_of
+from shipid.data.importing import digest_of
 from shipid.data.mapping import read_mapping
 from shipid.errors import DataError
 
@@ -30,16 +30,17 @@ def fetch(name: str) -> Path:
     ------
     DataError : if the log is not there, cannot be downloaded, or is another file than the mapping was written for.
     """
-    source = read_mapping(name).source
+    mapping = read_mapping(name)
+    source = mapping.source
     folder = os.environ.get(FOLDER_VARIABLE)
     if folder:
         if source.file is None:
             raise DataError("the mapping names no file in a data folder", file=name, path="source.file")
         file = Path(folder) / source.file
-        if not file.is_file():
+        if not (file.is_file() if source.runs is None else file.is_dir()):
             message = f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})"
             raise DataError(message, file=file)
-        if source.sha256 not in (None, sha256_of(file)):
+        if source.sha256 not in (None, digest_of(mapping, file)):
             message = f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}"
             raise DataError(message, file=file, path="source.sha256")
         return file
@@ -49,6 +50,9 @@ def fetch(name: str) -> Path:
             file=name,
             path="source.url",
         )
+    if source.runs is not None:
+        message = f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder"
+        raise DataError(message, file=name, path="source.url")
     return _download(name, source.url, source.sha256, source.file)
 
 

@@ -87,23 +87,39 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
 
 def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     """RMS distance between positions and integrated u, v, psi over stretches of 30 s that start together."""
-    squares, lengths = [], []
-    for rows in stretches:
-        t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
-        rates = (u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi))
-        part = np.floor((t - t[0]) / STRETCH + 1e-9).astype(int)
-        start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
-        drift = [
-            rows[name].to_numpy() - cumulative_integral(t, rate)
-            for name, rate in zip(("north", "east"), rates, strict=True)
-        ]
-        squares.append(sum((error - error[start]) ** 2 for error in drift))
-        lengths.append(cumulative_integral(t, np.hypot(u, v))[-1])
-    error = float(np.sqrt(np.mean(np.concatenate(squares))))
+    lengths = [
+        cumulative_integral(rows["t"].to_numpy(), np.hypot(rows["u"].to_numpy(), rows["v"].to_numpy()))[-1]
+        for rows in stretches
+    ]
+    error = _rms(np.concatenate([_drift(rows) for rows in stretches]))
     duration = sum(float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for rows in stretches)
     distance = sum(lengths) / duration * min(STRETCH, duration) if duration > 0 else 0.0
     sentence = f"positions leave integrated velocities by {error:.2g} m (RMS) in {STRETCH:g} s, {distance:.3g} m run"
     yield _row("path", error, "m", PATH_ERROR * distance, sentence)
+
+
+def _drift(rows: pd.DataFrame) -> Array:
+    """Distance [m] between positions and integrated velocities, which start together every 30 s, (N,)."""
+    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
+    rates = (u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi))
+    part = np.floor((t - t[0]) / STRETCH + 1e-9).astype(int)
+    start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
+    errors = [
+        rows[name].to_numpy() - cumulative_integral(t, rate)
+        for name, rate in zip(("north", "east"), rates, strict=True)
+    ]
+    return np.asarray(np.hypot(*(error - error[start] for error in errors)))
+
+
+def check_series(dataset: Dataset) -> pd.DataFrame:
+    """What the checks of motion compare, row by row: run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]."""
+    parts = []
+    for run, rows in pieces(dataset):
+        t = rows["t"].to_numpy()
+        rate = np.gradient(np.unwrap(rows["psi"]), t) if len(t) > 2 else np.full(len(t), np.nan)
+        part = rows[["t", "r", "u", "v"]].assign(run=run, psi_rate=rate, drift=_drift(rows))
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
 
 
 def _repetition(stretches: list[pd.DataFrame], others: pd.Series[Any]) -> Iterator[dict[str, Any]]:

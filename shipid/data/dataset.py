@@ -6,7 +6,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,12 @@ REQUIRED = {"t": "s", "north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": 
 OPTIONAL = {"z": "m", "phi": "rad", "theta": "rad", "w": "m/s", "p": "rad/s", "q": "rad/s"} | {
     "V_w": "m/s",
     "beta_w": "rad",
+    "std_u": "m/s",
+    "std_v": "m/s",
+    "std_r": "rad/s",
 }
+STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
+"""State -> column of its standard deviation, where it was estimated instead of measured."""
 SIGNALS = {"n": "rev/s", "alpha": "rad", "delta": "rad"}
 ANGLES = ("psi", "phi", "theta", "beta_w")
 BREAK = "break"
@@ -191,14 +196,19 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
+    write_whole(target, lambda part: pyarrow.parquet.write_table(table, part, compression="zstd"))
+    return target
+
+
+def write_whole(target: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file that appears whole or not at all; raises DataError if the place cannot be written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
-            pyarrow.parquet.write_table(table, Path(folder) / target.name, compression="zstd")
+            write(Path(folder) / target.name)
             os.replace(Path(folder) / target.name, target)
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
-    return target
 
 
 def read_dataset(file: str | os.PathLike[str]) -> Dataset:

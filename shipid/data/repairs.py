@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -70,9 +70,11 @@ class HeadingOffset(Repair):
 
 
 class LeverArm(Repair):
-    """Position and velocity were logged `x` [m] forward of the vessel's origin: both move to the origin."""
+    """What was logged `x` [m] forward and `y` [m] to starboard of the vessel's origin moves to the origin."""
 
     x: float
+    y: float = 0.0
+    moves: Literal["both", "position", "velocity"] = "both"
 
 
 class Break(Repair):
@@ -147,19 +149,26 @@ def scale(rows: pd.DataFrame, repair: Scale) -> Outcome:
 def turn_heading(rows: pd.DataFrame, repair: HeadingOffset) -> Outcome:
     """Turn: psi <- psi + d; (u, v) <- R(-d) (u, v); the velocity over ground, R(psi) (u, v), does not change."""
     c, s = np.cos(repair.offset), np.sin(repair.offset)
-    u, v = rows["u"], rows["v"]
-    turned = rows.assign(psi=rows["psi"] + repair.offset, u=c * u + s * v, v=c * v - s * u)
+    turned = rows.assign(psi=rows["psi"] + repair.offset)
+    if "u" in rows and "v" in rows:  # else they are estimated from the heading as it now is
+        u, v = rows["u"], rows["v"]
+        turned = turned.assign(u=c * u + s * v, v=c * v - s * u)
     return _all_rows(turned, f"{np.degrees(repair.offset):+.2f} deg")
 
 
 def move_origin(rows: pd.DataFrame, repair: LeverArm) -> Outcome:
-    """Move: v <- v - x r; north <- north - x cos(psi); east <- east - x sin(psi); u does not change (rigid body)."""
-    moved = rows.assign(
-        v=rows["v"] - repair.x * rows["r"],
-        north=rows["north"] - repair.x * np.cos(rows["psi"]),
-        east=rows["east"] - repair.x * np.sin(rows["psi"]),
-    )
-    return _all_rows(moved, f"sensor {repair.x:g} m forward of the origin")
+    """Move: (north, east) <- (north, east) - R(psi) (x, y); u <- u + y r; v <- v - x r (rigid body)."""
+    moved = rows
+    c, s = np.cos(rows["psi"]), np.sin(rows["psi"])
+    if repair.moves != "velocity":
+        north, east = repair.x * c - repair.y * s, repair.x * s + repair.y * c
+        moved = moved.assign(north=rows["north"] - north, east=rows["east"] - east)
+    if repair.moves != "position" and "v" in rows:  # else it is estimated from the position as it now is
+        moved = moved.assign(v=rows["v"] - repair.x * rows["r"])
+    if repair.moves != "position" and "u" in rows:
+        moved = moved.assign(u=rows["u"] + repair.y * rows["r"])
+    side = f", {repair.y:g} m to starboard" if repair.y else ""
+    return _all_rows(moved, f"sensor {repair.x:g} m forward{side} of the origin")
 
 
 def break_runs(rows: pd.DataFrame, repair: Break) -> Outcome:

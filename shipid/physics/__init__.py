@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from shipid.physics import hull, radiation, restoring, thruster, waves, wind
+from shipid.physics import hull, propeller, radiation, restoring, rudder, thruster, waves, wind
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,8 @@ class Term:
     states : for a term with states of its own, a function from its block to their names; `function` and `rates` then
         take them as the signal `state`.
     rates : d(state)/dt from signals; integrated with the motion. Takes what parameters of `function` it names.
+    gives : signal -> function of signals and of parameters of `function`: what a term whose block says that it is
+        `behind` this one takes as that signal.
     """
 
     function: Callable[..., Any]
@@ -32,6 +34,7 @@ class Term:
     drawn: Callable[..., Mapping[str, int]] | None = None
     states: Callable[[Mapping[str, Any]], tuple[str, ...]] | None = None
     rates: Callable[..., Any] | None = None
+    gives: Mapping[str, Callable[..., Any]] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Signals:
     environment: Mapping[str, str] = field(
         default_factory=lambda: {"V_w": "m/s", "beta_w": "rad", "V_c": "m/s", "beta_c": "rad"}
     )
+    given: tuple[str, ...] = ("wash",)
 
 
 SIGNALS = Signals()
@@ -58,6 +62,8 @@ SIGNALS = Signals()
 TERMS: dict[str, Term] = {
     "hull.derivatives": Term(hull.derivatives),
     "hull.prime_derivatives": Term(hull.prime_derivatives),
+    "hull.mmg": Term(hull.mmg),
+    "hull.abkowitz": Term(hull.abkowitz),
     "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
     "hull.resistance": Term(hull.resistance),
     "restoring.hydrostatic": Term(restoring.hydrostatic),
@@ -73,6 +79,10 @@ TERMS: dict[str, Term] = {
     "wind.blendermann": Term(wind.blendermann),
     "thruster.azimuth": Term(thruster.azimuth),
     "thruster.tunnel": Term(thruster.tunnel),
+    "thruster.propeller": Term(propeller.propeller, gives={"wash": propeller.wash}),
+    "thruster.service_speed": Term(propeller.service_speed),
+    "thruster.rudder": Term(rudder.rudder),
+    "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),
 }
 
 ACTUATORS: dict[str, Memory] = {

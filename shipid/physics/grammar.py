@@ -16,6 +16,7 @@ from casadi import SX
 
 AXES = "XYZKMN"
 MOTIONS = "uvwpqr"
+DEVIATIONS = ("u", "v", "r", "delta")
 POSITIVE = object()  # marks a parameter that must be greater than zero
 
 
@@ -50,9 +51,10 @@ class Monomial:
 
 
 @cache
-def monomial(name: str, alphabet: str, axes: str = AXES) -> Monomial:
-    """Read a name; ValueError says what it should look like."""
-    factor, before = rf"[{alphabet}]|\|[{alphabet}]\|", rf"([{axes}])_" if axes else "()"
+def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
+    """Read a name whose factors are words of the alphabet; ValueError says what it should look like."""
+    word = f"(?:{'|'.join(alphabet)})"
+    factor, before = rf"{word}|\|{word}\|", rf"([{axes}])_" if axes else "()"
     parts = re.fullmatch(rf"{before}((?:{factor})+)", name)
     if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
@@ -125,6 +127,27 @@ def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
     return rho / 2 * L**length * U ** (2 - formula.order)
 
 
+def deviation(name: str) -> Monomial:
+    """A derivative about straight running at the service speed: factors u (its change), v, r and delta."""
+    return monomial(name, DEVIATIONS)
+
+
+def of_the_hull(name: str) -> Monomial:
+    """The same without the rudder angle."""
+    formula = deviation(name)
+    if any(symbol == "delta" for symbol, _ in formula.factors):
+        raise ValueError(f"{name!r} is a rudder derivative: it belongs in a rudder of kind 'rudder_derivatives'")
+    return formula
+
+
+def of_the_rudder(name: str) -> Monomial:
+    """The same with it."""
+    formula = deviation(name)
+    if all(symbol != "delta" for symbol, _ in formula.factors):
+        raise ValueError(f"{name!r} has no factor delta: it belongs in [hull.abkowitz]")
+    return formula
+
+
 def thrust_monomial(name: str) -> Monomial:
     """A thruster coefficient's formula: factors J, y (for J_y) and t (for tanh(|J_y| / width)); `1` is the constant."""
     return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
@@ -132,5 +155,7 @@ def thrust_monomial(name: str) -> Monomial:
 
 DERIVATIVES = Grammar(derivative, derivative_unit)
 PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime")
+HULL_DEVIATIONS = Grammar(of_the_hull, lambda _: "prime")
+RUDDER_DEVIATIONS = Grammar(of_the_rudder, lambda _: "prime")
 ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
 THRUST = Grammar(thrust_monomial, lambda _: "-")

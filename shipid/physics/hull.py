@@ -1,7 +1,8 @@
-"""Hull forces in calm water: named derivatives, strip cross-flow drag, straight-ahead resistance."""
+"""Hull forces in calm water: named derivatives in four scalings, strip cross-flow drag, straight-ahead resistance."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import casadi as ca
@@ -9,9 +10,19 @@ import numpy as np
 from casadi import SX
 
 from shipid.physics.frames import vector
-from shipid.physics.grammar import AXES, DERIVATIVES, MOTIONS, POSITIVE, PRIME_DERIVATIVES, derivative, prime_scale
+from shipid.physics.grammar import (
+    AXES,
+    DERIVATIVES,
+    HULL_DEVIATIONS,
+    MOTIONS,
+    POSITIVE,
+    PRIME_DERIVATIVES,
+    derivative,
+    deviation,
+    prime_scale,
+)
 
-SPEED_FLOOR = 0.01  # m/s: keeps 1/U of higher-order prime derivatives finite at rest
+SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
 
 
 def derivatives(nu_r: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
@@ -41,6 +52,57 @@ def prime_derivatives(
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     return derivatives(nu_r, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()})
+
+
+def mmg(
+    nu_r: SX,
+    *,
+    R_0: Annotated[SX, "-", POSITIVE],
+    L_pp: Annotated[SX, "m", POSITIVE],
+    T: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+    **values: Annotated[SX, PRIME_DERIVATIVES],
+) -> SX:
+    """Wrench (6) of the MMG hull polynomial (Yasukawa and Yoshimura 2015, eqs. 9-11).
+
+    X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
+    resistance turns round with the ship's motion: fully where the drift angle is below 45 deg. U as above.
+    """
+    U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
+    ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)
+    scaled = {name: value * T / L_pp * prime_scale(name, rho, L_pp, U) for name, value in values.items()}
+    return derivatives(nu_r, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
+
+
+def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L_pp: SX, U_0: SX, rho: SX) -> SX:
+    """Wrench (6) of an Abkowitz polynomial: 1/2 rho L^2 U_0^2 value x monomial, moments with L^3.
+
+    Factors u' = (u - U_0) / U_0, v' = v / U_0, r' = r L / U_0, delta [rad].
+    """
+    factors = {"u": nu_r[0] / U_0 - 1, "v": nu_r[1] / U_0, "r": nu_r[5] * L_pp / U_0, "delta": SX(delta)}
+    force = rho / 2 * L_pp**2 * U_0**2
+    wrench = [SX(1, 1)] * 6
+    for name, value in values.items():
+        formula = deviation(name)
+        axis = AXES.index(formula.axis)
+        lever = 1 if formula.axis in "XYZ" else L_pp
+        wrench[axis] = wrench[axis] + force * lever * value * formula.value(factors)
+    return ca.vertcat(*wrench)
+
+
+def abkowitz(
+    nu_r: SX,
+    *,
+    L_pp: Annotated[SX, "m", POSITIVE],
+    U_0: Annotated[SX, "m s^-1", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+    **values: Annotated[SX, HULL_DEVIATIONS],
+) -> SX:
+    """Wrench (6) of derivatives about straight running at the service speed U_0 (Abkowitz 1964), in its prime system.
+
+    The factor u is the change of speed, (u - U_0) / U_0: Y_v with Y_uv = Y_v is a force that goes with u v.
+    """
+    return about_service_speed(nu_r, 0.0, values, L_pp, U_0, rho)
 
 
 def strips(*, strips: int) -> dict[str, np.ndarray]:

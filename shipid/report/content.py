@@ -31,6 +31,7 @@ ANCHORS = (
     "cells",
     "provenance",
 )
+OF_A_MANOEUVRE = ("measures", "criteria", "track", "histories", "spiral")
 # Columns of a trial; whatever else its frame holds is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
@@ -43,15 +44,16 @@ class Sentence:
     Parameters
     ----------
     text : plain text.
-    figure : one of `ANCHORS`, or empty for no link; ValueError otherwise.
+    figure : one of `ANCHORS` or, on the page of a manoeuvre, `OF_A_MANOEUVRE`; empty for no link; ValueError otherwise.
     """
 
     text: str
     figure: str = ""
 
     def __post_init__(self) -> None:
-        if self.figure and self.figure not in ANCHORS:
-            raise ValueError(f"no figure is called {self.figure!r}; valid: {', '.join(ANCHORS)}")
+        known = (*ANCHORS, *OF_A_MANOEUVRE)
+        if self.figure and self.figure not in known:
+            raise ValueError(f"no figure is called {self.figure!r}; valid: {', '.join(known)}")
 
 
 @dataclass(frozen=True)

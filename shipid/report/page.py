@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
@@ -14,7 +15,7 @@ from plotly.offline import get_plotlyjs
 
 from shipid.errors import ResultError
 from shipid.report import error_map, errors_over, factors, gain, logs, palette, paths, search, tables
-from shipid.report.content import ReportContent
+from shipid.report.content import Finding, ReportContent, Sentence
 from shipid.report.figure import Figure
 from shipid.report.tables import Table
 from shipid.report.wording import bound, number
@@ -47,16 +48,60 @@ def sections(content: ReportContent) -> list[Section]:
     return [section for section in listing if any(section.items)]
 
 
+class Shown(Protocol):
+    """What every page says beside its sections."""
+
+    @property
+    def title(self) -> str:
+        """Heading of the page."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Short name beside the kicker."""
+        ...
+
+    @property
+    def answer(self) -> Sequence[Sentence]:
+        """Sentences below the title."""
+        ...
+
+    @property
+    def findings(self) -> Sequence[Finding]:
+        """Claims with verdicts; empty for none."""
+        ...
+
+    @property
+    def provenance(self) -> Mapping[str, str]:
+        """Label -> value."""
+        ...
+
+    @property
+    def study_document(self) -> str:
+        """Document as text; empty for none."""
+        ...
+
+    @property
+    def command(self) -> str:
+        """What reproduces the page; empty for none."""
+        ...
+
+
 def render(content: ReportContent) -> str:
-    """Write the page as text."""
-    parts = sections(content)
-    anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
+    """Write the page of a study as text."""
     windows = paths.window_data(content) if content.snapshots else None
+    return page(content, sections(content), "study", windows)
+
+
+def page(content: Shown, parts: Sequence[Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
+    """Write sections as one page: `kicker` says above the title what it is; `windows` is what page.js browses."""
+    anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "bound": bound}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
+        kicker=kicker,
         sections=parts,
         anchors=anchors,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
@@ -89,7 +134,7 @@ def write(text: str, file: Path) -> Path:
     return file
 
 
-def _figures(parts: list[Section]) -> list[Figure]:
+def _figures(parts: Sequence[Section]) -> list[Figure]:
     return [item for section in parts for item in section.items if isinstance(item, Figure)]
 
 

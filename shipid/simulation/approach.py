@@ -44,8 +44,8 @@ class Controls:
     def of(cls, vessel: Vessel) -> Controls:
         """Ask the equations; DocumentError for a vessel that nothing drives ahead or turns."""
         commands = dynamics(vessel).commands
-        idle = acceleration(vessel, PROBE_SPEED, {})
-        ahead = {name: acceleration(vessel, PROBE_SPEED, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
+        idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
+        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
         drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
         straight = acceleration(vessel, PROBE_SPEED, running)

@@ -20,8 +20,11 @@ def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -
     for parameter in declared:
         name = parameter.name
         if parameter.kind == "open":
-            closed = {other.name for other in declared} | {"source", "off", "kind"}
-            result.update({key: f"{path}.{key}" for key in block if key not in closed})
+            closed = {other.name for other in declared}
+            numbers = [
+                key for key, value in block.items() if type(value) in (int, float)
+            ]  # not `kind`, `off`, actuators
+            result.update({key: f"{path}.{key}" for key in numbers if key not in closed})
         elif parameter.kind == "list":
             result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]
         elif parameter.kind == "table":

@@ -18,8 +18,8 @@ from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.vessel.bindings import Binding, bindings
 from shipid.vessel.load import Vessel
+from shipid.vessel.schema import BEHIND, behind, signals, structural, term_blocks
 from shipid.vessel.schema import parameters as declared
-from shipid.vessel.schema import signals, structural, term_blocks
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
@@ -27,6 +27,7 @@ ETA_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
 LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
 PLANE, HEAVE = (0, 1, 5), 2
+CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
 HELM = "helm"  # prefix of what a helmsman remembers
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
@@ -140,7 +141,8 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
-    force = _added_mass_force(M_A, nu_r, nu_c_dot) - coriolis(M_RB, nu)
+    kept = CORIOLIS[vessel.document.get("added_mass", {}).get("coriolis", "full")]
+    force = _added_mass_force(M_A, nu_r, nu_c_dot, kept) - coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
     summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
@@ -186,15 +188,16 @@ def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[
     )
 
 
-def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX) -> SX:
+def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX, kept: tuple[int, ...]) -> SX:
     """Force (6) of added mass beyond -M_A nu_dot.
 
-    Surge, sway and yaw have the Coriolis terms of manoeuvring in calm water. Heave acts in the inertial frame, on
-    w_dot + p v - q u, and what is coupled to it has no others.
+    Surge, sway and yaw have the Coriolis terms of manoeuvring in calm water, on the axes `kept`. Heave acts in the
+    inertial frame, on w_dot + p v - q u, and what is coupled to it has no others.
     """
     heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
     plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
-    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - coriolis(plane @ M_A @ plane, plane @ nu_r)
+    own = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
+    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - own @ coriolis(plane @ M_A @ plane, plane @ nu_r)
 
 
 def _upright(eta: SX, nu: SX, m: SX) -> SX:
@@ -243,11 +246,10 @@ def _sum_of_terms(
 ) -> tuple[SX, list[tuple[str, SX, SX, dict[str, int], np.ndarray | None]]]:
     """Wrench (6) of all terms; and, of what is not written out, (path, component, its wrench, widths, arrays)."""
     total, mapped = SX(6, 1), []
+    given = _given(terms, available, bound, value_of)
     for path, key, block in terms:
-        term, component = TERMS[key], path.rsplit(".", 1)[-1]
-        own = {
-            name: available[f"{component}.{name}"] for name in SIGNALS.commands if f"{component}.{name}" in available
-        }
+        term = TERMS[key]
+        own = _own_commands(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
         if path in own_states:
             own["state"] = own_states[path]
         wrench = partial(_wrench, term, {**available, **own}, _values(bound[path], value_of))
@@ -260,6 +262,29 @@ def _sum_of_terms(
             parts = ca.vertsplit(entry, [0, *np.cumsum(list(widths.values())).tolist()])
             mapped.append((path, entry, wrench(dict(zip(widths, parts, strict=True))), widths, arrays))
     return total, mapped
+
+
+def _own_commands(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
+    """Commands of one component by signal: what its actuators have reached."""
+    component = path.rsplit(".", 1)[-1]
+    return {name: available[f"{component}.{name}"] for name in SIGNALS.commands if f"{component}.{name}" in available}
+
+
+def _given(
+    terms: list[tuple[str, str, Mapping[str, Any]]],
+    available: Mapping[str, SX],
+    bound: Mapping[str, Binding],
+    value_of: Mapping[str, SX],
+) -> dict[str, SX]:
+    """Signals that components give to those behind them: `propeller.wash`."""
+    found = {}
+    for path, key, _ in terms:
+        for name, function in TERMS[key].gives.items():
+            here = {**available, **_own_commands(path, available)}
+            taken = {parameter.name for parameter in declared(function)}
+            own = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
+            found[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **own)
+    return found
 
 
 def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:

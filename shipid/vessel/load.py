@@ -21,7 +21,17 @@ from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
-from shipid.vessel.schema import DOFS, TABLE, components, kinds, term_blocks, term_model, vessel_model
+from shipid.vessel.schema import (
+    BEHIND,
+    DOFS,
+    TABLE,
+    behind,
+    components,
+    kinds,
+    term_blocks,
+    term_model,
+    vessel_model,
+)
 
 LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
@@ -196,6 +206,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
         _check_lengths(path, block, file)
         if TABLE in block:
             _check_wave_table(f"{path}.{TABLE}", block[TABLE], TABLES[key], file)
+    _check_behind(vessel)
     _check_units(vessel)
     _check_numbers(vessel)
     return vessel
@@ -207,6 +218,17 @@ def _check_numbers(vessel: Vessel) -> None:
         _check_order(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
+
+
+def _check_behind(vessel: Vessel) -> None:
+    """Refuse a component behind another that is not there, is off or has nothing to give it."""
+    terms = list(term_blocks(vessel.document))
+    for path, key, block in terms:
+        for name in behind(TERMS[key]):
+            giving = [other.rsplit(".", 1)[-1] for other, kind, _ in terms if name in TERMS[kind].gives]
+            if block[BEHIND] not in giving:
+                message = f"{block[BEHIND]!r} gives no {name}: {choices(block[BEHIND], giving)}"
+                raise DocumentError(message, file=vessel.file, path=f"{path}.{BEHIND}")
 
 
 def _check_sense(vessel: Vessel) -> None:

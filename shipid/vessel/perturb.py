@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
-from shipid.physics.grammar import derivative
+from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
@@ -235,16 +236,18 @@ def _select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, wher
         found = documents.match(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])
-            found = [path for path in found if _has_order(path) and relation(_order(path), limit)]
+            orders = {path: _order(path) for path in found}
+            found = [path for path, order in orders.items() if order is not None and relation(order, limit)]
         if not found:
             raise DocumentError(f"{pattern!r} selects nothing: {choices(pattern, paths)}", file=file, path=where)
         chosen.update(found)
     return [path for path in paths if path in chosen]
 
 
-def _has_order(path: str) -> bool:
-    return path.startswith(("hull.derivatives.", "hull.prime_derivatives."))
-
-
-def _order(path: str) -> int:
-    return derivative(path.rsplit(".", 1)[-1]).order
+def _order(path: str) -> int | None:
+    """Number of factors of a derivative of hull or rudder; None for any other number."""
+    name = path.rsplit(".", 1)[-1]
+    for formula in (derivative, deviation):
+        with suppress(ValueError):
+            return formula(name).order
+    return None

@@ -24,6 +24,7 @@ PARTICULARS = {
     "B": "m",
     "T": "m",
     "C_b": "-",
+    "U_0": "m s^-1",
 }
 CONSTANTS = {"rho": "kg m^-3", "rho_a": "kg m^-3", "g": "m s^-2"}
 SHARED = {**dict.fromkeys(PARTICULARS, "particulars"), **dict.fromkeys(CONSTANTS, "constants")}
@@ -89,6 +90,13 @@ def structural(term: Term) -> tuple[str, ...]:
     return tuple(inspect.signature(source).parameters) if source else ()
 
 
+@cache
+def behind(term: Term) -> tuple[str, ...]:
+    """Signals that a term takes from the component that its block says it is behind."""
+    return tuple(name for name in signals(term.function) if name in SIGNALS.given)
+
+
+BEHIND = "behind"  # the key that names another component
 TABLE = "table"  # the structural key that names a file of columns; every other one is a whole number
 
 
@@ -99,6 +107,7 @@ class Block(BaseModel):
     source: str | None = Field(default=None, description="where the numbers come from")
 
 
+_CORIOLIS = Annotated[Literal["full", "mmg", "none"], Field(description="what the hull's derivatives do not hold")]
 _Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
 
 
@@ -179,6 +188,8 @@ def term_model(key: str) -> type[Block]:
     if commands:
         fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
+    if behind(term):
+        extra[BEHIND] = (Annotated[str, Field(description="the thruster in whose wash it stands")], ...)
     return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 
@@ -225,7 +236,7 @@ def vessel_model() -> type[BaseModel]:
         "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
         "inertia": (block_model("inertia", parameters(rigid_body)), ...),
-        "added_mass": (block_model("added_mass", parameters(added_mass)) | None, None),
+        "added_mass": (block_model("added_mass", parameters(added_mass), coriolis=(_CORIOLIS, "full")) | None, None),
         **{group: (_fixed(group) | None, None) for group in FIXED},
         "wind": (_named("wind") | None, None),
         "thruster": (GenericAlias(dict, (str, _named("thruster"))), {}),

@@ -53,7 +53,7 @@ MAPPINGS = {
     "separator_of_a_pattern": ("format.separator", "or the word 'whitespace'"),
     "break_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, intervals, kind, reason"),
     "heading_offset_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, kind, offset, reason, unit"),
-    "lever_arm_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, kind, reason, x"),
+    "lever_arm_of_a_column": ("repair.0.columns", "unknown key: valid: enabled, kind, moves, reason, x, y"),
     "not_toml": ("", "not valid TOML"),
     "absent": ("", "no such file"),
 }

@@ -66,3 +66,33 @@ def test_prime_derivatives_are_si_ones_at_their_speed() -> None:
     u, v = 4.0, 0.3
     found = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), L_pp=20.0, rho=1000.0, Y_v=-0.3))
     assert found[1] == pytest.approx(-0.3 * 0.5 * 1000 * 400 * np.hypot(u, v) * v, rel=1e-5)
+
+
+def test_the_mmg_hull_is_its_formula() -> None:
+    """Yasukawa and Yoshimura (2015), eqs. 9-11: X with R_0 and a fourth order, forces on L T, the moment on L^2 T."""
+    u, v, r, L, T = 1.2, -0.3, 0.05, 7.0, 0.46
+    U = np.hypot(u, v)
+    v_, r_ = v / U, r * L / U
+    force = 0.5 * 1000 * L * T * U**2
+    X = force * (-0.02 - 0.04 * v_**2 + 0.77 * v_**4)
+    Y, N = force * (-0.315 * v_ + 0.083 * r_), force * L * (-0.049 * r_ - 0.294 * v_**2 * r_)
+    values = {"X_vv": -0.04, "X_vvvv": 0.77, "Y_v": -0.315, "Y_r": 0.083, "N_r": -0.049, "N_vvr": -0.294}
+    found = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
+    np.testing.assert_allclose(numbers(found), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
+
+
+def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
+    ahead, astern = (
+        numbers(hull.mmg(ca.SX(ca.DM([u, 0.2, 0, 0, 0, 0])), R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0))[0]
+        for u in (1.0, -1.0)
+    )
+    assert ahead == -astern < 0
+
+
+def test_abkowitz_counts_speed_from_that_of_service() -> None:
+    """With Y_uv = Y_v the force goes with u v at any speed."""
+    values = {"L_pp": 160.0, "U_0": 7.5, "rho": 1025.0, "Y_v": -0.01, "Y_uv": -0.01, "N_vvv": 0.02}
+    for u, v in ((7.5, 0.4), (3.0, -0.5)):
+        found = numbers(hull.abkowitz(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), **values))
+        assert found[1] == pytest.approx(-0.01 * 0.5 * 1025 * 160**2 * u * v)
+        assert found[5] == pytest.approx(0.02 * 0.5 * 1025 * 160**3 * v**3 / 7.5)

@@ -29,6 +29,11 @@ def test_aft_azimuths_turn_against_their_angle_and_forward_ones_with_it() -> Non
     assert tractor.helm == {"port.alpha": 1.0, "starboard.alpha": -1.0}
 
 
+@pytest.mark.parametrize("key", ["kvlcc2-l7", "mariner"])
+def test_a_positive_rudder_angle_turns_the_ship_to_starboard(key: str) -> None:
+    assert Controls.of(load_vessel(key)).helm == {"rudder.delta": 1.0}
+
+
 def test_orders_name_every_command() -> None:
     orders = Controls.of(TUNNEL).orders(np.array([2.0, 3.0]), np.array([0.1, -0.2]))
     assert set(orders) == set(dynamics(TUNNEL).commands)

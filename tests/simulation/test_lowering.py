@@ -27,7 +27,8 @@ Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 
 
 def family(vessel: Vessel, count: int) -> np.ndarray:
-    rules = [{"parameters": ["hull.*", "inertia.m", "thruster.*.k_T"], "factor": (0.7, 1.3)}]
+    scales = ["thruster.*.k_T"] if any(path.endswith(".k_T") for path in vessel.parameters) else []
+    rules = [{"parameters": ["hull.*", "inertia.m", *scales], "factor": (0.7, 1.3)}]
     drawn = members(Family(name="f", members=count, perturb=rules), vessel)
     return np.array([variant.parameters for variant in drawn])
 

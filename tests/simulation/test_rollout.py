@@ -17,6 +17,7 @@ from shipid.simulation.scan import memory_along, uninterrupted
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
+from tests.conftest import pace
 
 Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 LAG = {"kind": "first_order", "T": 2.0, "rate": 1e3}
@@ -48,18 +49,21 @@ def test_turning_the_chart_turns_the_path(vessel: Vessel, draw_inputs: Draw) -> 
 
 
 def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> None:
-    start = zeros(dynamics(bundled_vessel).state, 2) | {"u": np.full(2, 4.0)}
-    alpha = np.array([0.5, -0.5])
-    commands = {
-        f"{side}.{s}": (np.full(2, 2.5) if s == "n" else alpha)
-        for side in ("port", "starboard")
-        for s in ("n", "alpha")
-    }
-    environment = {"V_w": np.full(2, 6.0), "beta_w": np.array([0.8, -0.8])}
-    found = rollout(bundled_vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
+    """Of a ship whose screw, if there is but one, works alike on both sides."""
+    values = bundled_vessel.parameters
+    alike = {path: values[path.removesuffix("_minus") + "_plus"] for path in values if path.endswith("_minus")}
+    vessel = bundled_vessel.with_values(alike)
+    model = dynamics(vessel)
+    start = zeros(model.state, 2) | {"u": np.full(2, 4.0)}
+    angle = np.array([0.5, -0.5])
+    commands = {name: np.full(2, 2.5) if name.endswith(".n") else angle for name in model.commands}
+    weather = {"V_w": np.full(2, 6.0), "beta_w": np.array([0.8, -0.8])}
+    environment = {name: weather[name] for name in model.environment}
+    found = rollout(vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
     for name, sign in (("north", 1), ("east", -1), ("psi", -1), ("u", 1), ("v", -1), ("r", -1)):
         np.testing.assert_allclose(found[name][..., 1], sign * found[name][..., 0], rtol=1e-9, atol=1e-9)
-    assert found["psi"][-1, 0, 0] < -1  # alpha > 0 turns to port
+    to_starboard = 1 if "rudder.delta" in commands else -1  # delta > 0 turns there, alpha > 0 to port
+    assert to_starboard * found["psi"][-1, 0, 0] > 0.5
 
 
 def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
@@ -67,6 +71,8 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
 
     Not from step to step: once a ship has come to drift astern, a polynomial hull may gain a little for a while.
     """
+    if "abkowitz" in bundled_vessel.document["hull"]:
+        pytest.skip("a polynomial about one speed says nothing of a ship that stops")
     u, v, r = (x.ravel() for x in np.meshgrid([0.5, 3.0, 6.0], [-1.0, 0.2, 1.0], [-0.13, 0.02, 0.13]))
     model = dynamics(bundled_vessel)
     start = zeros(model.state, len(u)) | {"u": u, "v": v, "r": r}
@@ -80,9 +86,9 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
 
 
 def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, seed: int = 7) -> np.ndarray:
-    """State after 8 s of smooth motion: one side of every kink (rates and drift keep their sign)."""
-    given = draw_inputs(vessel, 3, seed)
-    given["start"] |= {"u": np.full(3, 3.0), "v": np.full(3, 0.4), "r": np.full(3, -0.05)}
+    """State after 8 s of the ordinary ship: smooth, one side of every kink (rates and drift keep their sign)."""
+    given, slow = draw_inputs(vessel, 3, seed), pace(vessel)
+    given["start"] |= {"u": np.full(3, 3.0 * slow), "v": np.full(3, 0.4 * slow), "r": np.full(3, -0.05)}
     commands = {name: np.full(3, 0.6 if name.endswith("alpha") else 2.0) for name in given["commands"]}
     environment = {name: np.zeros(3) for name in given["environment"]}
     memory = {name: np.full(3, 0.5 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
@@ -91,7 +97,7 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
         given["start"],
         commands,
         environment,
-        step=step,
+        step=step * slow,
         num_steps=round(8 / step),
         method=method,
         memory=memory,
@@ -100,9 +106,11 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
 
 
 def smooth(vessel: Vessel) -> Vessel:
-    """The lag without its rate limit, which is a kink that no order survives."""
-    limits = {path: 1e3 for path in vessel.parameters if path.endswith(".rate")}
-    return vessel.with_values({"wind.off": True, **limits})
+    """The lag without its rate limit, a kink that no order survives, and not shorter than a step resolves."""
+    lags = {path: value for path, value in vessel.parameters.items() if ".actuator." in path}
+    limits = {path: 1e3 if path.endswith(".rate") else max(value, 1.0) for path, value in lags.items()}
+    calm = {"wind.off": True} if "wind" in vessel.document else {}
+    return vessel.with_values({**calm, **limits})
 
 
 @pytest.mark.parametrize(("method", "order", "step"), [("euler", 1, 0.25), ("rk4", 4, 1.0)])
@@ -223,7 +231,9 @@ def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
 @pytest.mark.parametrize("group", ["start", "commands", "environment"])
 def test_a_missing_channel_is_named(bundled_vessel: Vessel, draw_inputs: Draw, group: str) -> None:
     given = draw_inputs(bundled_vessel, 2)
-    name = {"start": "psi", "commands": "port.alpha", "environment": "beta_w"}[group]
+    if not given[group]:
+        pytest.skip("needs none")
+    name = {"start": "psi", "commands": list(given["commands"])[-1], "environment": "beta_w"}[group]
     given[group][name + "_"] = given[group].pop(name)
     with pytest.raises(DataError, match=f"{name!r} is needed .* did you mean '{name}_'") as caught:
         rollout(bundled_vessel, **given, step=1.0, num_steps=2)

@@ -39,7 +39,7 @@ def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
 
 def mass_matrix(vessel: Vessel) -> np.ndarray:
     inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
-    added = {k: v for k, v in vessel.document["added_mass"].items() if k != "source"}
+    added = {k: v for k, v in vessel.document["added_mass"].items() if k not in ("source", "coriolis")}
     M = np.array(ca.evalf(ca.densify(rigid_body(**inertia) + added_mass(**added))))
     return M[np.ix_(vessel.axes, vessel.axes)]
 

@@ -20,6 +20,7 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
     source = term.components or term.drawn
     if source is not None:
         given |= set(source(**dict.fromkeys(structural(term), 3)))
+    given |= set(SIGNALS.given)
     if term.rates is not None:
         assert term.states is not None
         assert set(signals(term.rates)) <= given
@@ -36,7 +37,7 @@ def test_parameters_are_read_off_the_signature() -> None:
 
 
 def test_kinds_of_a_group() -> None:
-    assert kinds("thruster") == ["azimuth", "tunnel"]
+    assert kinds("thruster") == ["azimuth", "tunnel", "propeller", "service_speed", "rudder", "rudder_derivatives"]
     assert kinds("wind") == ["table", "blendermann"]
     assert kinds("rocket") == []
 
@@ -75,8 +76,9 @@ def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
     document = load_vessel(name).document
     assert _unknown(schema, schema, document, "") == []
     assert set(schema["required"]) <= set(document)
-    spoilt = {**document, "thruster": {"port": {**document["thruster"]["port"], "D": 1.0}}}
-    assert _unknown(schema, schema, spoilt, "") == [".thruster.port.D"]
+    thruster, block = next(iter(document["thruster"].items()))
+    spoilt = {**document, "thruster": {thruster: {**block, "D": 1.0}}}
+    assert _unknown(schema, schema, spoilt, "") == [f".thruster.{thruster}.D"]
 
 
 def test_json_schema_carries_units() -> None:

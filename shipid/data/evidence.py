@@ -1,0 +1,277 @@
+"""Kinematic tests on columns of unknown meaning: which of them fit together, in which unit, frame and sign.
+
+All tests compare changes over windows of a few seconds with integrals over the same windows, so that noise and
+resampling matter little. The plane is complex: north + i east, and a body vector turns by exp(i psi).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array, cumulative_integral
+
+Complex = NDArray[np.complex128]
+GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
+WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
+FALSE_STEP = np.radians(20.0)  # of a heading between two rows
+FEW = 30  # values: fewer may be round by chance
+NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Index of the first and last row of every window, (W,)."""
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+
+    def change(self, values: NDArray[np.generic]) -> Complex:
+        """Value at the end less value at the start."""
+        plane = np.asarray(values, dtype=np.complex128)
+        return np.asarray(plane[self.last] - plane[self.first])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Seen changes explained by a scale times integrated ones: scale, its standard error, share left unexplained."""
+
+    scale: float
+    error: float
+    left: float
+
+
+def windows(t: Array, duration: float = WINDOW) -> Windows:
+    """Windows of about `duration` [s] without a hole in them: at least `STEPS` rows, at most a fifth of the log."""
+    usual = float(np.median(np.diff(t)))
+    duration = max(STEPS * usual, min(duration, (t[-1] - t[0]) / 5))
+    first = np.arange(len(t))
+    last = np.searchsorted(t, t + duration)
+    inside = last < len(t)
+    first, last = first[inside], last[inside]
+    holes = np.append(0, np.cumsum(np.diff(t) > GAP * usual))
+    whole = (holes[last] == holes[first]) & (last - first >= STEPS)
+    first, last = first[whole], last[whole]
+    thin = max(1, len(first) // MOST)
+    return Windows(first[::thin], last[::thin])
+
+
+def integral(t: Array, rate: NDArray[np.generic]) -> Complex:
+    """Integral of a real or complex rate (N,) from t[0] on."""
+    return cumulative_integral(t, np.real(rate)) + 1j * cumulative_integral(t, np.imag(rate))
+
+
+def fit(seen: Complex, integrated: Complex) -> Fit:
+    """Least squares with one real scale; the error from the scatter of the scale between twenty parts of the log."""
+    power = float(np.sum(np.abs(integrated) ** 2))
+    total = float(np.sum(np.abs(seen) ** 2))
+    if power <= 0.0 or total <= 0.0:
+        return Fit(0.0, np.inf, 1.0)
+    scale = float(np.real(np.vdot(integrated, seen))) / power
+    parts = [
+        slice(a, b) for a, b in zip(*(np.linspace(0, len(seen), 21).astype(int)[i:] for i in (0, 1)), strict=False)
+    ]
+    powers = [float(np.sum(np.abs(integrated[part]) ** 2)) for part in parts]
+    scales = [
+        float(np.real(np.vdot(integrated[part], seen[part]))) / size
+        for part, size in zip(parts, powers, strict=True)
+        if size > 0.01 * power / 20
+    ]
+    error = 1.25 * float(np.std(scales)) / np.sqrt(len(scales)) if len(scales) > 2 else np.inf
+    return Fit(scale, error, float(np.sum(np.abs(seen - scale * integrated) ** 2)) / total)
+
+
+def robust(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
+    """Windows whose unexplained change is no outlier: spikes and jumps of a position are told apart from all else."""
+    scale = fit(seen, integrated).scale
+    miss = np.abs(seen - scale * integrated)
+    return np.asarray(miss <= 6.0 * np.median(miss) + 1e-9)
+
+
+def agreement(track: Complex, psi: Array) -> complex:
+    """Mean of exp(i (course - psi)) over windows, those with little way weighing less."""
+    turned = track * np.exp(-1j * psi)
+    size = float(np.sum(np.abs(turned)))
+    return complex(np.sum(turned)) / size if size > 0 else 0j
+
+
+def heal(values: Array, turn: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Unwrap an angle that jumps at a whole turn; false samples between, if any, are replaced and told.
+
+    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn.
+    """
+    signed = np.diff(values) / turn
+    steps = np.abs(signed)
+    ordinary = np.percentile(steps, 90) if len(steps) else 0.0
+    large = steps > max(FALSE_STEP / (2 * np.pi), 5 * ordinary)
+    between = large & (steps < 1.0 - max(FALSE_STEP / (2 * np.pi), 5 * ordinary))
+    # the steps through false samples add up to about a whole turn; those of a spike to nothing
+    near = np.abs(np.convolve(signed, np.ones(NEIGHBOURS), "same")) if len(signed) > NEIGHBOURS else steps
+    false = between & (near > NEAR_TURN)
+    dropped = np.append(false, False) | np.insert(false, 0, False)
+    known = ~dropped & np.isfinite(values)
+    index = np.arange(len(values))
+    if known.sum() < 2:
+        return values, false
+    return np.interp(index, index[known], np.unwrap(values[known], period=turn)), false
+
+
+def shift(t: Array, seen: NDArray[np.generic], integrated: NDArray[np.generic], longest: float) -> tuple[float, float]:
+    """Seconds by which `seen` comes later than what it integrates, and the share of the misfit that this explains."""
+    usual = float(np.median(np.diff(t)))
+    chosen = windows(t)
+    inside = (t[chosen.first] > t[0] + longest) & (t[chosen.last] < t[-1] - longest)
+    chosen = Windows(chosen.first[inside], chosen.last[inside])
+    if len(chosen.first) < 20:
+        return 0.0, 0.0
+    change = chosen.change(seen)
+    delays = np.arange(-longest, longest + usual / 2, max(usual / 2, longest / 40))
+    left = []
+    for delay in delays:
+        moved = _at(t, integrated, t[chosen.last] - delay) - _at(t, integrated, t[chosen.first] - delay)
+        keep = robust(change, moved)
+        left.append(float(np.mean(np.abs(change[keep] - fit(change[keep], moved[keep]).scale * moved[keep]) ** 2)))
+    best, none = int(np.argmin(left)), int(np.argmin(np.abs(delays)))
+    return float(delays[best]), 1.0 - left[best] / left[none] if left[none] > 0 else 0.0
+
+
+def _at(t: Array, values: NDArray[np.generic], instants: Array) -> Complex:
+    real, imaginary = (np.interp(instants, t, part) for part in (np.real(values), np.imag(values)))
+    return np.asarray(real + 1j * imaginary, dtype=complex)
+
+
+def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
+    """Arm x + i y [m] of the position's point off that of the velocities, its error, and the share of misfit explained.
+
+    Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
+    """
+    power = float(np.sum(np.abs(turned) ** 2))
+    if power < 1e-3 * len(turned):
+        return 0j, np.inf, 0.0
+    parts = np.array_split(np.arange(len(seen)), 10)
+    whole = np.vdot(turned, seen - integrated) / power
+    found = [
+        np.vdot(turned[part], (seen - integrated)[part]) / np.sum(np.abs(turned[part]) ** 2)
+        for part in parts
+        if np.sum(np.abs(turned[part]) ** 2) > 0.02 * power / 10
+    ]
+    error = 1.25 * float(np.std(found)) / np.sqrt(len(found)) if len(found) > 3 else np.inf
+    explained = abs(whole) ** 2 * power / max(float(np.sum(np.abs(seen - integrated) ** 2)), 1e-30)
+    return complex(whole), error, float(explained)
+
+
+def effect(t: Array, r: Array, order: Array) -> float:
+    """How surely an order turns the ship to starboard: t value of a in r' = a order + b r + c."""
+    chosen = windows(t, 4.0)
+    thin = max(1, len(chosen.first) // 400)
+    chosen = Windows(chosen.first[::thin], chosen.last[::thin])
+    if len(chosen.first) < 12 or np.ptp(order) == 0.0:
+        return 0.0
+    columns = [chosen.change(x).real for x in (cumulative_integral(t, order), cumulative_integral(t, r), t)]
+    design, change = np.stack(columns, axis=1), chosen.change(r).real
+    sizes = np.linalg.norm(design, axis=0)
+    if not np.all(sizes > 0):
+        return 0.0
+    solution, _, rank, _ = np.linalg.lstsq(design / sizes, change, rcond=None)
+    if rank < design.shape[1]:
+        return 0.0
+    rest = change - design / sizes @ solution
+    spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * float(rest @ rest) / max(1, len(rest) - 3)
+    return float(solution[0] / np.sqrt(spread[0, 0])) if spread[0, 0] > 0 else 0.0
+
+
+def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
+    """Where a position leaves its integrated velocity at once: (start, end [s], how far it stays away [m])."""
+    usual = float(np.median(np.diff(t)))
+    reach = max(1, round(2.0 / usual))
+    if len(t) < 20 * reach:
+        return []
+    drift = position - integrated
+    miss = np.abs(drift[reach:] - drift[:-reach])
+    limit = max(5.0 * float(np.percentile(miss, 98)), 2.0 * usual)
+    holes = np.append(0, np.cumsum(np.diff(t) > GAP * usual))
+    wild = (miss > limit) & (holes[reach:] == holes[:-reach])
+    if not wild.any() or wild.mean() > 0.05:
+        return []
+    edges = np.flatnonzero(wild)
+    groups = np.split(edges, np.flatnonzero(np.diff(edges) > 2 * reach) + 1)
+    found = []
+    for group in groups:
+        start, end = max(0, group[0] - 1), min(len(t) - 1, group[-1] + reach + 1)
+        around = 3 * reach
+        before, after = drift[max(0, start - around) : start + 1], drift[end : end + around + 1]
+        stays = abs(_middle(after) - _middle(before))
+        found.append((float(t[start]), float(t[end]), float(stays)))
+    return found
+
+
+def _middle(points: Complex) -> complex:
+    return complex(np.median(points.real), np.median(points.imag))
+
+
+def straight(r: Array, t: Array) -> NDArray[np.bool_]:
+    """Rows in the straightest runs: hardly any turn for half a minute."""
+    usual = float(np.median(np.diff(t)))
+    width = max(3, round(30.0 / usual))
+    calm = pd.Series(np.abs(r)).rolling(width, center=True, min_periods=width // 2).max().to_numpy()
+    return np.asarray(calm < max(np.radians(0.3), 0.1 * float(np.percentile(np.abs(r), 95))))
+
+
+def visits(values: Array) -> int:
+    """How often a signal comes to its largest value."""
+    top = values == values.max()
+    return int(np.sum(np.diff(top.astype(int)) == 1))
+
+
+def between_rows(values: Array) -> float:
+    """Share of rows that lie exactly on the line between their neighbours, of those where anything changes."""
+    first, second = np.diff(values), np.diff(values, 2)
+    moving = (first[1:] != 0.0) & (first[:-1] != 0.0)
+    quantum = np.min(np.abs(first[first != 0.0])) if np.any(first != 0.0) else 0.0
+    scale = float(np.ptp(values))
+    if moving.sum() < 50 or quantum > 1e-5 * scale:  # rounded values lie on lines by chance
+        return 0.0
+    return float(np.mean(np.abs(second[moving]) < 1e-9 * scale))
+
+
+def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
+    """Multiplier in [low, high] that makes values round: (it, how well from 0 to 1, from how many values).
+
+    Instruments round, and the rounding survives a conversion: R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x
+    are whole multiples of the quantum, and about N^-1/2 else. Only values that stand still for two rows are asked,
+    which no later interpolation has made; if there are few, all.
+    """
+    still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
+    asked = still if len(still) >= FEW else np.unique(values)[:400]
+    if len(asked) < FEW or _roundness(asked, np.ones(1), 1e-4)[0] > 0.8:  # round as they stand: nothing was converted
+        return 0.0, 0.0, len(asked)
+    for quantum in (0.1, 0.01):
+        if low * float(np.ptp(asked)) < 20 * quantum:
+            continue  # too few multiples to be missed
+        step = quantum / 8 / float(np.abs(asked).max())
+        multipliers = np.arange(low, high, step)
+        best = multipliers[np.argmax(_roundness(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
+        finer = best + np.linspace(-step, step, 101)
+        sizes = _roundness(asked, finer, quantum)
+        if sizes.max() > 0.8:
+            return float(finer[np.argmax(sizes)]), float(sizes.max()), len(asked)
+    return 0.0, 0.0, len(asked)
+
+
+def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
+    """R for every multiplier, (K,)."""
+    phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
+    return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
+
+
+def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
+    """Columns with missing values interpolated; good enough for tests."""
+    result = {}
+    for name, values in columns:
+        known = np.isfinite(values)
+        result[name] = np.interp(t, t[known], values[known]) if known.any() else values
+    return result

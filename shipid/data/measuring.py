@@ -1,0 +1,68 @@
+"""Manoeuvre measures of the runs of a dataset."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pandas as pd
+
+from shipid.data.dataset import Dataset, pieces
+from shipid.errors import DataError, choices
+from shipid.measures import MEASURES
+from shipid.measures.criteria import criteria
+from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.rows import criterion_rows, measure_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Tables of a dataset's manoeuvres, one row each: `run`, `kind`, and the rows of `shipid.measures.rows`.
+
+    left : runs that are no standard manoeuvre, with a sentence why.
+    """
+
+    measures: pd.DataFrame
+    criteria: pd.DataFrame
+    left: dict[str, str]
+
+
+def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | None = None) -> Measured:
+    """Measure every run; a run with breaks is measured in its unbroken pieces, named `run/1`, `run/2`, ...
+
+    Parameters
+    ----------
+    kind : of all runs, a key of `MEASURES`; default: what is recognised.
+    length : of the ship between perpendiculars [m]; without it nothing is judged by ship lengths.
+
+    Raises
+    ------
+    DataError : an unknown kind, a length that is not positive.
+    """
+    if kind is not None and kind not in MEASURES:
+        raise DataError(f"no manoeuvre is called {kind!r}: {choices(kind, MEASURES)}", path="--manoeuvre")
+    if length is not None and not length > 0:
+        raise DataError(f"a length of {length:g} m is none: it must be positive", path="--length")
+    measures, judged, left = [], [], {}
+    for name, rows in _named(dataset):
+        if len(rows) < 2:
+            left[name] = "it has one row"
+            continue
+        record = record_of({str(column): rows[column].to_numpy() for column in rows if column != "run"})
+        kinds, why = kinds_of(record) if kind is None else ((kind,), "")
+        if not kinds:
+            left[name] = why
+        for seen in kinds:
+            found = MEASURES[seen](record)
+            measures += [{"run": name, "kind": seen, **row} for row in measure_rows(found, length)]
+            judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, found, length))]
+    return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)
+
+
+def _named(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
+    found = list(pieces(dataset))
+    count, number = Counter(name for name, _ in found), Counter[str]()
+    for name, rows in found:
+        number[name] += 1
+        yield (name if count[name] == 1 else f"{name}/{number[name]}"), rows

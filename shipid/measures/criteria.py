@@ -1,0 +1,117 @@
+"""IMO criteria of ship manoeuvrability: resolution MSC.137(76), annex, 5.3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipid.measures.record import DEGREE, Measures
+
+SOURCE = "IMO MSC.137(76)"
+SHORTEST = 100.0  # m: length from which the standards apply
+SAME = 0.5 * DEGREE  # under which an angle is the one that a test asks for
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One criterion beside what was measured.
+
+    Parameters
+    ----------
+    name : what is judged, and its paragraph.
+    value, limit, unit : greatest value allowed, in ship lengths ("L") or rad.
+    met : None where the value is missing or the manoeuvre is not the one that the criterion is about.
+    note : why it is not judged, or what is to be known.
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    met: bool | None
+    note: str = ""
+
+
+def criteria(kind: str, measures: Measures, length: float | None) -> list[Criterion]:
+    """Judge a manoeuvre of a ship of a length between perpendiculars [m]; empty for kinds without a criterion.
+
+    The test speed (90 % of that at 85 % of the greatest engine power, or more), full load, deep calm water (5.2) and a
+    logged point at midships are for the user to see to.
+    """
+    if kind == "turning":
+        return list(_turning(measures, length))
+    if kind == "zigzag":
+        return list(_zigzag(measures, length))
+    if kind == "stop":
+        track = _lengths(measures, "track_reach", length)
+        found = _judged("stopping ability: track reach (5.3.4)", track, 15.0, "L", measures["track_reach"].why, length)
+        note = "; ".join(filter(None, [found.note, "up to 20 L where a large displacement makes 15 L impracticable"]))
+        return [Criterion(found.name, found.value, 15.0, "L", found.met, note if found.met is False else found.note)]
+    return []
+
+
+def _turning(measures: Measures, length: float | None) -> Iterator[Criterion]:
+    over = _wrong(measures, {"helm": 35.0})
+    note = f"{over}; the test asks for that, or for the greatest helm allowed at the test speed" if over else ""
+    for name, limit in (("advance", 4.5), ("tactical_diameter", 5.0)):
+        label = f"turning ability: {name.replace('_', ' ')} (5.3.1)"
+        missing = measures[name].why
+        yield _judged(label, _lengths(measures, name, length), limit, "L", missing, length, note)
+
+
+def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
+    small = _wrong(measures, {"helm": 10.0, "execute_heading": 10.0})
+    large = _wrong(measures, {"helm": 20.0, "execute_heading": 20.0})
+    if not large:
+        found = measures["overshoot_1"]
+        yield _judged(
+            "yaw checking: 20/20 first overshoot (5.3.3.3)", found.value, 25 * DEGREE, "rad", found.why, length
+        )
+    if small:
+        return
+    travelled = _lengths(measures, "initial_turning", length)
+    label = "initial turning ability: track to 10 deg (5.3.2)"
+    yield _judged(label, travelled, 2.5, "L", measures["initial_turning"].why, length)
+    speed = measures["approach_speed"].value
+    ratio = length / speed if length and speed > 0 else float("nan")
+    for number, paragraph, limit in ((1, "5.3.3.1", first_limit(ratio)), (2, "5.3.3.2", second_limit(ratio))):
+        found = measures[f"overshoot_{number}"]
+        ordinal = "first" if number == 1 else "second"
+        label = f"yaw checking: 10/10 {ordinal} overshoot ({paragraph})"
+        yield _judged(label, found.value, limit, "rad", found.why, length)
+
+
+def first_limit(ratio: float) -> float:
+    """Greatest first overshoot [rad] of a 10/10 zigzag for L/V [s]."""
+    return float(np.clip(5 + ratio / 2, 10, 20)) * DEGREE
+
+
+def second_limit(ratio: float) -> float:
+    """Greatest second overshoot [rad] of a 10/10 zigzag for L/V [s]."""
+    return float(np.clip(17.5 + 0.75 * ratio, 25, 40)) * DEGREE
+
+
+def _lengths(measures: Measures, name: str, length: float | None) -> float:
+    return measures[name].value / length if length else float("nan")
+
+
+def _wrong(measures: Measures, asked: dict[str, float]) -> str:
+    """What differs from the angles [deg] that a test asks for; empty if nothing does."""
+    said = {name: (measures[name].value / DEGREE, angle) for name, angle in asked.items()}
+    return ", ".join(
+        f"{name.replace('_', ' ')} is {value:.1f} deg, not {angle:g}"
+        for name, (value, angle) in said.items()
+        if not abs(value - angle) <= SAME / DEGREE
+    )
+
+
+def _judged(
+    name: str, value: float, limit: float, unit: str, missing: str, length: float | None, note: str = ""
+) -> Criterion:
+    if not np.isfinite(value) or not np.isfinite(limit):
+        why = missing or "the length of the ship is not known"
+        return Criterion(name, value, limit, unit, None, why)
+    short = f"the standards are for ships of {SHORTEST:g} m and more" if length and length < SHORTEST else ""
+    return Criterion(name, value, limit, unit, None if note else value <= limit, "; ".join(filter(None, [note, short])))

@@ -1,0 +1,93 @@
+"""From the columns of a run to a record, and which standard manoeuvre it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from shipid.errors import DataError
+from shipid.measures.record import DEGREE, Array, Record, helm_over, plateaus, released
+from shipid.measures.turning import MIDSHIPS
+from shipid.measures.zigzag import last_over
+
+STATES = ("t", "north", "east", "psi", "u", "v", "r")
+LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
+MANY, APART = 5, 2 * DEGREE  # levels of helm that make a spiral, and how far they are apart
+MOSTLY = 0.7  # of the time that a zigzag's helm is over, to either side
+AMIDSHIPS = 0.2  # of the time of the turn that a pull-out's helm is amidships
+STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
+
+
+def record_of(columns: Mapping[str, Array]) -> Record:
+    """Record of one run from the columns of a dataset.
+
+    The helm is the mean of the angle commands that move, each with the sign that turned the ship to starboard: that of
+    the integral of helm over yaw rate. The shaft is the mean of the speeds that run at first.
+
+    Raises
+    ------
+    DataError : a column is missing.
+    """
+    missing = next((name for name in STATES if name not in columns), None)
+    if missing is not None:
+        raise DataError("missing column", path=missing)
+    states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
+    angles = [np.asarray(values, dtype=float) for values in _commands(columns, (".delta", ".alpha"))]
+    shafts = [np.asarray(values, dtype=float) for values in _commands(columns, (".n",))]
+    helms = [sign * angle for angle in angles if (sign := _sense(angle, states["r"]))]
+    running = [shaft for shaft in shafts if shaft[0] != 0]
+    return Record(
+        **states,
+        helm=np.mean(helms, axis=0) if helms else np.zeros(len(states["t"])),
+        shaft=np.mean(running, axis=0) if running else None,
+    )
+
+
+def _commands(columns: Mapping[str, Array], endings: tuple[str, ...]) -> list[Array]:
+    return [values for name, values in columns.items() if name.count(".") == 1 and name.endswith(endings)]
+
+
+def _sense(angle: Array, r: Array) -> float:
+    """+1 or -1, the sign with which an angle turns the ship to starboard; 0 for one that does nothing."""
+    return float(np.sign(angle[:-1] @ np.diff(r)))
+
+
+def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
+    """Kinds of manoeuvre that a run is, keys of `MEASURES`; where it is none, a sentence why.
+
+    A stop: the shaft turns from ahead to astern. Else by the helm, from where it is first put over, to a ship that goes
+    straight. Zigzag: over to either side in turn, at least once reversed, while the ship turns by less than 90 deg.
+    Turning: over to one side through 90 deg or more. Pull-out as well: then amidships for a fifth of the time of the
+    turn, or more. A helm of many levels is some spiral, and the user has to say which.
+    """
+    shaft, over = record.shaft, helm_over(record)
+    if shaft is not None and shaft[0] > 0 > shaft.min():
+        return ("stop",), ""
+    if over.angle < LEAST_HELM:
+        return (), f"the helm moves by less than {LEAST_HELM / DEGREE:g} deg, and the shafts are not reversed"
+    straight = abs(float(np.interp(over.start, record.t, record.r))) <= STRAIGHT * np.abs(record.r).max()
+    share = over.side * record.helm / over.angle
+    last = last_over(record, over) + 1
+    off = np.abs(record.psi - record.psi[over.row])
+    within = slice(over.row, last)
+    if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN:
+        both = float((np.abs(share[within]) >= 0.5).mean())
+        few = f"the helm is over to either side for {both:.0%} of the time only"
+        return (("zigzag",), "") if both >= MOSTLY else ((), few)
+    levels = {round(float(record.helm[b]) / APART) for _, b in plateaus(record.t, record.helm, APART / 4)}
+    if len(levels) >= MANY:
+        return (), f"the helm is held at {len(levels)} levels: say whether it is a spiral or a reverse-spiral"
+    if not straight:
+        return (), "the ship turns already where the helm is first put over"
+    row = released(record, over)
+    if off[: row + 1][-1] < LEAST_TURN:
+        return (), "the helm is let go before the ship has turned by 90 deg"
+    turn, rest = record.t[row - 1] - record.t[over.row], np.abs(share[row:]) < MIDSHIPS
+    amidships = row + np.flatnonzero(rest)
+    if not len(amidships):
+        return ("turning",), ""
+    moved = np.flatnonzero(~rest[amidships[0] - row :])
+    end = amidships[0] + int(moved[0]) - 1 if len(moved) else len(record.t) - 1
+    long = record.t[end] - record.t[amidships[0]] >= AMIDSHIPS * turn
+    return (("turning", "pull-out") if long else ("turning",)), ""

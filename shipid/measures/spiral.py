@@ -1,0 +1,98 @@
+"""Direct (Dieudonne) and reverse (Bech) spiral: yaw rate over helm, and the loop of an unstable ship."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipid.measures.record import DEGREE, Array, Measures, Record, mean, plateaus, settled
+
+LEVEL_HELM = 0.5 * DEGREE  # under which two helm angles are one level
+LEVEL_RATE = 0.05  # of the greatest rate, under which two rates are one level
+NAN = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Steady points of a spiral in the order sailed: helm (K,) [rad] and yaw rate (K,) [rad/s].
+
+    skipped : levels that were not steady.
+    """
+
+    helm: Array
+    rate: Array
+    skipped: int
+
+
+def levels(record: Record) -> Levels:
+    """Helm levels of a direct spiral with the yaw rate over the last quarter of each, where that has settled."""
+    t, most = record.t, float(np.abs(record.r).max())
+    helm, rate = [], []
+    stretches = plateaus(t, record.helm, LEVEL_HELM)
+    for first, last in stretches:
+        found = settled(t, record.r, float(t[first]), float(t[last]), most)
+        if np.isfinite(found):
+            helm.append(float(np.median(record.helm[first : last + 1])))
+            rate.append(found)
+    return Levels(np.array(helm), np.array(rate), len(stretches) - len(helm))
+
+
+def rate_levels(record: Record) -> Levels:
+    """Yaw rate levels of a reverse spiral with the mean helm over the last quarter of each."""
+    t, most = record.t, float(np.abs(record.r).max())
+    stretches = [(float(t[a]), float(t[b])) for a, b in plateaus(t, record.r, LEVEL_RATE * most)] if most else []
+    means = [[mean(t, values, b - (b - a) / 4, b) for a, b in stretches] for values in (record.helm, record.r)]
+    return Levels(np.array(means[0]), np.array(means[1]), 0)
+
+
+def spiral(record: Record) -> Measures:
+    """Measures of a direct spiral from one side to the other and back.
+
+    Returns
+    -------
+    Measures : `neutral_helm`, mean of the helm at which the rate changes sign on the two ways; `loop_width`, the helm
+        by which these differ [rad]; `loop_height`, the difference of the rates at helm 0 [rad/s]. Both are 0 for a
+        stable ship, and no finer than the levels are apart. `levels` and `levels_not_steady`: counts.
+    """
+    found, points = Measures(), levels(record)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(points.helm))) != 0) + 1
+    corner = int(turns[0]) if len(turns) else 0
+    ways = [(points.helm[: corner + 1], points.rate[: corner + 1]), (points.helm[corner:], points.rate[corner:])]
+    zero = [_at_zero(rate, helm) for helm, rate in ways] if corner else [NAN, NAN]
+    flat = [_at_zero(helm, rate) for helm, rate in ways] if corner else [NAN, NAN]
+    why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
+    found.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
+    found.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
+    found.add("loop_height", abs(flat[1] - flat[0]), "rad/s", "the helm does not pass 0 on both ways")
+    found.add("levels", len(points.helm), "-", "")
+    found.add("levels_not_steady", points.skipped, "-", "")
+    return found
+
+
+def _at_zero(x: Array, y: Array) -> float:
+    """Value y where x first changes sign, linear between points; NaN if it does not."""
+    for i in range(len(x) - 1):
+        if x[i] == 0 or x[i] * x[i + 1] < 0:
+            return float(y[i] if x[i] == 0 else y[i] - x[i] * (y[i + 1] - y[i]) / (x[i + 1] - x[i]))
+    return float(y[-1]) if len(x) and x[-1] == 0 else NAN
+
+
+def reverse_spiral(record: Record) -> Measures:
+    """Measures of a reverse spiral, whose helm over rate falls between the folds of an unstable ship.
+
+    Returns
+    -------
+    Measures : `neutral_helm` at rate 0; `loop_width`, the most that the helm falls while the rate rises [rad], 0 for a
+        stable ship; `levels`: their count.
+    """
+    found, points = Measures(), rate_levels(record)
+    order = np.argsort(points.rate)
+    helm, rate = points.helm[order], points.rate[order]
+    both = len(rate) >= 3 and rate[0] < 0 < rate[-1]
+    why = "there are no three steady rates to both sides"
+    found.add("neutral_helm", float(np.interp(0.0, rate, helm)) if both else NAN, "rad", why)
+    width = float((np.maximum.accumulate(helm) - helm).max()) if both else NAN
+    found.add("loop_width", width, "rad", why)
+    found.add("levels", len(rate), "-", "")
+    return found

@@ -1,0 +1,39 @@
+"""The crash stop (MSC.137(76); MSC/Circ.1053)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.measures.record import Measures, Record, crossing, departure, integral, value_at
+
+NAN = float("nan")
+
+
+def stop(record: Record) -> Measures:
+    """Measures of a stop, from the order astern until the ship no longer moves ahead.
+
+    Returns
+    -------
+    Measures : `execute`, instant of the order [s]; `approach_speed` [m/s]; `stopping_time` [s]; `track_reach` along the
+        path, `head_reach` along the heading at the order, `lateral_deviation` to starboard of it [m]; `heading_change`
+        [rad], > 0 to starboard.
+    """
+    t, found, why = record.t, Measures(), "the shaft is not ordered to stop or astern"
+    astern = np.flatnonzero(record.shaft <= 0) if record.shaft is not None else np.empty(0, dtype=int)
+    start = NAN
+    if record.shaft is not None and len(astern):
+        start = departure(t, record.shaft, int(astern[0])) if astern[0] else float(t[0])
+    ahead, aside = record.along(start)
+    end = crossing(t, record.u, 0.0, start, rising=False)
+    found.add("execute", start, "s", why)
+    if np.isfinite(start):
+        found.add("approach_speed", float(np.interp(start, t, record.speed)), "m/s", why)
+        why = "the ship still moves ahead when the log ends"
+    else:
+        found.add("approach_speed", NAN, "m/s", why)
+    found.add("stopping_time", end - start, "s", why)
+    found.add("track_reach", integral(t, record.speed, start, end), "m", why)
+    found.add("head_reach", value_at(t, ahead, end), "m", why)
+    found.add("lateral_deviation", value_at(t, aside, end), "m", why)
+    found.add("heading_change", value_at(t, record.psi, end) - value_at(t, record.psi, start), "rad", why)
+    return found

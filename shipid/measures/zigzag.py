@@ -1,0 +1,133 @@
+"""The zigzag: overshoots, initial turning, time to check the yaw, period (MSC.137(76); ITTC 7.5-04-02-01)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from shipid.measures.record import (
+    DEGREE,
+    Array,
+    HelmOver,
+    Measures,
+    Record,
+    crossing,
+    extreme,
+    helm_over,
+    integral,
+    value_at,
+)
+
+ROUND = 5 * DEGREE  # execute headings are usually multiples of it
+MOST = 4  # overshoots that are measured: later ones repeat them
+NEAR = 1.5 * DEGREE  # how far from the execute heading a rudder may be seen to be reversed
+STILL = "the helm is never moved"
+
+
+def zigzag(record: Record, execute_heading: float | None = None, course: float | None = None) -> Measures:
+    """Measures of a zigzag.
+
+    The n-th execute after the first is where the heading passes the execute heading, whatever the rudder does by then;
+    the n-th overshoot is what the heading goes beyond it before it turns back. The zigzag ends where the helm is let
+    go for longer than it was ever over.
+
+    Parameters
+    ----------
+    execute_heading : off the course [rad]; default: at which the helm is seen to be reversed.
+    course : of the approach [rad]; default: the heading at the first execute.
+
+    Returns
+    -------
+    Measures : `execute`, instant of the first one [s]; `helm`, `execute_heading` [rad]; `approach_speed` [m/s];
+        `initial_turning` (track from first to second execute [m]) and `initial_turning_time` [s]; `overshoot_1` to at
+        most `overshoot_4` [rad] and `time_to_check_1`, ... [s] after the execute; `reach` (from the first execute until
+        back on course) [s]; `period` (second to fourth execute) [s]; `speed_loss` (greatest until the third execute, as
+        a share of the approach speed).
+    """
+    over, found = helm_over(record), Measures()
+    start, helm = over.start, over.angle
+    record = record.upto(last_over(record, over) + 1)
+    t = record.t
+    around = value_at(t, record.psi, start) if course is None else course
+    off = over.side * (record.psi - around)
+    angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
+    executes = _executes(t, off, angle, start)
+    before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else float("nan")
+    found.add("execute", start, "s", STILL)
+    found.add("helm", helm if helm else float("nan"), "rad", STILL)
+    found.add("execute_heading", angle, "rad", "the helm is never reversed")
+    found.add("approach_speed", before, "m/s", STILL)
+    second, third, fourth = (*executes, *[float("nan")] * 3)[:3]
+    missing = "the log ends before the {} execute".format
+    found.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
+    found.add("initial_turning_time", second - start, "s", missing("second"))
+    for number, (moment, until) in enumerate(_legs(executes, float(t[-1])), start=1):
+        sense = 1.0 if number % 2 else -1.0
+        turned, peak = extreme(t, sense * off, moment, until)
+        why = "the log ends before the heading turns back" if np.isfinite(moment) else missing("next")
+        found.add(f"overshoot_{number}", peak - angle, "rad", why)
+        found.add(f"time_to_check_{number}", turned - moment, "s", why)
+    back = crossing(t, off, 0.0, second, rising=False) if np.isfinite(second) else float("nan")
+    found.add("reach", back - start, "s", "the log ends before the ship is back on her course")
+    found.add("period", fourth - second, "s", missing("fourth"))
+    slowest = float("nan")
+    if np.isfinite(third):
+        slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
+    found.add("speed_loss", 1 - slowest / before if before else float("nan"), "-", missing("third"))
+    return found
+
+
+def last_over(record: Record, over: HelmOver) -> int:
+    """Row in which the helm of a zigzag is last over to a side: then it is let go for longer than it was ever over."""
+    rows = np.flatnonzero(np.abs(record.helm) >= over.angle / 2)
+    rows = rows[rows >= over.row] if over.angle else rows[-1:]
+    gaps = np.flatnonzero(np.diff(rows) > 1)
+    begins, ends = rows[np.append(0, gaps + 1)], rows[np.append(gaps, len(rows) - 1)]
+    longest = float((record.t[ends] - record.t[begins]).max())
+    long = np.flatnonzero(record.t[begins[1:]] - record.t[ends[:-1]] > longest)
+    return int(ends[long[0]] if len(long) else ends[-1])
+
+
+def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
+    """Instants [s] of the second, third, ... execute: the heading off the course passes +angle, -angle, +angle ..."""
+    found: list[float] = []
+    moment, sense = start, 1.0
+    while np.isfinite(moment) and np.isfinite(angle):
+        moment = crossing(t, sense * off, angle, moment)
+        if np.isfinite(moment):
+            found.append(moment)
+        sense = -sense
+    return found
+
+
+def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
+    """Each execute with the next one, or the end of the log; two at least, as the criteria ask for two overshoots."""
+    legs = list(pairwise([*executes, end]))[:MOST]
+    return legs + [(float("nan"), float("nan"))] * (2 - len(legs))
+
+
+def _seen(record: Record, off: Array, helm: float, start: float) -> float:
+    """Heading off the course [rad] at which the helm is reversed.
+
+    It lies about the last row with the old helm and the first with another, or, as helms are late, a little before:
+    the multiple of 5 deg there, else the last whole degree.
+    """
+    over = np.where(np.abs(record.helm) >= helm / 2, np.sign(record.helm), 0.0)
+    rows = np.flatnonzero((over != 0) & (record.t >= start))
+    pairs = [(a, b) for a, b in pairwise(rows) if over[a] != over[b]]
+    if not pairs:
+        return float("nan")
+    full = [_last_full(np.abs(record.helm[: a + 1]), helm) for a, _ in pairs]
+    low = float(np.median(np.abs(off[full])))
+    high = float(np.median([np.abs(off[row + 1]) for row in full]))
+    whole = round((low + high) / 2 / ROUND) * ROUND
+    if whole > 0 and low - NEAR <= whole <= high + NEAR:
+        return whole
+    return max(float(np.floor(high / DEGREE + 0.25)), 1.0) * DEGREE
+
+
+def _last_full(size: Array, helm: float) -> int:
+    """Last row in which the helm is fully over, of those up to the one before it passes half."""
+    full = np.flatnonzero(size >= 0.95 * helm)
+    return int(full[-1]) if len(full) else len(size) - 1

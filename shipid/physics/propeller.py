@@ -1,0 +1,119 @@
+"""Fixed-pitch propellers: behind a hull (MMG), or as a shaft speed that belongs to a ship's speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import casadi as ca
+from casadi import SX
+
+from shipid.physics.frames import force_at, vector
+from shipid.physics.grammar import POSITIVE, THRUST
+from shipid.physics.hull import SPEED_FLOOR
+from shipid.physics.thruster import SHAFT_FLOOR, polynomial
+
+
+def drift(nu_r: SX) -> tuple[SX, SX]:
+    """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
+
+    Going ahead it is the MMG's; astern it is counted from the stern, so that it stays small.
+    """
+    square = nu_r[0] ** 2 + nu_r[1] ** 2
+    along = ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, ca.fabs(nu_r[0]))
+    return ca.sqrt(square + SPEED_FLOOR**2), ca.atan2(-nu_r[1], along)
+
+
+def inflow(nu_r: SX, x: SX, y: SX, w_P0: SX, C_1: SX, C_2_plus: SX, C_2_minus: SX) -> SX:
+    """u_P = (1 - w_P) u [m/s], the wake w_P changing with the drift beta_P at the propeller (MMG eqs. 16, 17).
+
+    (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1), beta_P = beta - x r / U.
+    """
+    U, beta = drift(nu_r)
+    beta_P = beta - x * nu_r[5] / U
+    C_2 = ca.if_else(beta_P >= 0, C_2_plus, C_2_minus)
+    change = 1 + (1 - ca.exp(-C_1 * ca.fabs(beta_P))) * (C_2 - 1)
+    return (1 - w_P0) * change * (nu_r[0] - nu_r[5] * y)
+
+
+def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX, J_max: SX) -> SX:
+    """K_T(J), J = u_P / (|n| D_p) turned when astern and kept within J_min..J_max."""
+    sense = ca.if_else(n >= 0, 1, -1)
+    J = sense * u_P / (ca.fmax(ca.fabs(n), SHAFT_FLOOR) * D_p)
+    return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), SX(1, 1), SX(1))
+
+
+def propeller(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    K_T: Annotated[Mapping[str, SX], THRUST],
+    J_min: Annotated[SX | float, "-"] = -1.0,
+    J_max: Annotated[SX | float, "-"] = 1.5,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    t_P: Annotated[SX, "-"],
+    w_P0: Annotated[SX, "-"],
+    C_1: Annotated[SX, "-"],
+    C_2_plus: Annotated[SX, "-"],
+    C_2_minus: Annotated[SX, "-"],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
+
+    n [rev/s]; wake w_P0 on a straight course, C_1, C_2 its change with drift (C_2_plus where beta_P > 0). Astern the
+    polynomial is read from the other side, times k_astern. Yasukawa and Yoshimura (2015).
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus)
+    sense = ca.if_else(n >= 0, 1, -k_astern)
+    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
+    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+
+
+def wash(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    K_T: Annotated[Mapping[str, SX], THRUST],
+    J_min: Annotated[SX | float, "-"] = -1.0,
+    J_max: Annotated[SX | float, "-"] = 1.5,
+    w_P0: Annotated[SX, "-"],
+    C_1: Annotated[SX, "-"],
+    C_2_plus: Annotated[SX, "-"],
+    C_2_minus: Annotated[SX, "-"],
+) -> SX:
+    """What a rudder behind it stands in, (3): inflow u_P [m/s], speed far down the race [m/s], D_p [m].
+
+    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)); no race astern.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus)
+    K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
+    race = ca.sqrt(ca.fmax(u_P**2 + 8 / ca.pi * K * (n * D_p) ** 2, 0) + SPEED_FLOOR**2)
+    return ca.vertcat(u_P, ca.if_else(n >= 0, race, u_P), D_p)
+
+
+def service_speed(
+    nu_r: SX,
+    n: SX,
+    *,
+    n_0: Annotated[SX, "s^-1", POSITIVE],
+    X_u: Annotated[SX, "prime"],
+    X_uu: Annotated[SX | float, "prime"] = 0.0,
+    X_uuu: Annotated[SX | float, "prime"] = 0.0,
+    L_pp: Annotated[SX, "m", POSITIVE],
+    U_0: Annotated[SX, "m s^-1", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of thrust less resistance about the speed U_0 n / n_0 that belongs to a shaft speed n [rev/s].
+
+    X = 1/2 rho L^2 U_0^2 (X_u d + X_uu d^2 + X_uuu d^3), d = u / U_0 - n / n_0 (Abkowitz 1964): an expansion about
+    steady running, from which nothing far off follows.
+    """
+    d = nu_r[0] / U_0 - n / n_0
+    return vector(rho / 2 * L_pp**2 * U_0**2 * d * (X_u + d * (X_uu + d * X_uuu)), 0, 0, 0, 0, 0)

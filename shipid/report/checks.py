@@ -1,0 +1,141 @@
+"""The checks of a log as one page: what failed and why, the tracks, and run by run what the checks compare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report import logs, tables
+from shipid.report.content import ReportContent, Sentence
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
+from shipid.report.page import Section, page, write
+from shipid.report.palette import category
+from shipid.report.tables import Cell, Table
+from shipid.report.wording import counted, listed
+
+POINTS = 600  # of one line: more than pixels are wide
+HEADING, RATE = 0, 1  # colours
+
+
+def write_checks(
+    file: Path,
+    name: str,
+    checks: pd.DataFrame,
+    series: pd.DataFrame,
+    tracks: pd.DataFrame,
+    repairs: pd.DataFrame,
+    provenance: Mapping[str, str],
+) -> Path:
+    """Write the page of a checked log, which makes no request; raises ResultError if the place cannot be written.
+
+    Parameters
+    ----------
+    checks : check, run, value, unit, limit, ok, sentence.
+    series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s].
+    tracks : run, set, north, east [m].
+    repairs : kind, column, count, note; may be empty.
+    provenance : label -> value.
+    """
+    content = ReportContent(
+        title="Is this log in order?",
+        name=name,
+        answer=_answer(checks),
+        findings=[],
+        cells=pd.DataFrame(),
+        naive={},
+        models=pd.DataFrame(),
+        tracks=tracks,
+        repairs=repairs,
+        provenance=provenance,
+    )
+    parts = [
+        Section("checks", "The checks", (_table(checks),)),
+        Section("motion", "What the checks compare", (_motion(series),)),
+        Section("data", "The data", (logs.manoeuvres(content), tables.repairs(content))),
+    ]
+    return write(page(content, [part for part in parts if any(part.items)], "data check"), file)
+
+
+def _answer(checks: pd.DataFrame) -> list[Sentence]:
+    failed = checks[~checks["ok"].astype(bool)]
+    runs = counted(checks["run"].nunique(), "run")
+    if failed.empty:
+        return [Sentence(f"All {counted(len(checks), 'check')} of {runs} passed.")]
+    kinds = [str(kind) for kind in pd.unique(failed["check"])]
+    return [
+        Sentence(f"{len(failed)} of {counted(len(checks), 'check')} failed, in {failed['run'].nunique()} of {runs}."),
+        Sentence(f"What failed: {listed(kinds, 8)}."),
+    ]
+
+
+def _table(checks: pd.DataFrame) -> Table:
+    """Every check, what failed first."""
+    ordered = checks.assign(ok=checks["ok"].astype(bool)).sort_values("ok", kind="stable")
+    rows = [
+        [
+            tables.text(row.run),
+            tables.text(row.check),
+            Cell("passed", "passed") if row.ok else Cell("failed", "failed", bad=True),
+            Cell(f"{float(str(row.value)):.3g} {row.unit}", float(str(row.value))),
+            Cell(f"{float(str(row.limit)):.3g}", float(str(row.limit))),
+            tables.text(row.sentence),
+        ]
+        for row in ordered.itertuples()
+    ]
+    headings = ["run", "check", "result", "value", "limit", "what it says"]
+    return Table("all-checks", "Every check", "", headings, [False, False, False, True, True, False], rows)
+
+
+def _motion(series: pd.DataFrame) -> Figure | None:
+    """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
+    runs = [str(run) for run in pd.unique(series["run"])]
+    if not runs:
+        return None
+    views = {str(index): _panels(series[series["run"] == run]) for index, run in enumerate(runs)}
+    worst = series.groupby("run")["drift"].max()
+    return Figure(
+        id="motion-figure",
+        title="Heading, yaw rate, position and velocity",
+        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {worst.max():.1f} m.",
+        how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
+        "start together every 30 s.",
+        alternative="Lines over time; the table above holds what the checks make of them.",
+        height=240,
+        views=views,
+        controls=[Control("run", runs)],
+        chips=[
+            Chip("psi", "rate of the heading", category(HEADING)),
+            Chip("r", "yaw rate r", category(RATE)),
+            Chip("drift", "position off integrated velocities", category(2)),
+            Chip("u", "u", category(3)),
+            Chip("v", "v", category(4)),
+        ],
+    )
+
+
+def _panels(rows: pd.DataFrame) -> list[Panel]:
+    thin = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, min(POINTS, len(rows))).astype(int))]
+    t = thin["t"].to_numpy() - float(rows["t"].iloc[0])  # single precision would not do for a clock since 1970
+    degrees = {name: np.degrees(thin[name].to_numpy()) for name in ("psi_rate", "r")}
+    rates = [
+        line(
+            "rate of the heading",
+            t,
+            degrees["psi_rate"],
+            ["psi"],
+            "deg/s",
+            line={"color": category(HEADING), "width": 1},
+        ),
+        line("yaw rate r", t, degrees["r"], ["r"], "deg/s", line={"color": category(RATE), "width": 1.5}),
+    ]
+    drift = [line("drift", t, thin["drift"].to_numpy(), ["drift"], line={"color": category(2), "width": 1.5})]
+    speeds = [
+        line(name, t, thin[name].to_numpy(), [name], "m/s", line={"color": category(colour), "width": 1.5})
+        for name, colour in (("u", 3), ("v", 4))
+    ]
+    shown = (("deg/s", rates), ("m", drift), ("m/s", speeds))
+    return [Panel(go.Figure(traces, layout(axis("time in the run [s]"), axis(f"[{unit}]")))) for unit, traces in shown]

@@ -1,0 +1,218 @@
+"""Standard manoeuvres by name, with lengths, speeds and steps that suit the vessel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shipid.errors import ShipidError, choices
+from shipid.simulation.approach import Controls, acceleration
+from shipid.simulation.manoeuvre import (
+    HELMS,
+    RATES,
+    CrashStop,
+    Manoeuvre,
+    PullOut,
+    ReverseSpiral,
+    Spiral,
+    TurningCircle,
+    Zigzag,
+)
+from shipid.simulation.truth import RPM
+from shipid.vessel.load import Vessel
+
+FROUDE, GRAVITY = 0.2, 9.81  # speed where none is asked for: U = 0.2 sqrt(g L)
+ROWS, STEPS = 50, 10  # rows of the log in the time that the ship takes for her length, steps a row
+HALVINGS, MOST_RPM = 60, 6000.0
+ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
+# in ship lengths at the speed of the approach: the log ahead of the execute, and what each kind takes
+LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A manoeuvre to be performed.
+
+    Parameters
+    ----------
+    kind, title : as measures are named, and in words.
+    speed, step, interval : of the approach [m/s], of the integration and between rows of the log [s].
+    """
+
+    kind: str
+    title: str
+    manoeuvre: Manoeuvre
+    speed: float
+    step: float
+    interval: float
+
+
+def standard(
+    vessel: Vessel,
+    name: str,
+    angles: Sequence[float] = (),
+    *,
+    speed: float | None = None,
+    side: str = "starboard",
+    duration: float | None = None,
+    step: float | None = None,
+) -> Standard:
+    """Declare a standard manoeuvre of a vessel.
+
+    Parameters
+    ----------
+    name : `zigzag`, `turning`, `pull-out`, `spiral`, `reverse-spiral`, `stop`.
+    angles : [deg] of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate [deg/s].
+    speed : of the approach [m/s]; default: Froude number 0.2.
+    duration : [s]; of a spiral, that each level is held. Default: what the ship takes for 60 of her lengths at that
+        speed, 30 for a zigzag, 40 for a level of a spiral, 80 for a stop.
+    step : of the integration [s]; default: about 1/500 of the time for one length. Ten steps make a row.
+
+    Raises
+    ------
+    ShipidError : an unknown name or side, angles that do not fit, no length, a speed that no shaft speed gives, a time
+        that is not positive.
+    """
+    if name not in KINDS:
+        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
+    build, most = KINDS[name]
+    if len(angles) > most:
+        raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
+    if any(angle <= 0 for angle in angles):
+        raise ShipidError("angles are positive: --side says which way she turns first", path="ANGLES")
+    for option, value in (("--duration", duration), ("--step", step)):
+        if value is not None and not value > 0:
+            raise ShipidError(f"{value:g} s must be positive", path=option)
+    length = length_of(vessel)
+    if length is None:
+        raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
+    asked = FROUDE * np.sqrt(GRAVITY * length) if speed is None else speed
+    n_rpm = shaft_speed(Controls.of(vessel), asked) / RPM
+    passing = length / asked  # s for one length
+    interval = _round(passing / ROWS) if step is None else step * STEPS
+    lead = float(np.ceil(LEAD * passing / interval) * interval)
+    course = 0.0 if name in ROUND else 90.0  # what goes straight is drawn from left to right
+    own = build(angles, side, duration, passing, {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course})
+    return Standard(name, _title(name, own), own, float(asked), interval / STEPS, interval)
+
+
+def length_of(vessel: Vessel) -> float | None:
+    """Length between perpendiculars [m], None where the document does not say."""
+    found = vessel.document.get("particulars", {}).get("L_pp")
+    return None if found is None else float(found)
+
+
+def shaft_speed(controls: Controls, speed: float) -> float:
+    """Shaft speed [rev/s] at which the ship goes straight ahead in calm water at a steady speed [m/s].
+
+    Raises
+    ------
+    ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
+    """
+    if speed <= 0:
+        raise ShipidError(f"a speed of {speed:g} m/s is no approach: it must be positive", path="--speed")
+
+    def surplus(n: float) -> float:
+        orders = controls.orders(np.full(1, n), np.zeros(1))
+        return float(acceleration(controls.vessel, speed, {key: float(value[0]) for key, value in orders.items()})[0])
+
+    low, high = 0.0, 1.0
+    while surplus(high) < 0:
+        low, high = high, 2 * high
+        if high > MOST_RPM * RPM:
+            raise ShipidError(f"no shaft speed gives {controls.vessel.name} {speed:g} m/s", path="--speed")
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if surplus(middle) < 0 else (low, middle)
+    return high
+
+
+def _title(name: str, own: Manoeuvre) -> str:
+    """What is done, in words."""
+    words = name.replace("-", " ")
+    if isinstance(own, Zigzag):
+        return f"{words} {own.angle_deg:g}/{own.execute_heading_deg:g}, first to {own.side}"
+    if isinstance(own, (TurningCircle, PullOut)):
+        return f"{words}, {own.angle_deg:g} deg of helm to {own.side}"
+    if isinstance(own, Spiral):
+        return f"{words}, {max(own.angles_deg):g} deg of helm to either side"
+    return words
+
+
+def _round(value: float) -> float:
+    """Nearest of 1, 2, 5 and their tens, by ratio."""
+    decade = 10.0 ** np.floor(np.log10(value))
+    steps = np.array([1, 2, 5, 10]) * decade
+    return float(f"{steps[np.argmin(np.abs(np.log(steps / value)))]:.6g}")
+
+
+Build = Callable[[Sequence[float], str, float | None, float, dict[str, Any]], Manoeuvre]
+
+
+def _zigzag(angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]) -> Zigzag:
+    helm = angles[0] if angles else 10.0
+    heading = angles[1] if len(angles) > 1 else helm
+    time = how["execute_at"] + ZIGZAG * passing if duration is None else duration
+    return Zigzag(angle_deg=helm, execute_heading_deg=heading, side=_side(side), duration=time, **how)
+
+
+def _turning(
+    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+) -> TurningCircle:
+    time = how["execute_at"] + TURN * passing if duration is None else duration
+    return TurningCircle(angle_deg=angles[0] if angles else 35.0, side=_side(side), duration=time, **how)
+
+
+def _pull_out(
+    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+) -> PullOut:
+    time = how["execute_at"] + TURN * passing if duration is None else duration
+    turn = (time - how["execute_at"]) / 2
+    return PullOut(angle_deg=angles[0] if angles else 20.0, side=_side(side), turn=turn, duration=time, **how)
+
+
+def _spiral(angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]) -> Spiral:
+    sense, most = (1 if side == "starboard" else -1), angles[0] if angles else HELMS[0]
+    there = [sense * most / HELMS[0] * helm for helm in HELMS]
+    hold = LEVEL * passing if duration is None else duration
+    return Spiral(angles_deg=(*there, *there[-2::-1]), hold=hold, **how)
+
+
+def _reverse_spiral(
+    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+) -> ReverseSpiral:
+    sense = 1 if side == "starboard" else -1
+    most = angles[0] if angles else float(np.rad2deg(0.25 / passing))  # r L / U = 0.25
+    hold = LEVEL * passing if duration is None else duration
+    return ReverseSpiral(rates_deg=tuple(sense * most * rate / RATES[0] for rate in RATES), hold=hold, **how)
+
+
+def _stop(
+    angles: Sequence[float],  # noqa: ARG001
+    side: str,  # noqa: ARG001
+    duration: float | None,
+    passing: float,
+    how: dict[str, Any],
+) -> CrashStop:
+    time = how["execute_at"] + STOP * passing if duration is None else duration
+    return CrashStop(astern_rpm=how["n_rpm"], duration=time, **how)
+
+
+def _side(side: str) -> Any:
+    if side not in ("starboard", "port"):
+        raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
+    return side
+
+
+KINDS: dict[str, tuple[Build, int]] = {
+    "zigzag": (_zigzag, 2),
+    "turning": (_turning, 1),
+    "pull-out": (_pull_out, 1),
+    "spiral": (_spiral, 1),
+    "reverse-spiral": (_reverse_spiral, 1),
+    "stop": (_stop, 0),
+}
+"""Name -> what builds it and how many angles it takes."""

@@ -1,0 +1,81 @@
+"""The smoother finds the velocities of a known motion, and errs as much as it says."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from shipid.data.kinematics import STATES, Noise, smooth
+from tests.data.conftest import turning
+
+T = np.arange(0.0, 120.0, 1.0)
+
+
+def noise(position: float, heading: float, acceleration: float, angular: float) -> Noise:
+    errors = {"north": position, "east": position, "psi": heading, "u": 0.05, "v": 0.05, "r": 1e-3}
+    return Noise(errors, acceleration, angular)
+
+
+@pytest.mark.parametrize("step", [0.2, 1.0, 2.0])
+def test_constant_turn_without_noise(step: float) -> None:
+    t = np.arange(0.0, 120.0, step)
+    motion = turning(t)
+    logged = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
+    found = smooth(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
+    inside = slice(3, -3)
+    np.testing.assert_allclose(found.state("u")[inside], 4.0, atol=0.01)
+    np.testing.assert_allclose(found.state("v")[inside], -0.5, atol=0.01)
+    np.testing.assert_allclose(found.state("r")[inside], 0.05, atol=1e-4)
+
+
+def random_motion(random: np.random.Generator, t: np.ndarray, given: Noise) -> np.ndarray:
+    """The filter's own model in fine steps: u, v, r walk at random; (N, 6)."""
+    fine, states = 20, np.zeros((len(t), 6))
+    x = np.array([0.0, 0.0, 1.0, 5.0, 0.3, 0.02])
+    states[0] = x
+    for index in range(1, len(t)):
+        dt = (t[index] - t[index - 1]) / fine
+        for _ in range(fine):
+            c, s = np.cos(x[2]), np.sin(x[2])
+            walk = [given.acceleration, given.acceleration, given.angular_acceleration] * random.standard_normal(3)
+            rates = np.array([x[3] * c - x[4] * s, x[3] * s + x[4] * c, x[5], 0.0, 0.0, 0.0])
+            x = x + dt * rates + np.append(np.zeros(3), walk * np.sqrt(dt))
+        states[index] = x
+    return states
+
+
+@pytest.mark.parametrize("logged", [("north", "east", "psi"), ("north", "east", "psi", "r"), STATES])
+def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
+    """NEES of (u, v, r) is chi-square (Bar-Shalom et al. 2001, 5.4.2): its mean over 120 motions lies in the band."""
+    random, given = np.random.default_rng(3), noise(0.5, np.radians(0.5), 0.05, np.radians(0.1))
+    steps = np.tile([0.5, 1.0, 1.5], 14)  # an irregular clock
+    t = np.append(0.0, np.cumsum(steps))
+    nees, consistency = [], []
+    for _ in range(120):
+        truth = random_motion(random, t, given)
+        noisy = {
+            name: truth[:, STATES.index(name)] + given.sample[name] * random.standard_normal(len(t)) for name in logged
+        }
+        found = smooth(t, noisy, given)
+        error = (found.states - truth)[20, 3:]
+        nees.append(error @ np.linalg.solve(found.covariances[20][3:, 3:], error))
+        consistency.append(found.consistency)
+    low, high = chi2.ppf([0.001, 0.999], 3 * 120) / 120
+    assert low < np.mean(nees) < high
+    assert np.mean(consistency) == pytest.approx(1.0, abs=0.1)
+
+
+def test_wrong_noise_is_told() -> None:
+    """Samples that err three times more than declared give innovations above one."""
+    random = np.random.default_rng(4)
+    motion = turning(T)
+    noisy = {name: motion[name].to_numpy() + 3.0 * random.standard_normal(len(T)) for name in ("north", "east")}
+    noisy["psi"] = motion["psi"].to_numpy()
+    assert smooth(T, noisy, noise(1.0, 0.01, 0.02, 1e-3)).consistency > 2.0
+
+
+def test_what_is_logged_makes_the_rest_surer() -> None:
+    motion = turning(T)
+    given = noise(1.0, 0.01, 0.05, 1e-3)
+    position = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
+    alone, with_u = smooth(T, position, given), smooth(T, position | {"u": motion["u"].to_numpy()}, given)
+    assert np.all(with_u.deviation("u")[1:] < alone.deviation("u")[1:])

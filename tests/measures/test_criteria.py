@@ -1,0 +1,64 @@
+"""Limits of IMO MSC.137(76), 5.3, and when a manoeuvre is judged by them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.measures import MEASURES
+from shipid.measures.criteria import criteria, first_limit, second_limit
+from shipid.measures.record import DEGREE, Measures
+from tests.measures.sailed import SAILED, every
+
+
+@pytest.mark.parametrize(
+    ("ratio", "first", "second"), [(5, 10, 25), (10, 10, 25), (20, 15, 32.5), (30, 20, 40), (60, 20, 40)]
+)
+def test_limits_of_the_overshoots(ratio: float, first: float, second: float) -> None:
+    """5.3.3.1 and 5.3.3.2: constant below L/V = 10 s and from 30 s on, linear between."""
+    assert first_limit(ratio) / DEGREE == pytest.approx(first)
+    assert second_limit(ratio) / DEGREE == pytest.approx(second)
+
+
+def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[float, float, bool | None, str]]:
+    measures = MEASURES[kind](every(SAILED[kind](), 0.5))
+    changed = Measures()
+    for name, one in measures.items():
+        changed.add(name, values.get(name, one.value), one.unit, one.why or "was not found")
+    found = criteria(kind, changed, length)
+    return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in found}
+
+
+def test_a_turning_circle() -> None:
+    assert judged("turning", 200.0, advance=880.0, tactical_diameter=1010.0) == {
+        "5.3.1": (pytest.approx(5.05), 5.0, False, "")
+    }
+    rows = criteria("turning", MEASURES["turning"](every(SAILED["turning"](), 0.5)), 200.0)
+    assert [(one.limit, one.met) for one in rows] == [(4.5, True), (5.0, True)]
+    value, _, met, note = judged("turning", 200.0, helm=20 * DEGREE)["5.3.1"]
+    assert np.isfinite(value)
+    assert met is None
+    assert "not 35" in note
+
+
+def test_a_zigzag() -> None:
+    found = judged("zigzag", 200.0, approach_speed=5.0, overshoot_1=19 * DEGREE, overshoot_2=41 * DEGREE)
+    assert list(found) == ["5.3.2", "5.3.3.1", "5.3.3.2"]
+    assert found["5.3.3.1"] == (pytest.approx(19 * DEGREE), pytest.approx(20 * DEGREE), True, "")
+    assert found["5.3.3.2"][1:] == (pytest.approx(40 * DEGREE), False, "")
+    both = {"helm": 20 * DEGREE, "execute_heading": 20 * DEGREE}
+    assert list(judged("zigzag", 200.0, **both)) == ["5.3.3.3"]
+    assert judged("zigzag", 200.0, helm=20 * DEGREE) == {}
+
+
+def test_a_stop() -> None:
+    assert judged("stop", 100.0, track_reach=1500.0)["5.3.4"][2:] == (True, "")
+    _, _, met, note = judged("stop", 100.0, track_reach=1600.0)["5.3.4"]
+    assert met is False
+    assert "up to 20 L" in note
+
+
+def test_what_is_not_judged_says_why() -> None:
+    assert judged("stop", None)["5.3.4"][2:] == (None, "the length of the ship is not known")
+    assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "was not found")
+    assert "100 m and more" in judged("stop", 50.0)["5.3.4"][3]

@@ -1,0 +1,76 @@
+"""Zigzags of a KVLCC2 model at HSVA (SIMMAN 2008): the overshoots that were read off these files."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.importing import import_log
+from shipid.data.mapping import read_mapping
+from shipid.measures import zigzag
+from shipid.measures.criteria import criteria
+from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.record import DEGREE
+
+# README beside the files; the tank repeats them to 0.2 to 0.5 deg
+READ_OFF = {
+    "10_10_P": (9.73, 17.77),
+    "10_10_S": (9.69, 20.54),
+    "20_10_P": (11.97, 13.87, 13.16),
+    "20_10_S": (11.71, 15.62, 12.41),
+}
+
+
+@cache
+def imported(folder: Path) -> pd.DataFrame:
+    return import_log(read_mapping("kvlcc2-hsva"), folder).frame
+
+
+def columns_of(folder: Path, name: str) -> dict[str, np.ndarray]:
+    if not (folder / "kvlcc2_hsva").is_dir():
+        pytest.skip("no kvlcc2_hsva in the folder of recorded data")
+    frame = imported(folder / "kvlcc2_hsva")
+    return {str(column): values.to_numpy() for column, values in frame[frame["run"] == name].items()}
+
+
+@pytest.mark.parametrize("name", READ_OFF)
+def test_overshoots_are_those_of_the_readme(shared_data: Path, name: str) -> None:
+    """About the ordered course, 0, to 0.03 deg; about the heading at the execute to 0.1 deg."""
+    record = record_of(columns_of(shared_data, name))
+    exact, found = zigzag(record, course=0.0), zigzag(record)
+    assert found["execute_heading"].value == pytest.approx(10 * DEGREE)
+    assert found["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
+    for number, angle in enumerate(READ_OFF[name], start=1):
+        assert exact[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.03)
+        assert found[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.1)
+
+
+@pytest.mark.parametrize("name", READ_OFF)
+def test_a_run_at_1_hz_says_the_same(shared_data: Path, name: str) -> None:
+    """20 Hz to 1 Hz, at full scale a row every 7 s: overshoots to 0.1 deg, their times to 0.1 s."""
+    columns = columns_of(shared_data, name)
+    fine = zigzag(record_of(columns), course=0.0)
+    for offset in (0, 7, 13):
+        coarse = zigzag(record_of({key: values[offset::20] for key, values in columns.items()}), course=0.0)
+        for number in range(1, len(READ_OFF[name]) + 1):
+            for measure, tolerance in ((f"overshoot_{number}", 0.1 * DEGREE), (f"time_to_check_{number}", 0.1)):
+                assert coarse[measure].value == pytest.approx(fine[measure].value, abs=tolerance)
+
+
+@pytest.mark.parametrize(("name", "heading"), [("05_01", 1), ("10_05", 5), ("15_01", 1), ("20_05", 5), ("35_05", 5)])
+def test_every_zigzag_is_recognised_with_its_execute_heading(shared_data: Path, name: str, heading: int) -> None:
+    record = record_of(columns_of(shared_data, name))
+    assert kinds_of(record) == (("zigzag",), "")
+    assert zigzag(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
+
+
+def test_a_short_log_leaves_measures_out_with_a_sentence(shared_data: Path) -> None:
+    found = zigzag(record_of(columns_of(shared_data, "10_10_P")))
+    assert np.isnan(found["period"].value)
+    assert found["period"].why == "the log ends before the fourth execute"
+    judged = {one.name: one for one in criteria("zigzag", found, 7.0)}
+    assert judged["yaw checking: 10/10 first overshoot (5.3.3.1)"].met is True  # 9.7 against 10 at L/V = 6 s

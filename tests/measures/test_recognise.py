@@ -1,0 +1,70 @@
+"""From columns to a record: which angle is the helm, and which way it turns the ship."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError
+from shipid.measures import turning, zigzag
+from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.record import DEGREE, Record
+from tests.measures.sailed import GAIN, SAILED, START, clock, every, nomoto, sailed
+
+
+def columns(record: Record) -> dict[str, np.ndarray]:
+    return {name: getattr(record, name) for name in ("t", "north", "east", "psi", "u", "v", "r")}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in SAILED if kind not in ("stop", "reverse-spiral")])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_helm_is_counted_by_what_it_does(kind: str, sign: float) -> None:
+    record = every(SAILED[kind](), 0.5)
+    angles = {"rudder.delta": sign * record.helm, "bow.alpha": -sign * record.helm, "idle.alpha": 0 * record.helm}
+    np.testing.assert_allclose(record_of(columns(record) | angles).helm, record.helm)
+
+
+def test_shafts_that_run_and_columns_that_lack() -> None:
+    record = every(SAILED["stop"](), 0.5)
+    given = columns(record) | {"port.n": record.shaft, "bow.n": 0 * record.t, "actual.port.n": 9 + 0 * record.t}
+    np.testing.assert_array_equal(record_of(given).shaft, record.shaft)
+    assert record_of(columns(record)).shaft is None
+    del given["psi"]
+    with pytest.raises(DataError, match="psi: missing column"):
+        record_of(given)
+
+
+def run(legs: list[tuple[float, float]], end: float) -> Record:
+    """Nomoto's ship with these orders (s, deg), at 10 Hz."""
+    t = clock(end)
+    psi, r, helm = nomoto(t, [(begin, angle * DEGREE) for begin, angle in legs])
+    return every(sailed(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
+
+
+def test_a_turn_ends_where_the_helm_is_let_go() -> None:
+    """As in a trial: small corrections before, a kick of opposite helm after; the turn alone is measured."""
+    plain = run([(40.0, 20)], 340.0)
+    trial = run([(5.0, 2), (8.0, -2), (11.0, 0), (40.0, 20), (340.0, -30), (343.0, 0), (346.0, 5)], 420.0)
+    assert kinds_of(trial) == (("turning",), "")
+    found, expected = turning(trial), turning(plain)
+    assert found["helm"].value == pytest.approx(20 * DEGREE)
+    assert found["execute"].value == pytest.approx(40.0)
+    assert found["steady_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-3)
+    assert found["tactical_diameter"].value == pytest.approx(expected["tactical_diameter"].value, rel=0.01)
+
+
+def test_a_helm_left_over_from_before_is_no_execute() -> None:
+    t = clock(200.0)
+    psi, r, helm = nomoto(t, [(0.0, 12 * DEGREE), (30.0, 0.0), (110.0, 10 * DEGREE), (120.0, -10 * DEGREE)])
+    record = every(sailed(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
+    later = Record(*(getattr(record, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
+    assert zigzag(later)["execute"].value == pytest.approx(110.0)
+    assert zigzag(record)["execute"].value == pytest.approx(0.0)  # put over there: she goes straight
+
+
+def test_what_is_no_manoeuvre_says_why() -> None:
+    assert "less than 3 deg" in kinds_of(run([(START, 2)], 60.0))[1]
+    assert "turned by 90 deg" in kinds_of(run([(START, 10), (START + 5, 0)], 60.0))[1]
+    already = run([(0.0, 20), (30.0, 1), (33.0, 20)], 60.0)
+    begun = Record(*(getattr(already, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
+    assert "turns already" in kinds_of(begun)[1]

@@ -1,0 +1,69 @@
+"""Instants between samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError
+from shipid.measures.record import crossing, departure, extreme, plateaus, value_at
+from tests.measures.sailed import every, stopped
+
+T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
+
+
+def test_a_cubic_is_met_between_uneven_samples() -> None:
+    cubic = (T - 2.0) * (T - 2.5) * (T - 6.0)
+    for when in (0.1, 1.0, 3.33, 5.0):
+        assert value_at(T, cubic, when) == pytest.approx((when - 2) * (when - 2.5) * (when - 6))
+    assert np.isnan(value_at(T, cubic, -0.1))
+    assert np.isnan(value_at(T, cubic, T[-1] + 0.1))
+
+
+def test_crossings_go_the_way_that_is_asked_for() -> None:
+    cubic = (T - 1.0) * (T - 2.9) * (T - 4.5)
+    assert crossing(T, cubic, 0.0, 0.0) == pytest.approx(1.0)
+    assert crossing(T, cubic, 0.0, 1.5, rising=False) == pytest.approx(2.9)
+    assert crossing(T, cubic, 0.0, 3.0) == pytest.approx(4.5)
+    assert crossing(T, cubic, 0.0, 4.8) == 4.8  # beyond it by then
+    assert np.isnan(crossing(T, cubic, 1e3, 0.0))
+
+
+def test_extremes_lie_inside() -> None:
+    when, value = extreme(T, 3.0 - (T - 2.2) ** 2, 0.0, 5.0)
+    assert (when, value) == (pytest.approx(2.2), pytest.approx(3.0))
+    assert np.isnan(extreme(T, T, 0.0, 5.0)[0])  # still rising where it ends
+
+
+@pytest.mark.parametrize("rate", [2.3, 5.0, 20.0])
+def test_an_angle_in_motion_is_traced_back(rate: float) -> None:
+    """A rudder that moves to 35 deg at `rate` from 3.21 s on, sampled at 10 Hz."""
+    t = np.arange(200) * 0.1
+    angle = np.clip(rate * (t - 3.21), 0, 35)
+    half = int(np.argmax(angle >= 17.5))
+    assert departure(t, angle, half) == pytest.approx(3.21, abs=1e-6)
+
+
+def test_an_order_holds_from_its_row_on() -> None:
+    t = np.arange(10.0)
+    assert departure(t, np.where(t >= 4, -10.0, 2.0), 4) == 4.0
+
+
+def test_plateaus_are_told_from_the_way_between_them() -> None:
+    t = np.arange(0, 90.0, 0.5)
+    values = np.where(t < 30, 5.0, np.where(t < 60, 0.0 + 5 * np.exp(-(t - 30) / 3), -5 + 5 * np.exp(-(t - 60) / 3)))
+    found = plateaus(t, values, 0.1)
+    assert [round(values[b]) for _, b in found] == [5, 0, -5]
+    assert [t[b] for _, b in found] == [30.0, 60.0, 89.5]  # a row at the jump belongs to both
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [("u", lambda x: x[:-1]), ("psi", lambda x: np.where(x == x[3], np.nan, x)), ("t", lambda x: x[::-1])],
+)
+def test_what_is_no_record_is_refused_by_name(name: str, spoil) -> None:  # type: ignore[no-untyped-def]
+    record = every(stopped(), 1.0)
+    with pytest.raises(DataError, match=f"^{name}: "):
+        replace(record, **{name: spoil(getattr(record, name))})

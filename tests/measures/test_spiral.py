@@ -1,0 +1,42 @@
+"""Loops of spirals: none for a stable ship, the fold of the curve for an unstable one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.measures import reverse_spiral, spiral
+from shipid.measures.record import DEGREE
+from shipid.measures.spiral import levels
+from tests.measures.sailed import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral
+
+
+def test_a_stable_ship_has_no_loop() -> None:
+    record = every(stable_spiral(), 0.5)
+    found, points = spiral(record), levels(record)
+    assert found["loop_width"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
+    assert found["loop_height"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
+    assert found["levels"].value == len(LEVELS)
+    np.testing.assert_allclose(points.helm, np.array(LEVELS) * DEGREE, atol=1e-9)
+    np.testing.assert_allclose(points.rate, GAIN * np.array(LEVELS) * DEGREE, atol=1e-5)
+
+
+def test_a_loop_as_wide_as_it_was_made() -> None:
+    """Rate K delta + 1 deg/s on the way to port, K delta - 1 deg/s on the way back: 2 deg/s high, 2 / K deg wide."""
+    record = every(stable_spiral(), 0.5)
+    back = record.t >= START + HOLD * 8
+    jump = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.2 * DEGREE, 0.0)
+    found = spiral(replace(record, r=record.r + jump))
+    assert found["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
+    assert found["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
+    assert found["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
+
+
+def test_reverse_spiral_finds_the_folds() -> None:
+    """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
+    found = reverse_spiral(every(reverse(), 0.5))
+    assert found["levels"].value == len(RATES)
+    assert found["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
+    assert found["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)

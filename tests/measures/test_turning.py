@@ -1,0 +1,64 @@
+"""Turning circle and pull-out against motions in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.measures import pull_out, turning
+from shipid.measures.record import DEGREE
+from tests.measures.sailed import DRIFT, GAIN, RATE, SPEED, START, circle, every, perfect_circle, released, rows
+
+
+def test_a_perfect_circle_has_exact_measures() -> None:
+    """x = R (sin(psi - b) + sin b), y = R (cos b - cos(psi - b)) with R = V / r and drift b."""
+    found, radius = turning(every(perfect_circle(), 0.1)), SPEED / RATE
+    exact = {
+        "execute": START,
+        "helm": 35 * DEGREE,
+        "approach_speed": SPEED,
+        "advance": radius * (np.cos(DRIFT) + np.sin(DRIFT)),
+        "transfer": radius * (np.cos(DRIFT) - np.sin(DRIFT)),
+        "tactical_diameter": 2 * radius * np.cos(DRIFT),
+        "greatest_advance": radius * (1 + np.sin(DRIFT)),
+        "greatest_transfer": radius * (1 + np.cos(DRIFT)),
+        "time_to_90": np.pi / 2 / RATE,
+        "time_to_180": np.pi / RATE,
+        "time_to_360": 2 * np.pi / RATE,
+        "steady_diameter": 2 * radius,
+        "steady_speed": SPEED,
+        "steady_rate": RATE,
+        "steady_drift": DRIFT,
+        "speed_loss": 0.0,
+    }
+    assert set(found) == set(exact)
+    for name, value in exact.items():
+        assert found[name].value == pytest.approx(value, abs=2e-3), name
+
+
+def test_an_unsteady_turn_has_no_steady_diameter() -> None:
+    """Short of a full turn, or while the rate still falls by 5 % from one quarter turn to the next."""
+    whole = every(perfect_circle(), 0.1)
+    short = turning(rows(whole, slice(0, round((START + 6.0 / RATE) / 0.1))))
+    assert np.isfinite(short["tactical_diameter"].value)
+    assert short["steady_diameter"].why == "the heading changes by less than 360 deg"
+    slowing = replace(whole, psi=6.0 * np.log1p(whole.psi / 6.0), helm=whole.helm)
+    assert "not steady" in turning(slowing)["steady_rate"].why
+
+
+def test_steady_rate_of_nomoto() -> None:
+    assert turning(every(circle(), 0.5))["steady_rate"].value == pytest.approx(GAIN * 35 * DEGREE, rel=1e-4)
+
+
+def test_pull_out_of_a_stable_and_of_an_unstable_ship() -> None:
+    record = every(released(), 0.5)
+    found = pull_out(record)
+    assert found["turning_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-4)
+    assert found["residual_rate"].value == pytest.approx(0.0, abs=1e-5)
+    left = 0.3 * DEGREE
+    found = pull_out(replace(record, r=record.r + left * (record.t > 110)))
+    assert found["residual_rate"].value == pytest.approx(left, rel=1e-3)
+    early = pull_out(rows(record, slice(0, 2 * 120)))
+    assert "still changes" in early["residual_rate"].why

@@ -1,0 +1,61 @@
+"""Zigzags of Nomoto's ship, whose overshoots are known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.measures import zigzag
+from shipid.measures.record import DEGREE
+from tests.measures.sailed import GAIN, START, TIME, clock, every, nomoto, sailed, zigzag_10, zigzag_legs
+
+
+@pytest.mark.parametrize(("helm", "heading"), [(10, 10), (20, 20), (20, 10), (10, 5), (15, 1)])
+@pytest.mark.parametrize("interval", [0.1, 1.0])
+def test_overshoots_and_times_of_nomoto(helm: float, heading: float, interval: float) -> None:
+    """Overshoot T r - K d T ln(1 + r / (K d)), at T ln(1 + r / (K d)) after a reversal at rate r."""
+    legs, peaks = zigzag_legs(helm * DEGREE, heading * DEGREE, 8)
+    t = clock(200.0)
+    psi, r, order = nomoto(t, legs)
+    found = zigzag(every(sailed(t, psi, r, order, np.full_like(t, 5.0), 0 * t), interval))
+    assert found["execute_heading"].value == pytest.approx(heading * DEGREE)
+    assert found["execute"].value == pytest.approx(START)
+    # the helm jumps, so the heading has kinks in its third derivative, which 1 Hz rounds off
+    angle, time = (1e-4, 1e-3) if interval < 1 else (0.02, 0.02)
+    for number, (overshoot, check) in enumerate(peaks[:4], start=1):
+        assert found[f"overshoot_{number}"].value / DEGREE == pytest.approx(overshoot / DEGREE, abs=angle)
+        assert found[f"time_to_check_{number}"].value == pytest.approx(check, abs=time)
+    assert found["initial_turning_time"].value == pytest.approx(legs[1][0] - START, abs=time)
+    assert found["initial_turning"].value == pytest.approx(5.0 * (legs[1][0] - START), abs=5 * time)
+    assert found["period"].value == pytest.approx(legs[3][0] - legs[1][0], abs=time)
+    assert GAIN * helm * DEGREE * TIME > 0
+
+
+def test_overshoots_count_from_the_execute_heading_not_from_the_helm() -> None:
+    """Where a measured rudder follows 0.5 s after the order, the overshoot still counts from the execute heading."""
+    record = every(zigzag_10(), 0.1)
+    late = replace(record, helm=np.append(np.zeros(5), record.helm[:-5]))
+    found, expected = zigzag(late, course=0.0)["overshoot_1"], zigzag(record, course=0.0)["overshoot_1"]
+    assert found.value == pytest.approx(expected.value, abs=1e-9)
+    assert zigzag(late)["execute_heading"].value == pytest.approx(10 * DEGREE)
+
+
+def test_execute_heading_and_course_may_be_given() -> None:
+    record = every(zigzag_10(), 0.1)
+    given = zigzag(record, execute_heading=8 * DEGREE, course=0.5 * DEGREE)
+    assert given["execute_heading"].value == 8 * DEGREE
+    difference = zigzag(record)["overshoot_1"].value - given["overshoot_1"].value
+    assert difference == pytest.approx(-1.5 * DEGREE, abs=1e-3 * DEGREE)
+
+
+def test_noise_of_a_compass_is_averaged() -> None:
+    """0.1 deg of white noise at 10 Hz: overshoots to 0.15 deg, as documented."""
+    record = every(zigzag_10(), 0.1)
+    rng = np.random.default_rng(1)
+    noisy = zigzag(replace(record, psi=record.psi + rng.normal(0, 0.1 * DEGREE, len(record.t))))
+    clean = zigzag(record)
+    for number in range(1, 5):
+        name = f"overshoot_{number}"
+        assert noisy[name].value / DEGREE == pytest.approx(clean[name].value / DEGREE, abs=0.15)

@@ -1,0 +1,42 @@
+import re
+
+import pandas as pd
+import pytest
+
+from shipid.errors import ResultError
+from shipid.report.checks import write_checks
+from tests.report.test_page import NASTY, Page
+
+CHECKS = pd.DataFrame(
+    [
+        {"check": "gap", "run": "a", "value": 1.0, "unit": "s", "limit": 3.0, "ok": True, "sentence": "fine"},
+        {"check": "path", "run": NASTY, "value": 9.0, "unit": "m", "limit": 2.0, "ok": False, "sentence": NASTY},
+    ]
+)
+RUNS = ["a", "a", NASTY, NASTY]
+SERIES = pd.DataFrame(
+    {"run": RUNS, "t": [1.7e9, 1.7e9 + 1, 0.0, 1.0], "r": 0.1, "psi_rate": [0.1, float("nan"), 0.1, 0.1]}
+).assign(drift=[0.0, 1.0, 2.0, 3.0], u=1.0, v=0.0)
+TRACKS = pd.DataFrame({"run": RUNS, "set": "the log", "north": [0.0, 1.0, 2.0, 3.0], "east": 0.0})
+REPAIRS = pd.DataFrame(columns=["kind", "column", "count", "note"])
+
+
+def test_page_of_checks(tmp_path):
+    file = write_checks(tmp_path / "new" / "c.html", NASTY, CHECKS, SERIES, TRACKS, REPAIRS, {"log": NASTY})
+    text = file.read_text()
+    assert text.count(NASTY) == 0
+    page = Page(text)
+    assert not page.open
+    assert not re.search(r'(src|href)="https?:', text.partition("plotly.js v")[0])
+    cells = [text for attributes, text in page.all("td") if attributes.get("class") == "bad"]
+    assert cells == ["failed"]
+    sentences = [text for _, text in page.all("li")]
+    assert any("1 of 2 checks failed, in 1 of 2 runs." in sentence for sentence in sentences)
+    assert "shipid data check" in text
+
+
+def test_a_log_in_order(tmp_path):
+    file = write_checks(tmp_path / "c.html", "log", CHECKS.iloc[:1], SERIES, TRACKS, REPAIRS, {})
+    assert "All 1 check of 1 run passed." in file.read_text()
+    with pytest.raises(ResultError, match="cannot be written"):
+        write_checks(file / "c.html", "log", CHECKS, SERIES, TRACKS, REPAIRS, {})

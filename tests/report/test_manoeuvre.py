@@ -1,0 +1,92 @@
+"""The page of one manoeuvre."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.measures import MEASURES
+from shipid.measures.criteria import criteria
+from shipid.measures.rows import criterion_rows, measure_rows
+from shipid.measures.spiral import levels
+from shipid.report import manoeuvre
+from shipid.report.manoeuvre import FIRST, ManoeuvreContent, write_manoeuvre
+from tests.measures.sailed import SAILED, every
+from tests.report.test_page import Page
+
+
+def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
+    record = every(SAILED[kind](), 0.5)
+    columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
+    shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
+    found, points = MEASURES[kind](record), levels(record)
+    return ManoeuvreContent(
+        title=f"{name}: {kind}",
+        name=kind,
+        kind=kind,
+        log=pd.DataFrame({**columns, "shaft": shaft}),
+        measures=pd.DataFrame(measure_rows(found, 120.0)),
+        criteria=pd.DataFrame(criterion_rows(criteria(kind, found, 120.0))),
+        outline=np.array([[60.0, 0.0], [40.0, 10.0], [-60.0, 10.0], [-60.0, -10.0], [40.0, -10.0]]),
+        levels=pd.DataFrame(
+            {"helm": points.helm, "rate": points.rate} if kind == "spiral" else {"helm": [], "rate": []}
+        ),
+        provenance={"Vessel": name},
+        command="shipid manoeuvre",
+    )
+
+
+@pytest.mark.parametrize("kind", MEASURES)
+def test_every_kind_has_a_page_that_fetches_nothing(kind: str, tmp_path: Path) -> None:
+    text = write_manoeuvre(content(kind, "<b>a ship</b>"), tmp_path / "new" / "page.html").read_text()
+    page = Page(text)
+    assert not page.open
+    assert "<b>a ship" not in text
+    anchors = {attributes.get("id") for _, attributes, _ in page.elements}
+    for tag, attributes, _ in page.elements:
+        assert "src" not in attributes
+        assert tag not in ("link", "iframe", "object", "img")
+        assert (attributes.get("href") or "#").startswith("#")
+        if attributes.get("href"):
+            assert str(attributes["href"])[1:] in anchors
+    words = " ".join(said for _, said in page.all("li", "td", "th"))
+    for measure in FIRST[kind]:
+        assert measure in words.lower()
+    assert ("spiral" in anchors) == (kind == "spiral")
+
+
+def test_first_measures_exist() -> None:
+    """A measure that is renamed must be renamed here too."""
+    for kind, names in FIRST.items():
+        assert set(names) <= set(content(kind).measures["measure"])
+
+
+def test_answer_counts_the_criteria_that_are_judged() -> None:
+    shown = content("zigzag")
+    assert shown.answer[1].text == "3 of 3 criteria of IMO MSC.137(76) are met."
+    worse = shown.criteria.assign(verdict=["met", "not met", "not judged"])
+    assert replace(shown, criteria=worse).answer[1].text == "1 of 2 criteria of IMO MSC.137(76) are met."
+    table = manoeuvre.criteria(replace(shown, criteria=worse))
+    assert table is not None
+    assert [row[4].bad for row in table.rows] == [False, True, False]
+
+
+def test_a_missing_measure_says_why_in_its_row() -> None:
+    shown = content("zigzag")
+    assert "why missing" not in manoeuvre.measures(shown).columns
+    spoiled = shown.measures.copy()
+    spoiled.loc[spoiled["measure"] == "period", ["value", "note"]] = [np.nan, "too short"]
+    table = manoeuvre.measures(replace(shown, measures=spoiled))
+    row = next(row for row in table.rows if row[0].text == "period")
+    assert (row[1].text, row[4].text, row[4].bad) == ("–", "too short", True)
+    assert "period: not found" in replace(shown, measures=spoiled).answer[0].text
+
+
+def test_ships_are_drawn_to_scale_where_they_were() -> None:
+    """Bow and stern of an outline lie on the heading, and the bow half a length ahead."""
+    drawn = manoeuvre._outline(np.array([[60.0, 0.0], [-60.0, 0.0]]), north=10.0, east=20.0, psi=np.pi / 2)
+    np.testing.assert_allclose(drawn[:2], [[80.0, 10.0], [-40.0, 10.0]], atol=1e-9)

@@ -1,0 +1,100 @@
+"""Standard manoeuvres by name: speeds, sides, steps, and what is refused."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.measures import MEASURES
+from shipid.measures.recognise import record_of
+from shipid.measures.record import Measures
+from shipid.simulation.approach import Controls
+from shipid.simulation.manoeuvre import ReverseSpiral, Spiral, Zigzag
+from shipid.simulation.perform import perform
+from shipid.simulation.standard import KINDS, shaft_speed, standard
+from shipid.vessel.load import load_vessel
+from tests.measures.test_laws import SIGNED, TOLERANCE
+
+SHIP = load_vessel("gunnerus-28.9")
+
+
+def measured(name: str, *angles: float, **how: object) -> Measures:
+    chosen = standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
+    log = perform(SHIP, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    return MEASURES[chosen.kind](record_of({str(key): log[key].to_numpy() for key in log if key != "run"}))
+
+
+def test_every_kind_that_is_measured_can_be_performed() -> None:
+    assert set(KINDS) == set(MEASURES)
+
+
+@pytest.mark.parametrize("speed", [1.5, 3.0, 5.0])
+def test_shaft_speed_gives_the_speed(speed: float) -> None:
+    n_rpm = 60 * shaft_speed(Controls.of(SHIP), speed)
+    path = perform(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
+    assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
+
+
+def test_speed_is_that_of_froude_unless_asked() -> None:
+    assert standard(SHIP, "turning").speed == pytest.approx(0.2 * np.sqrt(9.81 * 28.9))
+    assert standard(SHIP, "turning", speed=2.0).speed == 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "angles"), [("zigzag", (10.0, 10.0)), ("turning", ()), ("stop", ()), ("pull-out", ())]
+)
+def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) -> None:
+    """The bundled ship has the same helm to both sides."""
+    starboard, port = (measured(name, *angles, side=side) for side in ("starboard", "port"))
+    assert all(np.isfinite(one.value) for one in starboard.values())
+    for key, one in starboard.items():
+        sign = -1 if key in SIGNED else 1
+        assert port[key].value == pytest.approx(sign * one.value, abs=2 * TOLERANCE[one.unit]), key
+
+
+def test_overshoots_do_not_depend_on_the_step() -> None:
+    """The helm is reversed at most a step's turning late: 0.03 deg at the default step."""
+    default, fine = measured("zigzag", 20, 20), measured("zigzag", 20, 20, step=0.005)
+    for number in (1, 2):
+        name = f"overshoot_{number}"
+        assert np.degrees(default[name].value) == pytest.approx(np.degrees(fine[name].value), abs=0.06)
+
+
+def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
+    spiral = standard(SHIP, "spiral", (15,), side="port").manoeuvre
+    assert isinstance(spiral, Spiral)
+    assert (spiral.angles_deg[0], min(spiral.angles_deg), max(spiral.angles_deg)) == (-15, -15, 15)
+    reverse = standard(SHIP, "reverse-spiral", (2,)).manoeuvre
+    assert isinstance(reverse, ReverseSpiral)
+    assert (reverse.rates_deg[0], reverse.rates_deg[-1]) == (2, -2)
+
+
+@pytest.mark.parametrize(
+    ("name", "angles", "how", "said"),
+    [
+        ("zigzak", (), {}, "NAME: no manoeuvre is called 'zigzak': did you mean 'zigzag'?"),
+        ("zigzag", (1, 2, 3), {}, "ANGLES: zigzag takes 2 angles"),
+        ("stop", (1,), {}, "ANGLES: stop takes no angles"),
+        ("turning", (-35,), {}, "ANGLES: angles are positive"),
+        ("turning", (), {"side": "left"}, "--side: 'left' is no side"),
+        ("turning", (), {"speed": 0.0}, "--speed: a speed of 0 m/s"),
+        ("turning", (), {"speed": 900.0}, "--speed: no shaft speed gives"),
+        ("turning", (), {"duration": 0.0}, "--duration: 0 s must be positive"),
+        ("turning", (), {"step": -1.0}, "--step: -1 s must be positive"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(
+    name: str, angles: tuple[float, ...], how: dict[str, object], said: str
+) -> None:
+    with pytest.raises(ShipidError, match=f"^{re.escape(said)}"):
+        standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
+
+
+def test_a_ship_without_a_length_is_refused() -> None:
+    document = {key: value for key, value in SHIP.document.items() if key != "particulars"}
+    with pytest.raises(ShipidError, match=r"particulars\.L_pp is missing"):
+        standard(replace(SHIP, document=document), "turning")

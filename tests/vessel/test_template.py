@@ -1,0 +1,150 @@
+"""First guesses: formulae against measured ships, documents that run, refusals in one line."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.simulation.manoeuvre import TurningCircle, Zigzag
+from shipid.simulation.perform import perform
+from shipid.vessel.load import load_vessel
+from shipid.vessel.template import WIND, Particulars, added_mass, first_guess, hull
+
+MARINER = Particulars(160.93, 23.17, 7.47, 0.597, 7.7175)
+KVLCC2 = Particulars(320.0, 58.0, 20.8, 0.810, 7.97, ship_type="tanker")
+GUNNERUS = Particulars(33.9, 9.6, 2.6, 0.61, 5.0, "azimuth", "research")
+BEAMY, SLENDER = Particulars(20.0, 6.0, 2.0, 0.55), Particulars(200.0, 25.0, 9.0, 0.65)
+
+
+@pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
+@pytest.mark.parametrize("given", [MARINER, KVLCC2, GUNNERUS, BEAMY, SLENDER])
+def test_a_first_guess_turns_and_zigzags(given: Particulars, propulsor: str) -> None:
+    """It holds its speed, turns in a few lengths, and does not spin or run away."""
+    found = first_guess(replace(given, propulsor=propulsor), "ship", "ship.toml")
+    pace = given.length / found.vessel.document["particulars"]["U_0"]
+    kinds = [
+        TurningCircle(name="turn", n_rpm=60 * found.n, duration=25 * pace),
+        Zigzag(name="zigzag", n_rpm=60 * found.n, duration=25 * pace, approach="steady"),
+    ]
+    log = perform(found.vessel, kinds, step=pace / 60)
+    turn, zigzag = (log[log["run"] == name] for name in ("turn", "zigzag"))
+    assert turn["u"].iloc[0] == pytest.approx(given.service, rel=0.02)
+    assert 1.0 < (turn["east"].max() - turn["east"].min()) / given.length < 9.0
+    assert np.abs(zigzag["psi"]).max() < np.radians(70)
+    assert np.sign(zigzag["psi"]).nunique() >= 2
+
+
+def test_clarke_near_the_mariner_as_measured() -> None:
+    """Derivatives of Chislett and Stroem-Tejsen (1965), in 1e-5 of L^2 primes: four within 10 %, the moments less."""
+    to_square = MARINER.draught / MARINER.length
+    linear = {name: 1e5 * to_square * hull(MARINER)[name].number for name in ("Y_v", "N_r", "N_v")}
+    masses = added_mass(MARINER)
+    unit = 0.5 * 1025 * MARINER.length**3
+    assert linear["Y_v"] == pytest.approx(-1160, rel=0.1)
+    assert linear["N_r"] == pytest.approx(-184, rel=0.1)
+    assert linear["N_v"] == pytest.approx(-264, rel=0.6)  # the formula gives half as much again
+    assert 1e5 * masses["Y_vdot"].number / unit == pytest.approx(-748, rel=0.1)
+    assert 1e5 * masses["N_rdot"].number / unit / MARINER.length**2 == pytest.approx(-43.8, rel=0.1)
+
+
+def test_formulae_near_kvlcc2_as_measured() -> None:
+    """Table 3 of Yasukawa and Yoshimura (2015)."""
+    found = {name: value.number for name, value in hull(KVLCC2).items()}
+    for name, measured in {"Y_v": -0.315, "Y_r": 0.083, "N_v": -0.137, "N_r": -0.049, "Y_vrr": -0.391}.items():
+        assert found[name] == pytest.approx(measured, rel=0.25), name
+    assert -added_mass(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
+
+
+def test_yaw_of_a_stern_pushed_aside_is_told_stable_or_not() -> None:
+    """The same hull: azimuth units, which are fins too, hold the course; the rudder's does not."""
+    assert first_guess(GUNNERUS, "g", "g.toml").growth < 0
+    found = first_guess(replace(GUNNERUS, propulsor="propeller-rudder"), "g", "g.toml")
+    assert found.growth > 0
+    assert "UNSTABLE" in found.text
+
+
+def test_growth_is_that_of_a_small_yaw() -> None:
+    """A pull of 0.01 deg/s left to itself shrinks as the number says."""
+    found = first_guess(MARINER, "m", "m.toml")
+    log = perform(
+        found.vessel,
+        [Zigzag(n_rpm=60 * found.n, angle_deg=0.01, execute_heading_deg=90, duration=400)],
+        step=1.0,
+    )
+    r = log["r"].to_numpy()  # towards the steady rate of so little helm, at the rate of the slowest root
+    left = np.abs(r - r[-1])[[100, 160]]
+    assert np.log(left[1] / left[0]) / 60 == pytest.approx(found.growth, rel=0.1)
+
+
+@pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
+def test_every_number_says_where_it_comes_from(propulsor: str) -> None:
+    text = first_guess(replace(MARINER, propulsor=propulsor), "ship", "ship.toml").text
+    assert "FIRST GUESS" in text.splitlines()[0]
+    assert tomllib.loads(text)["description"].startswith("A first guess")
+    numbers = [line for line in text.splitlines() if " = " in line and '= "' not in line and not line.startswith("#")]
+    assert len(numbers) > 60
+    assert [line for line in numbers if line != "dof = 3" and "; " not in line] == []
+
+
+def test_a_written_first_guess_loads(tmp_path: Path) -> None:
+    file = tmp_path / "ship.toml"
+    found = first_guess(KVLCC2, 'a "quoted" ship', str(file))
+    file.write_text(found.text)
+    assert load_vessel(str(file)).digest == found.vessel.digest
+    assert load_vessel(str(file)).name == 'a "quoted" ship'
+
+
+def test_given_areas_and_type_are_taken() -> None:
+    given = replace(MARINER, ship_type="ferry", frontal_area=300.0, lateral_area=1800.0)
+    parameters = first_guess(given, "f", "f.toml").vessel.parameters
+    assert (parameters["wind.A_FW"], parameters["wind.A_LW"], parameters["wind.C_Dt"]) == (
+        300.0,
+        1800.0,
+        WIND["ferry"][0],
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"length": -5.0}, "length [m] = -5: the formulae hold for 1 to 450"),
+        ({"length": -5.0, "speed": None}, "length [m] = -5"),
+        ({"draught": 0.0}, "draught [m] = 0"),
+        ({"length": 300.0}, "length / beam = 12.9: the formulae hold for 3 to 9"),
+        ({"draught": 2.0}, "beam / draught = 11.6"),
+        ({"block": 1.2}, "block = 1.2"),
+        ({"block": float("nan")}, "block = nan"),
+        ({"speed": 40.0}, "speed [m/s] = 40: the formulae hold for 0.1 to 15.9"),
+        ({"speed": 0.0}, "speed [m/s] = 0"),
+        ({"lateral_area": 0.0}, "lateral area [m^2] = 0"),
+        ({"propulsor": "azimut"}, "did you mean 'azimuth'?"),
+        ({"ship_type": "tnker"}, "did you mean 'tanker'?"),
+        ({"length": 70.0, "block": 0.41, "draught": 12.0}, "Clarke's formula"),
+    ],
+)
+def test_what_the_formulae_do_not_know_is_refused(change: dict[str, object], complaint: str) -> None:
+    with pytest.raises(ShipidError) as caught:
+        first_guess(replace(MARINER, **change), "ship", "ship.toml")  # type: ignore[arg-type]
+    assert complaint in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_all_that_is_not_refused_loads() -> None:
+    """Corners of the ranges: a document comes out, but of the shortest and deepest hull."""
+    refused = 0
+    for length, slenderness, flatness, block in itertools.product((5.0, 120.0), (3.0, 9.0), (1.8, 6.0), (0.4, 0.9)):
+        beam = length / slenderness
+        given = Particulars(length, beam, beam / flatness, block)
+        if slenderness == 3.0 and flatness == 1.8:
+            refused += 1
+            with pytest.raises(ShipidError, match="Clarke's formula"):
+                first_guess(given, "ship", "ship.toml")
+        else:
+            first_guess(given, "ship", "ship.toml")
+    assert refused == 4
