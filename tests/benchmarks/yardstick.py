@@ -1,7 +1,8 @@
 """The recipe `paper` on cells of experiment 1: slow, so run once, piece by piece, and kept beside this file.
 
 `python -m tests.benchmarks.yardstick` goes on where it was stopped: every trained network is kept in
-`results/yardstick` until its cell is done, and finished cells are added to `yardstick.json`.
+`results/yardstick` until its cell is done, and finished cells are added to `yardstick.json`. `--close` adds cells that
+were begun, with the trials they have; their core-seconds are then extrapolated, and marked so.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import hashlib
 import json
 import pickle
 import subprocess
+import sys
 import time
 from dataclasses import dataclass, replace
 from datetime import date
@@ -81,17 +83,20 @@ def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, recipe: Recipe) -> dic
 
 
 def main() -> None:
-    """Run the cells that are not kept yet."""
+    """Run the cells that are not kept yet; `--close` keeps those begun with the trials that they have."""
     use_threads(1)
+    closing, whole = "--close" in sys.argv[1:], Recipe.preset("paper")
     done = json.loads(KEPT.read_text()) if KEPT.exists() else []
     finished = {(row["world"], row["N_D"], row["model"]) for row in done}
     for cell in CELLS:
-        if (cell.world, cell.N_D, cell.model) in finished:
+        trials = len(list((PIECES / cell.name).glob("*.pickle"))) if closing else whole.trials
+        if (cell.world, cell.N_D, cell.model) in finished or trials == 0:
             continue
         plan, prepared = world(cell.world)
         spent = _remember(PIECES / cell.name)
-        row = tune_cell(plan, prepared, cell, Recipe.preset("paper"))
-        row |= {"core_seconds": sum(spent), "machine": machine(), "date": date.today().isoformat(), "commit": _commit()}
+        row = tune_cell(plan, prepared, cell, Recipe.preset("paper", trials=trials))
+        row |= {"core_seconds": sum(spent) * whole.trials / trials, "extrapolated": trials < whole.trials}
+        row |= {"machine": machine(), "date": date.today().isoformat(), "commit": _commit()}
         done.append(row)
         KEPT.write_text(json.dumps(done, indent=1) + "\n")
         print(f"{cell.name}: {row['core_seconds']:.0f} core-seconds, {len(row['trials'])} trials", flush=True)
