@@ -58,6 +58,10 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
     Returns
     -------
     dict : name of each feature that stays -> all the columns it stands for, itself first.
+
+    Raises
+    ------
+    DataError : none of them varies.
     """
     chosen: dict[str, tuple[str, ...]] = {}
     for name, values in table.items():
@@ -69,6 +73,10 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
             chosen[name] = (name,)
         else:
             chosen[twin] += (name,)
+    if not chosen:
+        raise DataError(
+            f"none of {', '.join(table)} varies over the training windows: nothing can be learned from them"
+        )
     return chosen
 
 

@@ -16,6 +16,7 @@ from shipid.errors import DocumentError, choices
 RIDGES = 9  # of a range
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
+Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
 class Recipe(BaseModel):
@@ -118,7 +119,7 @@ class RidgeRecipe(Recipe):
     command_scale: Positive
     wind_scale: Positive
     offset: Positive
-    ridge: Positive
+    ridge: Ridge | tuple[Ridge, Ridge]
     terms: PositiveInt
     mirror: Probability
     averaged: PositiveInt

@@ -39,6 +39,11 @@ def compensator(columns):
     return Compensator(COMMANDS, tuple(networks), {"layers": 2, "units": 5, "learning_rate": 0.01})
 
 
+def test_columns_of_which_none_varies_are_refused():
+    with pytest.raises(DataError, match="none of u, v varies"):
+        choose_features({"u": np.full(9, 2.0), "v": np.zeros(9)})
+
+
 def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):
     table = feature_table(columns, COMMANDS)
     assert list(table) == ["u", "v", "r", *COMMANDS, "u_rw", "v_rw"]
