@@ -113,7 +113,7 @@ class Predictor:
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
-        except (KeyError, TypeError, ValueError, AttributeError):
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             raise ResultError("damaged: run the study again", file=file) from None
 
 

@@ -143,8 +143,8 @@ def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
 
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
     try:
-        table: pd.DataFrame = pyarrow.parquet.read_table(file).to_pandas()
-        return table.reset_index(drop=True)
+        table: pd.DataFrame = pyarrow.parquet.read_table(file).to_pandas(ignore_metadata=True)  # an index is a column
+        return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None
 
@@ -276,7 +276,8 @@ def _speed(sentence: Any) -> Any:
     """Apparent wind speed [m/s] from N (knots), K (km/h) or M (m/s)."""
     if sentence.reference != "R" or not sentence.wind_speed:
         return None
-    return float(sentence.wind_speed) * {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}[sentence.wind_speed_units]
+    factor = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
+    return None if factor is None else float(sentence.wind_speed) * factor
 
 
 SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {

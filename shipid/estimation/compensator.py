@@ -133,12 +133,12 @@ class Network:
 
 @dataclass(frozen=True)
 class Compensator:
-    """The mean of the networks of all folds: measured quantities at an instant -> compensation of the path after it.
+    """The mean of some networks: measured quantities at an instant -> compensation of the path after it.
 
     Parameters
     ----------
     commands : names of the command columns.
-    networks : one per fold.
+    networks : one per fold (recipe `paper`), or those of the best trials (`fast`).
     hyperparameters : what tuning chose, for the record.
     """
 
@@ -225,10 +225,10 @@ def _check(network: Network, index: int) -> None:
 
 
 def flatten(paths: Array) -> Array:
-    """Arrange outputs (S, 2 T) of a network, x_1 ... x_T, y_1 ... y_T as in (12), for paths (T, S, 2)."""
+    """Arrange outputs (S, 2 r) of a network, x_1 ... x_r, y_1 ... y_r as in (12), for paths or shapes (r, S, 2)."""
     return np.concatenate([paths[..., 0], paths[..., 1]]).T
 
 
 def unflatten(outputs: Array) -> Array:
-    """Arrange paths (T, S, 2) of outputs (S, 2 T): the inverse of `flatten`."""
+    """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)

@@ -15,7 +15,7 @@ from shipid.errors import DocumentError, choices
 
 RIDGES = 9  # of a range
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
+Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
@@ -88,7 +88,7 @@ class GradientRecipe(Recipe):
     units: PositiveInt | tuple[PositiveInt, PositiveInt]
     input_dropout: Probability | tuple[Probability, Probability]
     hidden_dropout: Probability | tuple[Probability, Probability]
-    learning_rate: Positive
+    learning_rate: Scale
     weight_decay: NonNegativeFloat | tuple[PositiveFloat, PositiveFloat]
     epochs: PositiveInt
     batch: NonNegativeInt
@@ -115,10 +115,10 @@ class RidgeRecipe(Recipe):
     SEARCHED = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
 
     units: PositiveInt
-    motion_scale: Positive
-    command_scale: Positive
-    wind_scale: Positive
-    offset: Positive
+    motion_scale: Scale
+    command_scale: Scale
+    wind_scale: Scale
+    offset: Scale
     ridge: Ridge | tuple[Ridge, Ridge]
     terms: PositiveInt
     mirror: Probability

@@ -11,6 +11,7 @@ has this symmetry exactly, and each manoeuvre counts twice.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +35,8 @@ from shipid.estimation.compensator import (
 )
 from shipid.estimation.recipe import RidgeRecipe, seed_of
 
-SIDES = {"port": "starboard", "starboard": "port"}
+SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
+ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
 ODD = {"v", "r", "v_rw", "alpha", "delta"}  # change sign in the mirror: motions, relative wind, angles of actuators
 
 
@@ -191,7 +193,10 @@ def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ..
     matrix = np.zeros((len(names), len(names)))
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
-        partner = f"{SIDES.get(component, component)}.{signal}" if component else column
+        words = re.split("([^a-z]+)", component)
+        if signal == "n" and ACROSS & set(words) and f"{component}.alpha" not in table:
+            return None
+        partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
         sign = -1.0 if signal in ODD else 1.0
         if column in standing and partner in standing:
             matrix[names.index(standing[partner]), names.index(standing[column])] = sign

@@ -31,7 +31,7 @@ def tune(
     targets : model -> (T, S, 2) [m] what its physics misses, or the path itself for pure data-driven.
     folds : (training, validation) indices of windows, split by manoeuvre; one pair, or one per fold.
     recipe : what is searched, and how a network gets its weights.
-    seed : of all that is random; a model's result depends on its name, not on its company.
+    seed : of all that is random; a model's result does not depend on its company.
     on_trial : called with (trials done, trials in all) after each trial of all models.
     device : a PyTorch device.
 

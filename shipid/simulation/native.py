@@ -32,6 +32,7 @@ from shipid.simulation.integrate import Array, Batch, Method, cores, integrate
 from shipid.simulation.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.vessel.dynamics import Dynamics
 
+OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w")  # of the C compiler
 _CALLS = {
     ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
     ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
@@ -144,8 +145,7 @@ def _compile(found: str, source: str, library: Path, wanted: Target) -> str | No
         text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
         text.write_text(source, encoding="utf-8")
         mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-        options = ["-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w", *wanted.flags]
-        command = [found, *options, str(text), "-o", str(fresh), *mvec, "-lm"]
+        command = [found, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode:
             return result.stderr.strip() or "it gave no reason"
@@ -360,7 +360,7 @@ def _library(model: Dynamics, step: float, method: Method) -> Any:
     if found is None:
         raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
     source = _Source(model, step, method).text(target())
-    words = "\n".join([source, found, _version(found), platform.machine(), *sorted(_processor())])
+    words = "\n".join([source, *OPTIONS, found, _version(found), platform.machine(), *sorted(_processor())])
     folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
     library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
     try:

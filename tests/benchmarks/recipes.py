@@ -26,11 +26,12 @@ def run() -> dict[str, Any]:
         result[f"{name}: core-seconds, paper / fast"] = f"{kept['core_seconds']:.0f} / {fast['core_seconds']:.1f}"
         result[f"{name}: H, paper / fast [m]"] = f"{kept['H']:.2f} / {fast['H']:.2f}"
     for key, label in (("core_seconds", "time"), ("H", "mean H"), ("H_90", "mean H_90")):
-        paper, fast = (np.array([pair[side][key] for pair in pairs]) for side in (0, 1))
+        counted = pairs if key == "core_seconds" else [pair for pair in pairs if not pair[0]["extrapolated"]]
+        paper, fast = (np.array([pair[side][key] for pair in counted]) for side in (0, 1))
         result |= {f"{label}, paper": round(float(paper.mean()), 3), f"{label}, fast": round(float(fast.mean()), 3)}
         result[f"{label}, fast / paper"] = round(float(fast.mean() / paper.mean()), 4)
         if key != "core_seconds":
-            result[f"{label}: fast is better in"] = f"{int((fast < paper).sum())} of {len(pairs)}"
+            result[f"{label}: fast is better in"] = f"{int((fast < paper).sum())} of {len(counted)}"
     return result | _in_company(pairs[0][0]["world"])
 
 

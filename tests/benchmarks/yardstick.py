@@ -96,7 +96,11 @@ def main() -> None:
         spent = _remember(PIECES / cell.name)
         row = tune_cell(plan, prepared, cell, Recipe.preset("paper", trials=trials))
         row |= {"core_seconds": sum(spent) * whole.trials / trials, "extrapolated": trials < whole.trials}
-        row |= {"machine": machine(), "date": date.today().isoformat(), "commit": _commit()}
+        row |= {
+            "machine": {k: v for k, v in machine().items() if k != "system"},
+            "date": date.today().isoformat(),
+            "commit": _commit(),
+        }
         done.append(row)
         KEPT.write_text(json.dumps(done, indent=1) + "\n")
         print(f"{cell.name}: {row['core_seconds']:.0f} core-seconds, {len(row['trials'])} trials", flush=True)
@@ -114,7 +118,9 @@ def _remember(folder: Path) -> list[float]:
         if not file.exists():
             start = time.process_time()
             result = train(data, stack, recipe, entropy, device)
-            file.write_bytes(pickle.dumps((time.process_time() - start, result)))
+            whole = file.with_suffix(".part")
+            whole.write_bytes(pickle.dumps((time.process_time() - start, result)))
+            whole.replace(file)
         seconds, result = pickle.loads(file.read_bytes())
         spent.append(seconds)
         return result

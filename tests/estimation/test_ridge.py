@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from shipid.estimation.compensator import Compensator
+from shipid.estimation.compensator import Compensator, choose_features
 from shipid.estimation.recipe import Recipe
-from shipid.estimation.ridge import _blocks, _decompose, _left_out, _Part, smooth_basis
+from shipid.estimation.ridge import _blocks, _decompose, _left_out, _Part, _reflection, smooth_basis
 from shipid.estimation.tuning import tune
 
 torch.set_num_threads(1)
@@ -403,3 +403,20 @@ def test_two_runs_are_enough(columns, targets):
         seen = np.concatenate(RUNS[1:3])
         assert best < 1.5 * np.square(targets[key][:, seen]).mean()
         assert np.isfinite(one.compensator.predict(columns)).all()
+
+
+@pytest.mark.parametrize(
+    ("names", "mirrored"),
+    [
+        (("port_2.n", "starboard_2.n", "port_2.alpha", "starboard_2.alpha"), True),
+        (("left.n", "right.n"), True),
+        (("port_2.n", "port_2.alpha"), False),  # the other side is not recorded
+        (("bow.n",), False),  # a tunnel's shaft may drive sideways
+        (("bow.n", "bow.alpha"), True),
+        (("propeller.n", "rudder.delta"), True),
+    ],
+)
+def test_sides_are_told_from_names(names, mirrored):
+    rng = np.random.default_rng(2)
+    table = {name: rng.normal(size=60) for name in ("u", "v", "r", *names)}
+    assert (_reflection(table, choose_features(table)) is not None) == mirrored
