@@ -79,7 +79,7 @@ class Predictor:
         temporary = target.with_name(f".{target.name}")
         target.parent.mkdir(parents=True, exist_ok=True)
         with temporary.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
+            np.savez(stream, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)  # weights do not shrink
         os.replace(temporary, target)
         return target
 
