@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import optuna
-from numpy.typing import NDArray
 from optuna.trial import Trial, TrialState
 
 from shipid.estimation.compensator import (
+    Array,
     Compensator,
+    Index,
     Network,
     Normaliser,
     Tuned,
@@ -25,8 +26,6 @@ from shipid.estimation.compensator import (
 from shipid.estimation.recipe import GradientRecipe, seed_of
 from shipid.estimation.training import Settings, train
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Parameters = dict[str, float]
 
 

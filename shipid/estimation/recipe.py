@@ -96,7 +96,7 @@ class GradientRecipe(Recipe):
 
 
 class RidgeRecipe(Recipe):
-    """Networks with drawn hidden units and output weights in closed form, judged by leaving one run out at a time.
+    """Networks with drawn hidden units and output weights in closed form, judged by runs left out in turn.
 
     All ranges are searched by their logarithm, with the same trials for all models.
 
@@ -162,6 +162,7 @@ PAPER: dict[str, Any] = {
     "batch": 0,
     "patience": 200,
 }
+# Chosen on held-out windows of five worlds of `simulation`: docs/performance.md, "What lowers H".
 FAST: dict[str, Any] = {
     "trials": 50,
     "units": 256,
