@@ -330,7 +330,7 @@ def data_measures(
     measured = found.measures["run"].nunique() if len(found.measures) else 0
     typer.echo(f"{measured} runs measured, {len(found.left)} not")
     if csv is not None:
-        _write_csv(found.measures, csv)
+        _write_measures(found.measures, csv)
 
 
 @study_app.command("list")
@@ -539,7 +539,7 @@ def manoeuvre(
     if csv is not None:
         import pandas as pd
 
-        _write_csv(pd.DataFrame(rows), csv)
+        _write_measures(pd.DataFrame(rows), csv)
     if log is not None:
         source = f"simulated: {ship.name}, {chosen.title}"
         typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
@@ -587,9 +587,10 @@ def _manoeuvre_content(
     )
 
 
-def _write_csv(frame: DataFrame, file: Path) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    frame.to_csv(file, index=False)
+def _write_measures(frame: DataFrame, file: Path) -> None:
+    from shipid.study.store import write_table
+
+    write_table(file, frame)
     typer.echo(f"measures -> {file}")
 
 
