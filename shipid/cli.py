@@ -407,15 +407,65 @@ def study_screen(
     typer.echo(f"{len(frame)} members -> {file}")
 
 
-def _counted(blocks: Iterable[Any], total: int) -> Iterator[Any]:
+@study_app.command("rotate")
+def study_rotate(
+    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    tests: Annotated[list[str], typer.Option(help="runs that test in turn, * for any part of a name; may be repeated")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="file for a row per turn and cell: .csv or .parquet; default: <study>-rotate.csv"),
+    ] = None,
+    changes: Changes = None,
+    device: Device = "cpu",
+) -> None:
+    """Let every run test in its turn, all others train: how much the answer owes to the choice of the test run."""
+    from shipid.study import rotate
+    from shipid.study.plan import read_plan
+    from shipid.study.prepare import obtain
+    from shipid.study.store import check_table, write_table
+
+    plan = read_plan(study, _parsed(changes))
+    file = out or Path(f"{plan.name}-rotate.csv")
+    check_table(file)
+    dataset = obtain(plan)
+    wanted = rotate.turns(plan, dataset, tests)
+    cells = len(wanted) * len(plan.models) * len(set(plan.study.grid.seeds))
+    import pandas as pd
+
+    frame = pd.concat(list(_counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
+    write_table(file, frame)
+    typer.echo(f"H and A [m], each of {len(wanted)} runs tested in its turn, the others trained:")
+    columns, rows = ["A", "H", "least", "greatest", "H_90"], []
+    for row in rotate.spread(frame).to_dict("records"):
+        better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
+        rows.append([row["model"], *(_digits(row[name]) for name in columns), better])
+    _print(_table(["model", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
+    typer.echo(f"naive floor {_digits(frame.groupby('test')['naive'].first().mean())} m")
+    found = rotate.contrasts(frame, plan.study.claims).to_dict("records")
+    if found:
+        typer.echo("paired differences over the turns [m], with a 95 % interval:")
+        pairs = [
+            (
+                row["id"],
+                row["difference"],
+                "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(row[n] for n in ("mean", "low", "high"))),
+                f"{row['above']} of {row['turns']}",
+            )
+            for row in found
+        ]
+        _print(_table(["finding", "difference", "mean", "above 0"], pairs))
+    typer.echo(f"{len(frame)} cells -> {file}")
+
+
+def _counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterator[Any]:
     """Pass blocks of rows on, with a bar of how many rows of all are there; on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("members"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        task = progress.add_task("members", total=total)
+        task = progress.add_task(what, total=total)
         for block in blocks:
             progress.advance(task, len(block))
             yield block

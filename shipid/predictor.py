@@ -13,7 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from shipid.data.windows import from_frame, to_frame
+from shipid.data.windows import Commands, from_frame, planned_means, to_frame
 from shipid.errors import DataError, ResultError
 from shipid.estimation.compensator import Compensator
 from shipid.simulation.rollout import Distances, Engine, distances, rollout
@@ -21,7 +21,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,10 @@ class Predictor:
     """What predicts a trajectory from one instant: a vessel (or none), a compensator (or none), horizon and step.
 
     vessel : physics with its perturbed numbers; None is pure data-driven.
-    horizon, step, method : number of steps, step [s] and rule of the physics rollout; commands and wind are held.
+    horizon, step, method : number of steps, step [s] and rule of the physics rollout; wind is held.
     limits : column -> (least, greatest) seen in training: the region where the compensator has evidence.
+    commands : `held` at their value at the instant, or `known` over the horizon: then each method takes `planned`, the
+        command in force in each step, name -> (T, S).
     """
 
     vessel: Vessel | None
@@ -40,18 +42,42 @@ class Predictor:
     method: str = "euler"
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    commands: Commands = "held"
 
-    def physics(self, columns: Mapping[str, Array], memory: Mapping[str, Array] | None = None) -> Array:
+    def physics(
+        self,
+        columns: Mapping[str, Array],
+        memory: Mapping[str, Array] | None = None,
+        planned: Mapping[str, Array] | None = None,
+    ) -> Array:
         """Paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
         if self.vessel is None:
             return np.zeros((self.horizon, len(columns["u"]), 2))
-        paths, _ = physics_paths(self.vessel, columns, self.horizon, self.step, self.method, memory=memory)
+        how = self.horizon, self.step, self.method
+        paths, _ = physics_paths(self.vessel, columns, *how, memory=memory, planned=self._plan(planned))
         return paths[:, 0]
 
-    def predict(self, columns: Mapping[str, Array], memory: Mapping[str, Array] | None = None) -> Array:
+    def compensation(self, columns: Mapping[str, Array], planned: Mapping[str, Array] | None = None) -> Array:
+        """What the compensator adds, (T, S, 2) [m] in the frame (11); zeros without one."""
+        if self.compensator is None:
+            return np.zeros((self.horizon, len(columns["u"]), 2))
+        means = planned_means(columns, self._plan(planned) or {})
+        return self.compensator.predict({**columns, **means})
+
+    def predict(
+        self,
+        columns: Mapping[str, Array],
+        memory: Mapping[str, Array] | None = None,
+        planned: Mapping[str, Array] | None = None,
+    ) -> Array:
         """Cooperative paths (T, S, 2) [m] in the frame (11), from columns (S,) at the instants of prediction."""
-        paths = self.physics(columns, memory)
-        return paths if self.compensator is None else paths + self.compensator.predict(columns)
+        both: Array = self.physics(columns, memory, planned) + self.compensation(columns, planned)
+        return both
+
+    def _plan(self, planned: Mapping[str, Array] | None) -> Mapping[str, Array] | None:
+        if self.commands == "known" and planned is None:
+            raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
+        return planned if self.commands == "known" else None
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
         """Whether each instant (S,) lies outside what training has seen, in any column."""
@@ -70,6 +96,7 @@ class Predictor:
             "horizon": self.horizon,
             "step": self.step,
             "method": self.method,
+            "commands": self.commands,
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "provenance": dict(self.provenance),
             "compensator": None if self.compensator is None else self.compensator.header(),
@@ -110,6 +137,7 @@ class Predictor:
                 method=str(header["method"]),
                 limits={name: (low, high) for name, (low, high) in header["limits"].items()},
                 provenance=dict(header["provenance"]),
+                commands=header["commands"],
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
@@ -135,16 +163,18 @@ def physics_paths(
     *,
     parameters: Array | None = None,
     memory: Mapping[str, Array] | None = None,
+    planned: Mapping[str, Array] | None = None,
     device: str = "cpu",
 ) -> tuple[Array, Array]:
     """Paths (T, V, S, 2) [m] of V variants in the frame (11) of S instants, and which diverged (V, S).
 
-    Commands and wind are held at their value at the instant (method, section 2); what the vessel feels and the columns
-    do not hold, such as wind that was not measured, is zero: see `assumed`.
+    Commands and wind are held at their value at the instant (method, section 2), but for commands that are `planned`,
+    name -> (T, S). What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see
+    `assumed`.
     """
     found = rollout(
         vessel,
-        *_instants(vessel, columns),
+        *_instants(vessel, columns, planned),
         step=step,
         num_steps=horizon,
         method=method,  # type: ignore[arg-type]
@@ -168,6 +198,7 @@ def physics_distances(
     *,
     parameters: Array | None = None,
     memory: Mapping[str, Array] | None = None,
+    planned: Mapping[str, Array] | None = None,
     engine: Engine = "auto",
     device: str = "cpu",
 ) -> Distances:
@@ -178,7 +209,7 @@ def physics_distances(
     origin = (columns.get(name, np.zeros(future.shape[1])) for name in ("north", "east", "psi"))
     return distances(
         vessel,
-        *_instants(vessel, columns),
+        *_instants(vessel, columns, planned),
         np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1),
         step=step,
         method=method,  # type: ignore[arg-type]
@@ -190,7 +221,7 @@ def physics_distances(
 
 
 def _instants(
-    vessel: Vessel, columns: Mapping[str, Array]
+    vessel: Vessel, columns: Mapping[str, Array], planned: Mapping[str, Array] | None
 ) -> tuple[dict[str, Array], Mapping[str, Array], dict[str, Array]]:
     """Start, commands and environment of a rollout from columns (S,); what is not there is zero."""
     model = dynamics(vessel)
@@ -198,7 +229,7 @@ def _instants(
     columns = {"down": columns.get("z", zero), **columns}
     start = {name: columns.get(name, zero) for name in model.state}
     environment = {name: columns.get(name, zero) for name in model.environment}
-    return start, columns, environment
+    return start, {**columns, **(planned or {})}, environment
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,8 +14,10 @@ from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral
 from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
+Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each an order of its own."""
+PARTS = 3  # of the horizon, in which the compensator sees planned commands
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,20 @@ class Windows:
         for start, end in intervals:
             touched |= (self.t <= end) & (self.end >= start)
         return touched
+
+
+def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
+    """What is planned, as few numbers: the mean command less the present one in each part of the horizon.
+
+    The parts are nearly equal, `PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
+    ..., so that what is known of sides and signs of the command holds for its plan.
+    """
+    means: dict[str, Array] = {}
+    for name, values in planned.items():
+        component, _, signal = name.rpartition(".")
+        for number, part in enumerate(np.array_split(values, min(PARTS, len(values))), start=1):
+            means[f"{component}.planned-{number}.{signal}"] = part.mean(axis=0) - columns[name]
+    return means
 
 
 def to_frame(north: Any, east: Any, north0: Any, east0: Any, psi0: Any) -> tuple[Any, Any]:
@@ -209,6 +225,25 @@ def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, 
         if not mask.any():
             raise DataError(f"no {part} window is left when {', '.join(sorted(names))} validate")
     return training, validation
+
+
+def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """(Training, validation) indices that leave out one run part by part, in time, so that no moment is seen by both.
+
+    Three parts, or two where the middle one leaves nothing. Raises DataError where even that leaves nothing.
+    """
+    order = np.argsort(windows.t, kind="stable")
+    for count in (3, 2):
+        folds = []
+        for part in np.array_split(order, count):
+            if len(part):
+                touched = windows.touching([(float(windows.t[part].min()), float(windows.end[part].max()))])
+                folds.append((np.flatnonzero(~touched), np.sort(part)))
+        if all(len(training) for training, _ in folds):
+            return folds
+    (run,) = windows.spans
+    length = windows.horizon * windows.step
+    raise DataError(f"run {run!r} is too short to train and validate on with a horizon of {length:g} s")
 
 
 def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:

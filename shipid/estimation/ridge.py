@@ -246,8 +246,9 @@ def _left_out(
         for out, judged in blocks:
             rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
             without = _few_rows if rows.shape[1] <= rows.shape[2] else _many_rows
+            errors = without(part, rows, targets)
             for i, ridge in enumerate(ridges):
-                error = without(part, rows, targets, part.eigenvalues + ridge)
+                error = errors(part.eigenvalues + ridge)
                 if judged.shape != out.shape:
                     error = error.take_along_dim(judged[:, :, None], dim=1)
                 total[i] += error.square().sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
@@ -255,19 +256,22 @@ def _left_out(
     return found
 
 
-def _few_rows(part: _Part, rows: Tensor, targets: Tensor, diagonal: Tensor) -> Tensor:
-    """Errors (folds, b, K r) of blocks without themselves by their part of the hat matrix, (b, b)."""
-    weighted = rows / diagonal
+def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
+    """Errors (folds, b, K r) of blocks without themselves, by their part of the hat matrix, (b, b); of a diagonal."""
     unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
-    error: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
-    return error
+
+    def errors(diagonal: Tensor) -> Tensor:
+        weighted = rows / diagonal
+        found: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
+        return found
+
+    return errors
 
 
-def _many_rows(part: _Part, rows: Tensor, targets: Tensor, diagonal: Tensor) -> Tensor:
+def _many_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
     """The same by solving for the output weights without each block, (M, M)."""
-    others = torch.diag(diagonal) - rows.mT @ rows
-    weights: Tensor = torch.linalg.solve(others, part.product - rows.mT @ targets)
-    return targets - rows @ weights
+    own, product = rows.mT @ rows, part.product - rows.mT @ targets
+    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - own, product)
 
 
 def _network(

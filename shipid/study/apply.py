@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Dataset, pieces, read_dataset
+from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
 from shipid.data.windows import from_frame
-from shipid.errors import ResultError, choices
+from shipid.errors import DataError, ResultError, choices
 from shipid.predictor import Predictor, check_columns
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, check_table, write_table
@@ -19,6 +19,9 @@ from shipid.study.store import cell_file, check_table, write_table
 
 def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Path) -> tuple[pd.DataFrame, float]:
     """Write physics and cooperative paths in north-east for every instant of a log.
+
+    Where the predictor takes known commands they are those that the log holds later, and an instant needs them for the
+    whole horizon.
 
     Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m],
     outside) and the share of instants outside the training's limits. Pure data-driven cells have NaN for physics.
@@ -30,6 +33,9 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
         check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
     parts = [_along(predictor, dataset, run, rows) for run, rows in pieces(dataset)]
     frame = pd.concat(parts, ignore_index=True)
+    if frame.empty:
+        length = predictor.horizon * predictor.step
+        raise DataError(f"no run is as long as the horizon of {length:g} s, over which commands are known", file=log)
     write_table(out, frame)
     return frame, float(frame["outside"].mean())
 
@@ -44,17 +50,26 @@ def _known_cell(folder: Path, cell: str) -> Path:
 
 
 def _along(predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame) -> pd.DataFrame:
-    columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
+    t, planned = rows["t"].to_numpy(), None
+    count = len(t)
+    if predictor.commands == "known":
+        ahead = predictor.step * np.arange(predictor.horizon)
+        count = int((t + ahead[-1] <= t[-1] + clock_slack(t)).sum())  # later instants have no whole plan
+        if count == 0:
+            return pd.DataFrame()
+        later = sample(rows, t[:count] + ahead[:, None])
+        planned = {name: later[name] for name in dataset.commands}
     memory = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
-    origin = (columns["north"], columns["east"], columns["psi"])
-    steps, count = predictor.horizon, len(rows)
+    memory = memory and {name: values[:count] for name, values in memory.items()}
+    columns = {str(name): rows[name].to_numpy()[:count] for name in rows.columns if name != "run"}
+    origin, steps = (columns["north"], columns["east"], columns["psi"]), predictor.horizon
     result = {
         "run": np.full(steps * count, run),
         "t": np.repeat(columns["t"], steps),
         "ahead": np.tile(predictor.step * np.arange(1, steps + 1), count),
     }
-    physics = predictor.physics(columns, memory)
-    cooperative = physics if predictor.compensator is None else physics + predictor.compensator.predict(columns)
+    physics = predictor.physics(columns, memory, planned)
+    cooperative = physics + predictor.compensation(columns, planned)
     if predictor.vessel is None:
         physics = np.full_like(physics, np.nan)
     for name, path in (("physics", physics), ("cooperative", cooperative)):

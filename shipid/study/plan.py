@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, 
 from shipid import document as documents
 from shipid.data.importing import sha256_of
 from shipid.data.mapping import read_mapping
+from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.estimation.recipe import Recipe
@@ -67,19 +68,20 @@ class Split(Strict):
 
 
 class Prediction(Strict):
-    """`[prediction]`: horizon and step of the predictor; commands and wind are held at their present value."""
+    """`[prediction]`: horizon and step of the predictor, and what it knows; wind is held at its present value."""
 
     horizon: Annotated[int, Field(ge=2, le=100000, description="steps")]
     step: Annotated[FiniteFloat, Field(gt=0, description="s")] = 1.0
     method: Literal["euler", "rk4"] = "euler"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between instants of prediction")] = 1.0
     samples: Annotated[int, Field(ge=1)] | None = Field(default=None, description="instants per run, at most")
+    commands: Commands = Field(default="held", description="held at their present value, or known over the horizon")
 
 
 class Grid(Strict):
     """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""
 
-    N_D: Annotated[list[Annotated[int, Field(ge=2)]], Field(min_length=1, description="runs for training")]
+    N_D: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, description="runs for training")]
     seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
 
 

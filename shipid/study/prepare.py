@@ -15,7 +15,7 @@ from shipid.data.catalogue import fetch
 from shipid.data.dataset import Dataset, pieces, read_dataset
 from shipid.data.importing import import_log
 from shipid.data.mapping import read_mapping
-from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, split_folds, split_runs
+from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, part_folds, split_folds, split_runs
 from shipid.errors import DataError, DocumentError, choices
 from shipid.estimation.recipe import RidgeRecipe
 from shipid.metrics import Summary, position_error, summary
@@ -65,9 +65,12 @@ class Prepared:
     def folds(self, plan: Plan, batch: Batch, windows: Windows) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
 
-        With one fold, 20 % of the runs validate; a recipe in closed form can afford to leave out every run in turn.
+        With one fold, 20 % of the runs validate; a recipe in closed form can afford to leave out every run in turn. A
+        single run is left out part by part.
         """
         runs, num_folds = self.runs(plan, batch), plan.study.split.folds
+        if len(runs) == 1:
+            return part_folds(windows)
         held_out: list[tuple[str, ...]]
         if num_folds == 1 and isinstance(plan.recipe, RidgeRecipe):
             held_out = [(run,) for run in runs]
@@ -129,7 +132,22 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
         raise DocumentError(
             f"{max(plan.study.grid.N_D)}: only {available} runs are left for training", file=plan.file, path="grid.N_D"
         )
+    if min(plan.study.grid.N_D) == 1:
+        _check_single_runs(plan, rest)
     return rest, test, notes
+
+
+def _check_single_runs(plan: Plan, pool: Windows) -> None:
+    """Refuse N_D = 1 where the run that a seed draws is too short to be left out part by part."""
+    for batch in plan.batches:
+        if batch.N_D == 1:
+            (run,) = nested(plan, pool, batch)
+            try:
+                part_folds(pool.select(pool.run == run))
+            except DataError as error:
+                raise DocumentError(
+                    f"1: {error.message}; take 2 runs or more", file=plan.file, path="grid.N_D"
+                ) from None
 
 
 def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
@@ -237,6 +255,7 @@ def _one_round(
                 prediction.method,
                 parameters=parameters,
                 memory=window_memory(vessel, dataset, windows),
+                planned=planned(plan, windows),
                 device=device,
             )
             for windows in parts
@@ -268,6 +287,11 @@ def own_vessel(model: Model) -> Vessel:
     assert model.vessel is not None
     assert model.variant is not None
     return model.vessel.with_values(model.variant.values) if model.variant.values else model.vessel
+
+
+def planned(plan: Plan, windows: Windows) -> Mapping[str, Array] | None:
+    """Commands over the horizon, name -> (T, S), where the study knows them; None where they are held."""
+    return windows.planned if plan.study.prediction.commands == "known" else None
 
 
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:

@@ -63,9 +63,8 @@ def read_results(folder: Path) -> Results:
     paths = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
-            compensator = Predictor.load(store.cell_file(folder, row["cell"])).compensator
-            if compensator is not None:
-                paths[row["cell"]] = physics[row["model"]] + compensator.predict(test.columns)
+            predictor = Predictor.load(store.cell_file(folder, row["cell"]))
+            paths[row["cell"]] = physics[row["model"]] + predictor.compensation(test.columns, test.planned)
     return Results(
         folder=folder,
         plan=plan,

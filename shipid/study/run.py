@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.data.windows import covered
+from shipid.data.windows import covered, planned_means
 from shipid.errors import ShipidError
 from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
@@ -27,7 +27,7 @@ from shipid.simulation.scan import uninterrupted
 from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
-from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, prepare
+from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, planned, prepare
 from shipid.study.workers import METHOD, import_for_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
@@ -117,9 +117,10 @@ def run_batch(
     windows = prepared.pool.select(mask)
     usable = {m.name: np.isfinite(prepared.test_paths[m.name]).all() for m in prepared.models}
     targets = {m.name: windows.future - prepared.pool_paths[m.name][:, mask] for m in prepared.models}
+    means = planned_means(windows.columns, planned(plan, windows) or {})
     tuned = tune(
-        windows.columns,
-        prepared.commands,
+        {**windows.columns, **means},
+        (*prepared.commands, *means),
         targets,
         prepared.folds(plan, batch, windows),
         plan.recipe,
@@ -142,7 +143,8 @@ def run_batch(
             row["hyperparameters"] = ", ".join(f"{name} {value:.3g}" for name, value in searched.items())
             predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
             if usable[model.name]:
-                paths = prepared.test_paths[model.name] + found.compensator.predict(prepared.test.columns)
+                test = prepared.test
+                paths = prepared.test_paths[model.name] + predictor.compensation(test.columns, test.planned)
                 error = summary(position_error(paths, prepared.test.future))
                 row |= {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
             else:
@@ -174,6 +176,7 @@ def _predictor(plan: Plan, prepared: Prepared, model: Model, batch: Batch, compe
         step=windows.step,
         method=plan.study.prediction.method,
         limits=limits(windows, prepared.commands),
+        commands=plan.study.prediction.commands,
         provenance={
             "study": plan.name,
             "digest": plan.digest,

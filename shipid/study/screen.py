@@ -18,7 +18,7 @@ from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.predictor import check_columns, physics_distances
 from shipid.simulation.native import compiler
 from shipid.study.plan import Plan
-from shipid.study.prepare import obtain, partition, window_memory
+from shipid.study.prepare import obtain, partition, planned, window_memory
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -85,6 +85,7 @@ def _rows(
                 plan.study.prediction.method,
                 parameters=values[same],
                 memory=window_memory(vessel, dataset, windows),
+                planned=planned(plan, windows),
                 engine="native" if device == "cpu" and compiler() is not None else "auto",
                 device=device,
             )

@@ -280,7 +280,7 @@ def rudder(given: Particulars) -> Values:
 
 def azimuth(given: Particulars, side: int) -> Values:
     """One of two azimuth units at the stern; side -1 is port."""
-    unit = get(read(bundled("models")["gunnerus-33.9"]), "thruster.port")
+    unit = get(read(bundled("models")["gunnerus-28.9"]), "thruster.port")
     own = {
         "x": Value(-0.46 * given.length, "m", "-0.46 L: a guess"),
         "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess"),

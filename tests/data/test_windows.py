@@ -16,6 +16,8 @@ from shipid.data.windows import (
     fold_masks,
     from_frame,
     nested_runs,
+    part_folds,
+    planned_means,
     split_folds,
     split_runs,
     to_frame,
@@ -281,3 +283,31 @@ def test_impossible_splits() -> None:
         nested_runs(NAMES, [3, 18], 0)
     with pytest.raises(DataError, match="two runs"):
         split_runs(["a"], 0.2, 0)
+
+
+def test_planned_means_by_hand() -> None:
+    """Seven steps in three parts of 3, 2 and 2; what is planned to stay adds nothing."""
+    planned = {"port.n": np.array([2.0, 2, 2, 5, 6, 8, 9])[:, None], "port.alpha": np.full((7, 1), 0.3)}
+    means = planned_means({"port.n": np.array([2.0]), "port.alpha": np.array([0.3])}, planned)
+    assert {name: float(value[0]) for name, value in means.items()} == pytest.approx(
+        {"port.planned-1.n": 0.0, "port.planned-2.n": 3.5, "port.planned-3.n": 6.5}
+        | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
+    )
+    assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]
+
+
+@given(st.integers(10, 60), st.integers(1, 12))
+def test_parts_of_one_run_share_no_moment(length: int, horizon: int) -> None:
+    windows = cut_windows(as_dataset(turning(np.arange(0.0, length + horizon + 0.5))), horizon=horizon)
+    second = -(-(length + 1) // 2)  # instant where the second half begins: each half must see an end of the other
+    if horizon >= second or second - 1 + horizon >= length:
+        with pytest.raises(DataError, match="too short"):
+            part_folds(windows)
+        return
+    folds = part_folds(windows)
+    np.testing.assert_array_equal(np.sort(np.concatenate([part for _, part in folds])), np.arange(len(windows)))
+    for training, validation in folds:
+        seen = windows.select(validation)
+        span = float(seen.t.min()), float(seen.end.max())
+        assert len(training)
+        assert not windows.select(training).touching([span]).any()

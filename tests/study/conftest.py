@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from shipid.data.dataset import Dataset, write_dataset
+from shipid.study.plan import Plan, build_plan
 from tests.study.byhand import by_hand
+from tests.study.tiny import tiny_plan
 
 
 @pytest.fixture
 def made(tmp_path: Path) -> Any:
     """`by_hand` in a folder of its own."""
     return partial(by_hand, tmp_path)
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Callable[..., tuple[Plan, Dataset]]:
+    """A plan on a recorded dataset of one's own."""
+
+    def make(dataset: Dataset, **changes: Any) -> tuple[Plan, Dataset]:
+        file = write_dataset(dataset, tmp_path / "log.parquet")
+        document = tiny_plan(tmp_path).document
+        del document["truth"]
+        document |= {"data": {"dataset": str(file)}, "grid": {"N_D": [2]}, **changes}
+        return build_plan(document, tmp_path / "tiny.toml"), dataset
+
+    return make

@@ -48,7 +48,7 @@ BROKEN = {
     "no-families": ("family", "at least 1"),
     "more-data-than-runs": ("grid.N_D", "12 manoeuvres less 4 test runs leave 8"),
     "empty-grid": ("grid.N_D", "at least 1"),
-    "one-run-for-training": ("grid.N_D.0", "greater than or equal to 2"),
+    "no-run-for-training": ("grid.N_D.0", "greater than or equal to 1"),
     "negative-seed": ("grid.seeds.0", "greater than or equal to 0"),
     "all-runs-test": ("split.test", "of 12 manoeuvres at most 10 can test"),
     "no-test-run": ("split.test", "at least 1"),

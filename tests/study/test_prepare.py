@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 import tomlkit
 
-from shipid.data.dataset import Dataset, write_dataset
+from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DocumentError
 from shipid.estimation.recipe import Recipe
 from shipid.predictor import Predictor
 from shipid.simulation.rollout import rollout
 from shipid.study.envelope import envelope
-from shipid.study.plan import Plan, build_plan, read_plan
+from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import Prepared, constant_motion, limits, obtain, own_vessel, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
@@ -35,20 +35,6 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepa
     plan = tiny_plan(tmp_path_factory.mktemp("plan"), {"grid.seeds": [0, 1], "grid.N_D": [2, 4, 6, 8]})
     dataset = obtain(plan)
     return plan, dataset, prepare(plan, dataset)
-
-
-@pytest.fixture
-def recorded(tmp_path: Path) -> Callable[..., tuple[Plan, Dataset]]:
-    """A plan on a recorded dataset of one's own."""
-
-    def make(dataset: Dataset, **changes: Any) -> tuple[Plan, Dataset]:
-        file = write_dataset(dataset, tmp_path / "log.parquet")
-        document = tiny_plan(tmp_path).document
-        del document["truth"]
-        document |= {"data": {"dataset": str(file)}, "grid": {"N_D": [2]}, **changes}
-        return build_plan(document, tmp_path / "tiny.toml"), dataset
-
-    return make
 
 
 def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Dataset, Prepared]) -> None:

@@ -1,0 +1,101 @@
+"""Every run tests in its turn: how much an answer owes to the choice of the test run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from shipid import document as documents
+from shipid.data.dataset import Dataset
+from shipid.errors import DocumentError, choices
+from shipid.study.plan import NO_MODEL, Batch, Claims, Plan
+from shipid.study.prepare import partition, prepare
+from shipid.study.run import run_batch
+
+CONFIDENCE = 0.95
+KEYS = ["test", "model", "kind", "N_D", "seed", "A", "H", "H_90", "naive", "status"]
+
+
+def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
+    """Runs that match any pattern, in the order of the dataset; DocumentError for a pattern that matches none."""
+    runs = list(dict.fromkeys(map(str, dataset.frame["run"])))
+    chosen: set[str] = set()
+    for pattern in patterns:
+        found = documents.match(pattern, runs)
+        if not found:
+            raise DocumentError(f"{pattern!r} matches no run: {choices(pattern, runs)}", file=plan.file, path="--tests")
+        chosen.update(found)
+    if len(chosen) < 2:
+        raise DocumentError("only one run matches: take turns with two or more", file=plan.file, path="--tests")
+    return [run for run in runs if run in chosen]
+
+
+def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu") -> Iterator[pd.DataFrame]:
+    """Set one run aside after the other, train on all others, and yield the cells of each turn.
+
+    A row has test, model, kind (its family), N_D (runs that were left), seed, A, H, H_90 and naive [m], status. No
+    training window shares a moment with the test run.
+    """
+    for test in tests:
+        split = plan.study.split.model_copy(update={"test": [test]})
+        least = plan.study.model_copy(update={"split": split, "grid": plan.study.grid.model_copy(update={"N_D": [2]})})
+        rest, _, _ = partition(replace(plan, study=least, batches=()), dataset)
+        amount = len(rest.spans)
+        study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
+        batches = tuple(Batch(amount, seed) for seed in sorted(set(study.grid.seeds)))
+        turn = replace(plan, study=study, batches=batches)
+        prepared = prepare(turn, dataset, device)
+        floor = float(prepared.naive.mean())
+        rows = [row for batch in batches for row, _ in run_batch(turn, prepared, batch, device)]
+        yield pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
+
+
+def spread(frame: pd.DataFrame) -> pd.DataFrame:
+    """A row per model over the turns, seeds averaged: A, H, least and greatest H, H_90 [m], turns with H below A."""
+    per_turn = _per_turn(frame)
+    rows = []
+    for model, part in per_turn.groupby("model", sort=False):
+        row = {"model": model, "turns": len(part), "A": part["A"].mean(), "H": part["H"].mean()}
+        row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
+        rows.append(row | {"better": (part["H"] < part["A"]).sum() if model != NO_MODEL else np.nan})
+    return pd.DataFrame(rows)
+
+
+def contrasts(frame: pd.DataFrame, claims: Claims | None) -> pd.DataFrame:
+    """What R1-R4 compare, as paired differences over the turns: id, difference, mean, low, high [m], turns above 0.
+
+    Seeds are averaged first; low and high are Student's 95 % interval over the turns, which share training runs and so
+    are not independent: it is too narrow rather than too wide. No rows without `accurate` and `inaccurate`.
+    """
+    if claims is None or claims.accurate is None or claims.inaccurate is None:
+        return pd.DataFrame(columns=["id", "difference", "mean", "low", "high", "above", "turns"])
+    per_turn = _per_turn(frame)
+    A, H = (per_turn.pivot(index="test", columns="kind", values=name) for name in ("A", "H"))
+    good, bad = claims.accurate, claims.inaccurate
+    others = [kind for kind in H.columns if kind != NO_MODEL and kind not in claims.not_judged]
+    found = {
+        ("R1", f"{good}: A less H"): A[good] - H[good],
+        ("R1", f"{bad}: A less H"): A[bad] - H[bad],
+        ("R2", f"A of {good} less H of {bad}"): A[good] - H[bad],
+        ("R3", "gap of A less gap of H"): (A[bad] - A[good]).abs() - (H[bad] - H[good]).abs(),
+        ("R4", "H of none less the worst other H"): H[NO_MODEL] - H[others].max(axis=1),
+    }
+    rows = []
+    for (name, difference), values in found.items():
+        given = values.dropna().to_numpy(dtype=float)
+        mean, wide = (float(given.mean()) if len(given) else np.nan), np.nan
+        if len(given) > 1:
+            wide = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(given) - 1) * given.std(ddof=1) / len(given) ** 0.5)
+        row = {"id": name, "difference": difference, "mean": mean, "low": mean - wide, "high": mean + wide}
+        rows.append(row | {"above": int((given > 0).sum()), "turns": len(given)})
+    return pd.DataFrame(rows)
+
+
+def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
+    """Means over the seeds of every turn and model; cells that failed are left out."""
+    good = frame[frame["status"] == "ok"]
+    return good.groupby(["test", "model", "kind"], sort=False)[["A", "H", "H_90", "naive"]].mean().reset_index()
