@@ -8,15 +8,14 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import islice
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection, wait
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from shipid.errors import ShipidError
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
@@ -50,41 +49,42 @@ def on_workers(work: Callable[[Task], Result], tasks: Sequence[Task], count: int
     What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this
     process, whatever they are doing.
     """
-    from multiprocessing import get_context
-    from multiprocessing.connection import wait
-
     from shipid.simulation.scan import uninterrupted
 
-    context = get_context(METHOD)
-    left = iter(tasks)
-    doing: dict[Any, Task] = {}
-    processes = []
+    left, workers, doing = iter(tasks), ExitStack(), {}
     try:
         with uninterrupted(), _one_thread():  # half a process would complain
             for task in islice(left, count):
-                here, there = context.Pipe()
-                process = context.Process(target=_serve, args=(there, work), daemon=True)
-                process.start()
-                processes.append(process)
-                there.close()
-                here.send(task)
-                doing[here] = task
+                connection = _start(work, workers)
+                connection.send(task)
+                doing[connection] = task
         while doing:
-            for ready in wait(list(doing)):
-                found, done = ready.recv(), doing.pop(ready)  # type: ignore[union-attr]
+            for ready in cast("list[Connection]", wait(list(doing))):
+                found, done = ready.recv(), doing.pop(ready)
                 if isinstance(found, Exception):
                     raise found
                 for task in islice(left, 1):
-                    ready.send(task)  # type: ignore[union-attr]
+                    ready.send(task)
                     doing[ready] = task
                 yield done, found
     except (EOFError, ConnectionError):
-        raise ShipidError("a worker was killed, perhaps for want of memory: continue with fewer --workers") from None
+        raise ShipidError(
+            "a worker was killed, perhaps for want of memory; what is finished is kept: go on with fewer --workers"
+        ) from None
     finally:
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            process.join()
+        workers.close()
+
+
+def _start(work: Callable[[Any], Any], workers: ExitStack) -> Connection:
+    """Start a process that does the work, ended when `workers` closes; returns the connection to it."""
+    context: Any = get_context(METHOD)
+    here, there = Pipe()
+    process = context.Process(target=_serve, args=(there, work), daemon=True)
+    process.start()
+    there.close()
+    workers.callback(process.join)
+    workers.callback(process.terminate)
+    return here
 
 
 def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
