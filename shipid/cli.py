@@ -725,7 +725,7 @@ def _draw(events: Iterable[Event]) -> None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    with Progress(*columns, console=console) as progress:
+    with Progress(*columns, console=console, refresh_per_second=2) as progress:  # drawing takes time from workers
         task = progress.add_task("cells", total=None)
         for event in events:
             if event.kind == "note":

@@ -1,4 +1,4 @@
-"""Run a plan: batches on Dask, results stored as they come, so that an interrupted run resumes."""
+"""Run a plan: batches on workers, results stored as they come, so that an interrupted run resumes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,12 +23,11 @@ from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
-from shipid.simulation.scan import uninterrupted
 from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, planned, prepare
-from shipid.study.workers import METHOD, import_for_workers
+from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
@@ -61,7 +60,7 @@ def run_study(
 
     Parameters
     ----------
-    workers : processes of the local cluster, one thread each; default: one per core, no more than batches.
+    workers : local processes, one thread each; default: one per core, no more than batches.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
     """
@@ -191,45 +190,35 @@ def _compute(
     plan: Plan, prepared: Prepared, batches: list[Batch], workers: int | None, scheduler: str | None, device: str
 ) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
     """Batches and their results in the order in which they finish."""
+    if scheduler is not None:
+        yield from _on_dask(plan, prepared, batches, scheduler, device)
+        return
+    work = partial(run_batch, plan, prepared, device=device)
+    yield from on_workers(work, batches, workers or os.cpu_count() or 1)
+
+
+def _on_dask(
+    plan: Plan, prepared: Prepared, batches: list[Batch], scheduler: str, device: str
+) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
+    """The same on the cluster of an existing scheduler."""
     if not batches:
         return
-    with _client(workers, scheduler, len(batches)) as client:
-        from dask.distributed import as_completed
-
-        shared = client.scatter([plan, prepared], broadcast=True)
-        futures = {
-            client.submit(
-                run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
-            ): batch
-            for batch in batches
-        }
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-
-
-@contextmanager
-def _client(workers: int | None, scheduler: str | None, most: int) -> Iterator[Any]:
-    """A Dask client: of an existing scheduler, or of a local cluster of single-threaded processes."""
     import dask
-    from dask.distributed import Client, LocalCluster
+    from dask.distributed import Client, as_completed
 
-    quiet = {"distributed.worker.memory.terminate": False, "distributed.admin.large-graph-warning-threshold": "1GB"}
-    quiet |= {"distributed.worker.multiprocessing-method": METHOD}
-    with warnings.catch_warnings(), dask.config.set(quiet):
+    with warnings.catch_warnings(), dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
         warnings.simplefilter("ignore")
-        if scheduler is not None:
-            try:
-                client = Client(scheduler, timeout="10s")
-            except (OSError, ValueError) as error:
-                raise ShipidError(
-                    f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}"
-                ) from None
-            with client:
-                yield client
-            return
-        count = min(workers or os.cpu_count() or 1, most)
-        options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50, "memory_limit": 0}
-        with ExitStack() as stack:
-            with uninterrupted():  # half a cluster cannot be closed in good order
-                client = stack.enter_context(Client(stack.enter_context(LocalCluster(n_workers=count, **options))))
-            yield client
+        try:
+            client = Client(scheduler, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
+        with client:
+            shared = client.scatter([plan, prepared], broadcast=True)
+            futures = {
+                client.submit(
+                    run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
+                ): batch
+                for batch in batches
+            }
+            for future in as_completed(futures):
+                yield futures[future], future.result()

@@ -1,4 +1,4 @@
-"""How local workers start: quickly where that is safe. Imports nothing heavy, so that it can be called first of all."""
+"""Local workers: processes of one thread each that start quickly. Imports nothing heavy: it is called first of all."""
 
 from __future__ import annotations
 
@@ -6,9 +6,22 @@ import os
 import signal
 import sys
 import threading
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection, wait
+from queue import SimpleQueue
+from typing import Any, TypeVar, cast
+
+from shipid.errors import ShipidError
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 
 
 def import_for_workers() -> None:
@@ -21,12 +34,91 @@ def import_for_workers() -> None:
         return
     from multiprocessing import forkserver
 
-    before, environment = signal.signal(signal.SIGINT, signal.SIG_IGN), dict(os.environ)
-    try:  # both are inherited
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with _one_thread():
+            forkserver.set_forkserver_preload(["shipid.study.run"])
+            forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def on_workers(work: Callable[[Task], Result], tasks: Sequence[Task], count: int) -> Iterator[tuple[Task, Result]]:
+    """Tasks and their results from so many processes, as they finish; each process receives `work` once.
+
+    What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this
+    process, whatever they are doing.
+    """
+    from shipid.simulation.scan import uninterrupted
+
+    left, workers, doing = iter(tasks), ExitStack(), {}
+    try:
+        with uninterrupted(), _one_thread():  # half a process would complain
+            for task in islice(left, count):
+                connection = _start(work, workers)
+                connection.send(task)
+                doing[connection] = task
+        while doing:
+            for ready in cast("list[Connection]", wait(list(doing))):
+                found, done = ready.recv(), doing.pop(ready)
+                if isinstance(found, Exception):
+                    raise found
+                for task in islice(left, 1):
+                    ready.send(task)
+                    doing[ready] = task
+                yield done, found
+    except (EOFError, ConnectionError):
+        raise ShipidError(
+            "a worker was killed, perhaps for want of memory; what is finished is kept: go on with fewer --workers"
+        ) from None
+    finally:
+        workers.close()
+
+
+def _start(work: Callable[[Any], Any], workers: ExitStack) -> Connection:
+    """Start a process that does the work, ended when `workers` closes; returns the connection to it."""
+    context: Any = get_context(METHOD)
+    here, there = Pipe()
+    process = context.Process(target=_serve, args=(there, work), daemon=True)
+    process.start()
+    there.close()
+    workers.callback(process.join)
+    workers.callback(process.terminate)
+    return here
+
+
+def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
+    """Do the tasks that come; errors are results that keep where they arose."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tasks: SimpleQueue[Any] = SimpleQueue()
+    threading.Thread(target=_listen, args=(connection, tasks), daemon=True).start()
+    while True:
+        found = None
+        task = tasks.get()
+        try:
+            found = work(task)
+        except Exception as error:
+            error.add_note("".join(traceback.format_exception(error)))
+            found = error
+        connection.send(found)
+
+
+def _listen(connection: Connection, tasks: SimpleQueue[Any]) -> None:
+    """Receive tasks until the other end is closed or gone; then end this process, whatever it is doing."""
+    try:
+        while True:
+            tasks.put(connection.recv())
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes started meanwhile use one thread, whatever they import."""
+    before = dict(os.environ)
+    try:
         os.environ.update(ONE_THREAD)
-        forkserver.set_forkserver_preload(["shipid.study.run", "distributed.nanny"])
-        forkserver.ensure_running()
+        yield
     finally:
         os.environ.clear()
-        os.environ.update(environment)
-        signal.signal(signal.SIGINT, before)
+        os.environ.update(before)

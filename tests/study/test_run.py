@@ -33,7 +33,7 @@ def numbers(folder: Path) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["cell"])
 
 
-def test_interrupted_on_a_cluster_and_resumed_here_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
+def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
     """Two processes, stopped after the first batch; the other batch is done in this process."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     events = run_study(plan, folder, workers=2)
@@ -54,6 +54,16 @@ def test_interrupted_on_a_cluster_and_resumed_here_gives_the_same_numbers(tmp_pa
     assert stored[0].read_bytes() == before
     assert numbers(folder) == numbers(tiny_run)
     assert read_results(folder).complete
+
+
+def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
+    from dask.distributed import LocalCluster
+
+    options = {"processes": False, "protocol": "tcp://", "dashboard_address": ":0", "silence_logs": 50}
+    with LocalCluster(n_workers=1, threads_per_worker=1, **options) as cluster:
+        events = list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler=cluster.scheduler_address))
+    assert [event.done for event in events if event.kind in ("start", "cell", "end")] == [*range(9), 8]
+    assert numbers(tmp_path / "run") == numbers(tiny_run)
 
 
 def test_a_finished_run_does_nothing_again(tmp_path: Path, tiny_run: Path) -> None:

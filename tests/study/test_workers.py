@@ -1,15 +1,19 @@
-"""Workers: one process imports for all, on one thread each, and what starts it is as it was."""
+"""Workers: every task once, whoever does it; errors and deaths are told; no process outlives its iterator or parent."""
 
 from __future__ import annotations
 
+import math
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
-from shipid.study.workers import METHOD, ONE_THREAD, import_for_workers
+from shipid.errors import ShipidError
+from shipid.study.workers import METHOD, ONE_THREAD, import_for_workers, on_workers
 
 forked = pytest.mark.skipif(METHOD != "forkserver", reason="workers are forked on Linux only")
 
@@ -39,3 +43,60 @@ process.join()
     environment = os.environ | dict.fromkeys(ONE_THREAD, "2")
     found = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     assert found.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), found.stderr
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_every_task_is_done_once(count: int) -> None:
+    tasks = [4.0, 1.0, 0.0, 9.0][: 4 if count < 3 else 2]  # also fewer tasks than processes
+    assert sorted(on_workers(math.sqrt, tasks, count)) == [(task, task**0.5) for task in sorted(tasks)]
+    assert not multiprocessing.active_children()
+
+
+def test_nothing_to_do_starts_nothing() -> None:
+    assert list(on_workers(math.sqrt, [], 2)) == []
+
+
+def test_an_error_arises_here_and_keeps_where_it_arose() -> None:
+    with pytest.raises(ValueError, match="math domain") as caught:
+        list(on_workers(math.sqrt, [-1.0], 1))
+    assert "found = work(task)" in caught.value.__notes__[0]
+    assert not multiprocessing.active_children()
+
+
+def test_a_killed_worker_is_one_line() -> None:
+    with pytest.raises(ShipidError, match="a worker was killed") as caught:
+        list(on_workers(signal.raise_signal, [signal.SIGKILL, signal.SIGKILL], 2))
+    assert "\n" not in str(caught.value)
+    assert not multiprocessing.active_children()
+
+
+def test_closing_ends_busy_workers() -> None:
+    results = on_workers(time.sleep, [0, 3600], 2)
+    assert next(results) == (0, None)
+    results.close()  # type: ignore[attr-defined]
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes of Windows have no groups to interrupt")
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_their_parent_and_without_noise(sent: signal.Signals) -> None:
+    """Ctrl-C goes to all processes of a terminal, a kill to one; what all inherited is closed when all have ended."""
+    program = """
+import time
+from shipid.study.workers import on_workers
+try:
+    for task, _ in on_workers(time.sleep, [0, 3600, 3600], 2):
+        print("begun", flush=True)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"begun\n"
+        if sent == signal.SIGINT:
+            os.killpg(process.pid, sent)
+        else:
+            process.kill()
+        out, err = process.communicate(timeout=60)
+        assert (out, err) == (b"interrupted\n" if sent == signal.SIGINT else b"", b"")
