@@ -52,7 +52,7 @@ class Identify(BaseModel):
         description="dotted paths; * and [order >= 3] select, as in a family"
     )
     fixed: list[str] = Field(default=[], description="selections taken out again")
-    together: list[Annotated[list[str], Field(min_length=2)]] = Field(
+    together: list[Annotated[list[str], Field(min_length=1)]] = Field(
         default=[], description="lists of selections that share one factor"
     )
     prior: dict[str, Positive] = Field(default={}, description="selection -> standard deviation of the factor")
@@ -104,7 +104,7 @@ class Unknowns:
     groups : paths that share each factor; the first names it.
     scale : per group, the value of each of its paths at factor 1.
     centre : (n,) factor of the base, 1, or 0 where the base value is 0.
-    low, high : (n,) bounds. prior : (n,) standard deviations, inf where there is none.
+    low, high : (n,) bounds; 0 below where the vessel's own checks refuse the other sign. prior : (n,) standard deviations, inf where there is none.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -151,20 +151,34 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
             message = f"{bare} is 0, which no factor changes: give its size under scale, or fix it"
             raise DocumentError(message, file=file, path=f"{BLOCK}.scale")
         scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
-    names = [group[0] for group in groups]
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
-    low, high, prior = np.full(len(groups), -np.inf), np.full(len(groups), np.inf), np.full(len(groups), np.inf)
+    high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
+    low = np.array([0.0 if any(_keeps_sign(vessel, path) for path in group) else -np.inf for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
     for pattern, limits in settings.bounds.items():
         for path in chosen([pattern], "bounds"):
             if path in place:
-                low[place[path]], high[place[path]] = limits
+                low[place[path]], high[place[path]] = limits  # as the user says, also below 0
     for pattern, width in settings.prior.items():
         for path in chosen([pattern], "prior"):
             if path in place:
                 prior[place[path]] = width
-    assert len(names) == len(set(names))
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
+
+
+_SIGNED: dict[tuple[str, str], bool] = {}
+
+
+def _keeps_sign(vessel: Vessel, path: str) -> bool:
+    """Whether the vessel's own checks refuse the other sign: added mass, drag coefficients, lengths."""
+    key = (vessel.digest, path)
+    if key not in _SIGNED:
+        try:
+            vessel.with_values({path: -vessel.parameters[path]})
+            _SIGNED[key] = False
+        except DocumentError:
+            _SIGNED[key] = vessel.parameters[path] != 0
+    return _SIGNED[key]
 
 
 def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list[tuple[str, ...]]:
@@ -187,7 +201,7 @@ def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list
 
 
 def overrides(settings: Identify, runs: Sequence[str], vessel: Vessel, channels: Sequence[str]) -> dict[str, Any]:
-    """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for a name that is none."""
+    """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name."""
     result: dict[str, dict[str, float]] = {run: {} for run in runs}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]
     for key, value in documents.leaves(settings.runs):

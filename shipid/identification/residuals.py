@@ -191,7 +191,8 @@ class Intervals:
         seen, self.weight, self.time = (np.array(list(each)) for each in zip(*map(self._seen, places), strict=True))
         work = self.length * len(places) * fit.model.size
         self.native = work > COMPILE_FROM and compiler() is not None
-        self.known, self.seen = (pack(known), pack(seen)) if self.native else (known, seen)
+        self.known: Array = pack(known) if self.native else known
+        self.seen: Array = pack(seen) if self.native else seen
         self.guess = self.begin(np.tile(fit.centres, (len(fit.runs), 1)))[0]
 
     def __len__(self) -> int:
@@ -339,7 +340,7 @@ class Prediction:
 
 
 def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = None) -> Prediction:
-    """Run every segment as a whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: measured)."""
+    """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: as measured)."""
     intervals = Intervals(fit, 0)
     q = fit.centres + fit.widths * nuisances
     measured, slope = intervals.begin(q)

@@ -7,7 +7,7 @@ interval. Objective, constraints, their sparse derivatives and the Gauss-Newton 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +34,11 @@ OPTIONS = {
     "ipopt.sb": "yes",
     "ipopt.max_iter": MOST_ITERATIONS,
     "ipopt.tol": TOLERANCE,
+    "ipopt.acceptable_iter": 3,  # kinks of |v| and of limited advance ratios keep the last digits from settling
+    "ipopt.acceptable_tol": 1e-4,
+    "ipopt.acceptable_constr_viol_tol": 1e-5,
+    "ipopt.acceptable_obj_change_tol": 1e-8,
+    "ipopt.mu_init": 1e-4,  # the objective is of order one
     "ipopt.nlp_scaling_method": "none",  # the unknowns and residuals are scaled already
     "ipopt.bound_relax_factor": 0.0,
 }
@@ -41,7 +46,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Point:
-    """Where a solve begins or ends: factors (n,), nuisances (R, nq) in prior widths from their centres, nodes (K, nn)."""
+    """Where a solve begins or ends: factors (n,), nuisances (R, nq) in prior widths off their centres, nodes (K, nn)."""
 
     factors: Array
     nuisances: Array
@@ -59,7 +64,7 @@ class Result:
 
 
 def loss(r: Array, threshold: float) -> tuple[Array, Array]:
-    """Contribution of each residual to the objective, and its weight: r^2 and 1, linear beyond the threshold (Huber)."""
+    """What each residual adds to the objective, and its weight: r^2 and 1, linear beyond the threshold (Huber)."""
     size = np.abs(r)
     inside = size <= threshold
     with np.errstate(all="ignore"):
@@ -190,15 +195,11 @@ class _Numbers:
             parts += [np.ones(self.away.size), -self.slope.ravel()]
         return _placed(problem.jacobian_place, np.concatenate(parts), problem.jacobian.nnz())
 
-    def _scaled(self) -> Array:
-        R = self.found.R * self.problem.column_scale[:, None]
-        return R
-
     def gradient(self) -> Array:
         """Of half the objective."""
         problem, fit = self.problem, self.problem.fit
         own = (self.found.R @ (self.weight * self.found.r)[:, :, None])[:, :, 0] * problem.column_scale
-        result = np.bincount(problem.columns.ravel(), own.ravel(), problem.size)
+        result: Array = np.bincount(problem.columns.ravel(), own.ravel(), problem.size).astype(float)
         n, nuisances = fit.num_factors, self.point.nuisances.ravel()
         result[:n] += self.prior / fit.unknown.prior
         result[n : n + len(nuisances)] += nuisances
@@ -208,7 +209,7 @@ class _Numbers:
             result[columns[:, : problem.nn]] += pull
             q = columns[:, columns.shape[1] - problem.nq :]
             np.subtract.at(result, q, (pull[:, None] @ self.slope)[:, 0])
-        return np.asarray(result)
+        return result
 
     def hessian(self) -> Array:
         """Nonzeros of the upper triangle of the Gauss-Newton Hessian of half the objective."""
@@ -237,7 +238,7 @@ def _pattern(row: Index, column: Index, num_rows: int, num_columns: int) -> tupl
 
 
 def _placed(place: Index, values: Array, count: int) -> Array:
-    return np.bincount(place, values, count) if count else np.zeros(0)
+    return np.bincount(place, values, count).astype(float) if count else np.zeros(0)
 
 
 class _Memo:
@@ -262,7 +263,7 @@ class _Memo:
         return bool(self.held)
 
 
-class _Callback(ca.Callback):  # type: ignore[misc]
+class _Callback(ca.Callback):
     """A CasADi function of numbers: names and sparsities of what goes in and out, and what it does."""
 
     def __init__(
@@ -290,8 +291,8 @@ class _Callback(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> Any:
         return list(self.outputs.values())[i]
 
-    def eval(self, given: list[Any]) -> list[Any]:
-        return self.run(*given)
+    def eval(self, arg: Sequence[Any]) -> list[Any]:
+        return self.run(*arg)
 
 
 def solve(problem: Problem, start: Point, progress: Progress | None = None) -> Result:

@@ -31,7 +31,7 @@ COLUMNS = {"down": "z"}
 class Layout:
     """What is compiled: the structure of a fit without its numbers.
 
-    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, those that move the ship first.
+    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, first those that move the ship.
     weather : environment channels that are given; the others are zero. lags : steps that commands may be late by.
     """
 
@@ -279,7 +279,7 @@ def scan(layout: Layout, num_steps: int) -> ca.Function:
 
 
 def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """Ends (K, size) and outputs (K, N, entries) of K intervals: x (K, size), fixed (K, .), known and seen (K, N, .)."""
+    """Ends (K, size) and outputs (K, N, entries) of K intervals; x (K, size), fixed (K, .), known, seen (K, N, .)."""
     count, num_steps = known.shape[:2]
     with uninterrupted():
         end, record = scan(layout, num_steps).map(count)(
