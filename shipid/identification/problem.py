@@ -104,7 +104,8 @@ class Unknowns:
     groups : paths that share each factor; the first names it.
     scale : per group, the value of each of its paths at factor 1.
     centre : (n,) factor of the base, 1, or 0 where the base value is 0.
-    low, high : (n,) bounds; 0 below where the vessel's own checks refuse the other sign. prior : (n,) standard deviations, inf where there is none.
+    low, high : (n,) bounds; at least 0 where the vessel's own checks refuse the other sign.
+    prior : (n,) standard deviations, inf where there is none.
     """
 
     groups: tuple[tuple[str, ...], ...]

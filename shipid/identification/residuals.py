@@ -340,7 +340,7 @@ class Prediction:
 
 
 def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = None) -> Prediction:
-    """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: as measured)."""
+    """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: the log)."""
     intervals = Intervals(fit, 0)
     q = fit.centres + fit.widths * nuisances
     measured, slope = intervals.begin(q)

@@ -8,7 +8,7 @@ interval. Objective, constraints, their sparse derivatives and the Gauss-Newton 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -22,9 +22,11 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Progress = Callable[[int, float], object]
 INTERVAL = 20  # steps between nodes
-MOST_ITERATIONS = 200
+MOST_ITERATIONS = 60  # then single shooting from there, whose objective cannot cycle
+MOST_POLISHING = 200
 TOLERANCE = 1e-9  # of the scaled optimality conditions
-OPTIONS = {
+CIRCLED = ("Maximum_Iterations_Exceeded", "Restoration_Failed", "Search_Direction_Becomes_Too_Small")
+OPTIONS: dict[str, Any] = {
     "print_time": False,
     "show_eval_warnings": False,
     "error_on_fail": False,
@@ -32,7 +34,6 @@ OPTIONS = {
     "calc_lam_p": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.max_iter": MOST_ITERATIONS,
     "ipopt.tol": TOLERANCE,
     "ipopt.acceptable_iter": 3,  # kinks of |v| and of limited advance ratios keep the last digits from settling
     "ipopt.acceptable_tol": 1e-4,
@@ -46,7 +47,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Point:
-    """Where a solve begins or ends: factors (n,), nuisances (R, nq) in prior widths off their centres, nodes (K, nn)."""
+    """Where a solve begins or ends: factors (n,), nuisances (R, nq) in prior widths, off centre; nodes (K, nn)."""
 
     factors: Array
     nuisances: Array
@@ -296,17 +297,38 @@ class _Callback(ca.Callback):
 
 
 def solve(problem: Problem, start: Point, progress: Progress | None = None) -> Result:
-    """Minimise from a start; the sentence for what happened is the caller's. Ctrl-C stops after the iteration."""
+    """Minimise from a start; the sentence for what happened is the caller's. Ctrl-C stops after the iteration.
+
+    On real data, kinks and large residuals can make the Gauss-Newton steps trade continuity for fit in a circle. The
+    nodes are near the truth by then, so single shooting from there ends it: its objective falls with every step.
+    """
+    result = _minimise(problem, start, progress, MOST_ITERATIONS, 0)
+    if result.word not in CIRCLED:
+        return result
+    whole = Problem(problem.fit, 0)
+    point = Point(result.point.factors, result.point.nuisances, result.point.nodes[problem.starts])
+    second = _minimise(whole, point, progress, MOST_POLISHING, result.iterations)
+    if not np.isfinite(second.objective):
+        return result
+    nodes = result.point.nodes.copy()
+    nodes[problem.starts] = second.point.nodes
+    return replace(second, point=replace(second.point, nodes=nodes))
+
+
+def _minimise(problem: Problem, start: Point, progress: Progress | None, most: int, before: int) -> Result:
+    """One run of IPOPT of at most so many iterations, after those `before`."""
     with uninterrupted() as held:
         memo = _Memo(problem, progress, held)
+        memo.iterations += before
         low, high = problem.bounds()
-        found, word = _ipopt(problem, memo, np.clip(problem.join(start), low, high), low, high)
+        found, word = _ipopt(problem, memo, np.clip(problem.join(start), low, high), most)
     numbers = memo(found)
-    return Result(numbers.point, numbers.objective, max(memo.iterations, 0), word)
+    return Result(numbers.point, numbers.objective, max(memo.iterations, before), word)
 
 
-def _ipopt(problem: Problem, memo: _Memo, x0: Array, low: Array, high: Array) -> tuple[Array, str]:
+def _ipopt(problem: Problem, memo: _Memo, x0: Array, most: int) -> tuple[Array, str]:
     """Variables at the end, and IPOPT's word for it."""
+    low, high = problem.bounds()
     dense, m = ca.Sparsity.dense, problem.num_constraints
     x, p, one = dense(problem.size), dense(0, 0), dense(1)
 
@@ -351,13 +373,15 @@ def _ipopt(problem: Problem, memo: _Memo, x0: Array, low: Array, high: Array) ->
         {"stop": one},
         lambda *given: [memo.iterated(float(given[ca.nlpsol_out().index("f")]))],
     )
-    symbol = ca.MX.sym("x", problem.size)
+    symbol: Any = ca.MX.sym("x", problem.size)
     value, rows = functions["both"](symbol)
-    options = {
+    options: dict[str, Any] = {
         **OPTIONS,
+        "ipopt.max_iter": most,
         **{name: functions[name] for name in ("grad_f", "jac_g", "hess_lag")},
         "iteration_callback": after,
     }
-    solver = ca.nlpsol("solver", "ipopt", {"x": symbol, "f": value, "g": rows}, options)
+    programme: dict[str, Any] = {"x": symbol, "f": value, "g": rows}
+    solver = ca.nlpsol("solver", "ipopt", programme, options)
     answer = solver(x0=x0, lbx=low, ubx=high, lbg=0, ubg=0)
     return np.asarray(answer["x"]).ravel(), str(solver.stats()["return_status"])

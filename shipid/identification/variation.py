@@ -31,7 +31,7 @@ COLUMNS = {"down": "z"}
 class Layout:
     """What is compiled: the structure of a fit without its numbers.
 
-    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, first those that move the ship.
+    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, the moving ones first.
     weather : environment channels that are given; the others are zero. lags : steps that commands may be late by.
     """
 
