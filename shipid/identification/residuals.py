@@ -350,8 +350,9 @@ def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = No
     num_nodes, n, num_signals = len(fit.model.node), fit.num_factors, len(fit.layout.signals)
     R = found.R.transpose(0, 2, 1)  # (S, N ny, nc)
     by_node, by_factor, by_q = np.split(R, [num_nodes, num_nodes + n], axis=2)
-    by_q = (by_q + by_node @ slope) * fit.widths
     width = fit.start_width or 0.0
+    with np.errstate(all="ignore"):
+        by_q, by_start = (by_q + by_node @ slope) * fit.widths, by_node * (fit.node_scale * width)
     keep = (intervals.weight > 0).reshape(len(intervals), -1)
     where, place = np.nonzero(keep)
     away = (begun - measured) / (fit.node_scale * fit.start_width) if fit.start_width is not None else np.zeros((0, 0))
@@ -363,7 +364,7 @@ def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = No
         r=found.r[keep],
         by_factor=by_factor[keep],
         by_nuisance=by_q[keep],
-        by_start=by_node[keep] * fit.node_scale * width,
+        by_start=by_start[keep],
         segment=where,
         run=intervals.run[where],
         time=np.repeat(intervals.time, num_signals, axis=1).reshape(len(intervals), -1)[keep],

@@ -7,7 +7,7 @@ interval. Objective, constraints, their sparse derivatives and the Gauss-Newton 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,8 @@ from shipid.simulation.scan import uninterrupted
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Progress = Callable[[int, float], object]
-INTERVAL = 20  # steps between nodes
+INTERVALS = (20, 5, 1)  # steps between nodes: the first at whose ends the start is not lost
+LOST = 300.0  # scales of a node: far beyond what a step of the solver mends
 MOST_ITERATIONS = 60  # then single shooting from there, whose objective cannot cycle
 MOST_POLISHING = 200
 TOLERANCE = 1e-9  # of the scaled optimality conditions
@@ -75,7 +76,7 @@ def loss(r: Array, threshold: float) -> tuple[Array, Array]:
 class Problem:
     """The nonlinear programme of one fit; variables are factors, nuisances in prior widths, nodes in their scale."""
 
-    def __init__(self, fit: Fit, length: int = INTERVAL) -> None:
+    def __init__(self, fit: Fit, length: int = INTERVALS[0]) -> None:
         self.fit, self.intervals = fit, Intervals(fit, length)
         count, self.nn, self.nq, n = len(self.intervals), len(fit.model.node), len(fit.names), fit.num_factors
         self.size = n + len(fit.runs) * self.nq + count * self.nn
@@ -145,6 +146,17 @@ class Problem:
         )
         nuisances = np.tile(first, (len(fit.runs), 1))
         return Point(factors, nuisances, self.intervals.begin(fit.centres + fit.widths * nuisances)[0])
+
+    def lost(self, point: Point) -> NDArray[np.bool_]:
+        """(K,) intervals that leave what was measured so far that no step of the solver brings them back."""
+        with np.errstate(all="ignore"):
+            found = self.evaluate(self.join(point)).found
+            away = np.zeros(len(self.intervals))
+            away[self.ties] = np.abs((found.end[self.ties] - point.nodes[self.ties + 1]) / self.fit.node_scale).max(
+                axis=1
+            )
+            finite = np.isfinite(found.r).all(axis=1) & np.isfinite(found.end).all(axis=1)
+        return ~finite | ~(away < LOST)
 
     def bounds(self) -> tuple[Array, Array]:
         """Least and greatest value of every variable."""
@@ -296,13 +308,23 @@ class _Callback(ca.Callback):
         return self.run(*arg)
 
 
-def solve(problem: Problem, start: Point, progress: Progress | None = None) -> Result:
+def poses(fit: Fit, factors: Array) -> Iterator[tuple[Problem, Point]]:
+    """The programme of a fit and where it begins, with ever closer nodes, from the first whose ends are not lost."""
+    for length in INTERVALS:
+        problem = Problem(fit, length)
+        start = problem.start(factors)
+        if length == INTERVALS[-1] or not problem.lost(start).any():
+            yield problem, start
+
+
+def solve(problem: Problem, start: Point, progress: Progress | None = None, before: int = 0) -> Result:
     """Minimise from a start; the sentence for what happened is the caller's. Ctrl-C stops after the iteration.
 
-    On real data, kinks and large residuals can make the Gauss-Newton steps trade continuity for fit in a circle. The
-    nodes are near the truth by then, so single shooting from there ends it: its objective falls with every step.
+    Iterations are counted on from those `before`. On real data, kinks and large residuals can make Gauss-Newton steps
+    trade continuity for fit in a circle. The nodes are near the truth by then, so single shooting from there ends it:
+    its objective falls with every step.
     """
-    result = _minimise(problem, start, progress, MOST_ITERATIONS, 0)
+    result = _minimise(problem, start, progress, MOST_ITERATIONS, before)
     if result.word not in CIRCLED:
         return result
     whole = Problem(problem.fit, 0)
@@ -317,12 +339,12 @@ def solve(problem: Problem, start: Point, progress: Progress | None = None) -> R
 
 def _minimise(problem: Problem, start: Point, progress: Progress | None, most: int, before: int) -> Result:
     """One run of IPOPT of at most so many iterations, after those `before`."""
-    with uninterrupted() as held:
+    with uninterrupted() as held, np.errstate(all="ignore"):
         memo = _Memo(problem, progress, held)
         memo.iterations += before
         low, high = problem.bounds()
         found, word = _ipopt(problem, memo, np.clip(problem.join(start), low, high), most)
-    numbers = memo(found)
+        numbers = memo(found)
     return Result(numbers.point, numbers.objective, max(memo.iterations, before), word)
 
 

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.identification.problem import BLOCK, Identify, overrides
 from shipid.identification.residuals import Fit, Prediction, build, predict
-from shipid.identification.shooting import Point, Problem, Progress, Result, loss, solve
+from shipid.identification.shooting import Point, Progress, Result, loss, poses, solve
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -148,31 +148,37 @@ def _solved(
     objective_start: float | None = None,
 ) -> Solution:
     """One solve and what it says."""
-    problem = Problem(fit)
-    start = problem.start(factors)
-    if (
-        earlier is not None
-        and earlier.nodes.shape == start.nodes.shape
-        and earlier.nuisances.shape == start.nuisances.shape
-    ):
-        start = Point(factors, earlier.nuisances, earlier.nodes)
-    if objective_start is None:
-        objective_start = _objective(fit, predict(fit, factors, start.nuisances))
-    result = solve(problem, start, progress)
-    end = predict(fit, result.point.factors, result.point.nuisances, result.point.nodes[problem.starts])
-    word = WORDS.get(result.word, "not converged")
-    if word == "ok" and not np.isfinite(end.r).all():
-        word = "diverged"
-    lost = ~np.isfinite(problem.evaluate(problem.join(start)).found.r).all(axis=1)
+    before = 0
+    for problem, begin in poses(fit, factors):
+        if objective_start is None:
+            objective_start = _objective(fit, predict(fit, factors, begin.nuisances))
+        result = solve(problem, _warm(begin, factors, earlier), progress, before)
+        end = predict(fit, result.point.factors, result.point.nuisances, result.point.nodes[problem.starts])
+        word, before = WORDS.get(result.word, "not converged"), result.iterations
+        if word == "ok" and not np.isfinite(end.r).all():
+            word = "diverged"
+        if word in ("ok", "stopped"):
+            break
+    assert objective_start is not None
+    lost = problem.lost(begin)
     where = fit.runs[problem.intervals.run[np.argmax(lost)]] if lost.any() else None
     return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
+
+
+def _warm(begin: Point, factors: Array, earlier: Point | None) -> Point:
+    """Where an earlier solution ended, if it was of the same shape."""
+    if earlier is None or earlier.nodes.shape != begin.nodes.shape or earlier.nuisances.shape != begin.nuisances.shape:
+        return begin
+    return Point(factors, earlier.nuisances, earlier.nodes)
 
 
 def _objective(fit: Fit, at: Prediction) -> float:
     """Sum of squares, priors included; inf where a prediction diverges."""
     threshold = fit.settings.threshold if fit.settings.loss == "huber" else np.inf
     prior = (at.factors - fit.unknown.centre) / fit.unknown.prior
-    total = float(loss(at.r, threshold)[0].sum() + (prior**2).sum() + (at.nuisances**2).sum() + (at.away**2).sum())
+    with np.errstate(all="ignore"):
+        squares = loss(at.r, threshold)[0].sum() + (prior**2).sum()
+        total = float(squares + (at.nuisances**2).sum() + (at.away**2).sum())
     return total if np.isfinite(total) else float("inf")
 
 

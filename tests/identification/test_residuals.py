@@ -24,7 +24,7 @@ CASES = {
     "actuators": ["hull.derivatives.N_u*", "thruster.port.actuator.*"],
     "many-strips": ["hull.crossflow.C_d"],
     "roll": ["hull.derivatives.K_p", "hull.derivatives.N_uv"],
-    "kvlcc2-l7": ["hull.mmg.Y_*", "propeller.*.K_T.*"],
+    "kvlcc2-l7": ["hull.mmg.Y_*", "thruster.*.K_T.*"],
 }
 
 
