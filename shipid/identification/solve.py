@@ -161,6 +161,8 @@ def _solved(
             break
     assert objective_start is not None
     lost = problem.lost(begin)
+    if word == "not converged" and lost.any():
+        word = "diverged"
     where = fit.runs[problem.intervals.run[np.argmax(lost)]] if lost.any() else None
     return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
 
