@@ -18,7 +18,7 @@ from shipid.simulation.printing import Printed, print_function
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
-GROUPS_A_THREAD = 4  # fewer are not worth waking a thread for
+THREADS_FROM = 1e5  # vectors stepped: below it starting a thread costs more than it saves
 
 
 class _Source:
@@ -163,7 +163,7 @@ def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arr
     def part(first: int, last: int) -> None:
         run(ctypes.c_long(first), ctypes.c_long(last), ctypes.c_long(num_steps), *arrays)
 
-    threads = min(cores(), max(1, groups // GROUPS_A_THREAD))
+    threads = min(cores(), groups) if groups * num_steps * model.size > THREADS_FROM else 1
     if threads == 1:
         part(0, groups)
     else:

@@ -76,6 +76,11 @@ class Fit:
         own = dict(zip(self.layout.signals, self.deviations, strict=True))
         return np.array([own.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
 
+    @cached_property
+    def whole(self) -> Intervals:
+        """Every prediction as one interval."""
+        return Intervals(self, 0)
+
     @property
     def num_factors(self) -> int:
         """Factors to find."""
@@ -341,7 +346,7 @@ class Prediction:
 
 def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = None) -> Prediction:
     """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: the log)."""
-    intervals = Intervals(fit, 0)
+    intervals = fit.whole
     q = fit.centres + fit.widths * nuisances
     measured, slope = intervals.begin(q)
     free = fit.start_width is not None and nodes is not None

@@ -262,6 +262,7 @@ class _Memo:
         self.at: Array | None = None
         self.numbers: _Numbers | None = None
         self.iterations = -1
+        self.failure: Exception | None = None
 
     def __call__(self, x: Array) -> _Numbers:
         if self.numbers is None or self.at is None or not np.array_equal(x, self.at):
@@ -271,9 +272,13 @@ class _Memo:
     def iterated(self, objective: float) -> bool:
         """Note one more iteration; whether to stop."""
         self.iterations += 1
+        stop = False
         if self.progress is not None:
-            self.progress(self.iterations, 2 * objective * self.problem.sum)
-        return bool(self.held)
+            try:
+                stop = bool(self.progress(self.iterations, 2 * objective * self.problem.sum))
+            except Exception as error:  # CasADi would turn it into a complaint of its own
+                self.failure = error
+        return stop or self.failure is not None or bool(self.held)
 
 
 class _Callback(ca.Callback):
@@ -344,6 +349,8 @@ def _minimise(problem: Problem, start: Point, progress: Progress | None, most: i
         memo.iterations += before
         low, high = problem.bounds()
         found, word = _ipopt(problem, memo, np.clip(problem.join(start), low, high), most)
+        if memo.failure is not None:
+            raise memo.failure
         numbers = memo(found)
     return Result(numbers.point, numbers.objective, max(memo.iterations, before), word)
 

@@ -91,7 +91,7 @@ def identify(
     Parameters
     ----------
     start : factors to begin with, or an earlier solution; default: as the settings say.
-    progress : called with the iteration and the objective after each.
+    progress : called with the iteration and the objective after each; what is true stops there.
 
     Raises
     ------

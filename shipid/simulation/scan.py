@@ -104,20 +104,25 @@ def run_casadi(
     return np.stack(records, axis=1), np.stack(worst)
 
 
+_holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
+
+
 @contextmanager
 def uninterrupted() -> Iterator[list[int]]:
     """Hold back Ctrl-C until a call into CasADi is over: there it would turn into a complaint about arguments.
 
-    Gives what is held back, so that a long call can look and stop.
+    Gives what is held back, so that a long call can look and stop. Inside another, the outer one holds.
     """
-    held: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield held
+    if _holding or threading.current_thread() is not threading.main_thread():
+        yield _holding[0] if _holding else []
         return
+    held: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+    _holding.append(held)
     try:
         yield held
     finally:
+        _holding.clear()
         signal.signal(signal.SIGINT, before)
         if held:  # also where the interrupt made the work fail
             raise KeyboardInterrupt

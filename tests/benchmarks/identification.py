@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from scipy.optimize import least_squares
 from shipid.data.dataset import Dataset
 from shipid.identification.problem import Identify
 from shipid.identification.residuals import Evaluation, Fit, Intervals, build
-
 from shipid.identification.solve import identify
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -41,7 +41,7 @@ def run() -> dict[str, Any]:
     start = dict(zip(fit.unknown.paths, begin.tolist(), strict=True))
     first = clock(lambda: identify(vessel, data, data.runs, settings, start=start))
     ways = {
-        "single": lambda: single(fit, begin),
+        "single": lambda: single(build(vessel, data, data.runs, settings), begin),
         "identify": lambda: identify(vessel, data, data.runs, settings, start=start),
     }
     seconds = best_of(ways, ROUNDS)
@@ -121,10 +121,8 @@ def _convergence(
     for seed in range(STARTS):
         begin = 1 + spread * np.random.default_rng(seed).uniform(-1, 1, fit.num_factors)
         start = dict(zip(fit.unknown.paths, begin.tolist(), strict=True))
-        try:
+        with suppress(ValueError):  # residuals are not finite in the initial point
             reached["single shooting"] += 2 * single(fit, begin).cost < best * (1 + NEAR)
-        except ValueError:  # residuals are not finite in the initial point
-            pass
         reached["identify"] += identify(vessel, data, data.runs, settings, start=start).objective < best * (1 + NEAR)
     return {f"starts off by {spread:.0%}: {name} converges": f"{n} of {STARTS}" for name, n in reached.items()}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -258,6 +260,27 @@ def test_progress_is_told() -> None:
     )
     assert [i for i, _ in told] == list(range(found.iterations + 1))
     assert told[-1][1] == pytest.approx(found.objective, abs=1e-6)
+
+
+def test_progress_can_stop_and_fail() -> None:
+    dataset, start = trials(SHIP, runs=2, steps=30), dict.fromkeys(FEW, 1.2)
+    found = identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: i == 1)
+    assert (found.status, found.iterations) == ("stopped", 1)
+    with pytest.raises(ZeroDivisionError):
+        identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: 1 / i)
+
+
+def test_ctrl_c_ends_it() -> None:
+    dataset, told = trials(SHIP, runs=2, steps=30), list[int]()
+
+    def interrupt(iteration: int, _objective: float) -> None:
+        told.append(iteration)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        identify(SHIP, dataset, dataset.runs, settings(), start=dict.fromkeys(FEW, 1.2), progress=interrupt)
+    assert told == [0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def solution_of(**more: object) -> Solution:
