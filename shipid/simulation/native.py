@@ -50,7 +50,7 @@ _OPERATIONS = {
     ca.OP_FMAX: "v_max({0}, {1})",
     ca.OP_IF_ELSE_ZERO: "((V)(({0} != 0) & (M){1}))",
 }
-_C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
+C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
 
@@ -179,8 +179,8 @@ class _Source:
 
     def __init__(self, model: Dynamics, step: float, method: Method) -> None:
         self.model, self.step, self.method = model, step, method
-        self.own = [print_function(f, STAGES, _C) for f in (model.rates, model.advance)]
-        self.sums = [print_function(term.function, _SUM_STAGES, _C) for term in model.sums]
+        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+        self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
         self.all = [*self.own, *self.sums]
 
     def offset(self, stage: int, printed: Printed) -> int:
@@ -278,9 +278,7 @@ const V dt[1] = {{ K(step) }};
         widths = [sum(term.widths.values()) for term in model.drawn]
         block = 1 if widths else BLOCK
         drawn = " ".join(f"own[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
-        return f"""#define W {wanted.lanes}
-{_HEAD}
-{_vector_functions(wanted)}
+        return f"""{head(wanted)}
 {self.functions()}
 {_MEASURE}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
@@ -356,10 +354,18 @@ def _folder(wanted: str) -> Path:
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method) -> Any:
     """The `run` of a model, compiled or from the cache; ShipidError if there is no compiler or it fails."""
-    found = compiler()
-    if found is None:
+    if compiler() is None:
         raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
-    source = _Source(model, step, method).text(target())
+    try:
+        return compiled(_Source(model, step, method).text(target()))
+    except ShipidError as error:
+        raise ShipidError(f"{error.message}: use engine 'torch'") from None
+
+
+def compiled(source: str) -> Any:
+    """The `run` of C source, compiled or from the cache; ShipidError if the compiler fails. There must be one."""
+    found = compiler()
+    assert found is not None
     words = "\n".join([source, *OPTIONS, found, _version(found), platform.machine(), *sorted(_processor())])
     folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
     library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
@@ -368,7 +374,7 @@ def _library(model: Dynamics, step: float, method: Method) -> Any:
     except OSError:  # not there, or not whole
         failure = _compile(found, source, library, target())
     if failure is not None:
-        raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]}): use engine 'torch'")
+        raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]})")
     return _loaded(library)
 
 
@@ -376,6 +382,11 @@ def _loaded(library: Path) -> Any:
     run = ctypes.CDLL(str(library)).run
     run.restype = None
     return run
+
+
+def head(wanted: Target) -> str:
+    """What every source begins with: the vector type of the target and its functions."""
+    return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
 
 
 def _padded(array: Array, width: int) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
@@ -15,6 +15,15 @@ import numpy as np
 from shipid.simulation.integrate import Array, Batch, Method, cores, integrate
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
+
+
+def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
+    """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
+    for term in model.sums:
+        own = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
+        columns = [ca.repmat(one, 1, own.shape[1]) for one in inputs]
+        tau = tau + ca.sum2(term.function.map(own.shape[1])(*columns, own))
+    return model.rates(*inputs, tau)
 
 
 @lru_cache(maxsize=32)
@@ -39,12 +48,7 @@ def casadi_scan(
     }
 
     def rates(x: Any, m: Any) -> Any:
-        total = tau
-        for term in model.sums:
-            own = entries[term.path] if term.arrays is None else ca.DM(term.arrays.T)
-            columns = [ca.repmat(a, 1, own.shape[1]) for a in (x, m, commands, environment, parameters)]
-            total = total + ca.sum2(term.function.map(own.shape[1])(*columns, own))
-        return model.rates(x, m, commands, environment, parameters, total)
+        return summed_rates(model, [x, m, commands, environment, parameters], tau, entries)
 
     def advance(m: Any, dt: float) -> Any:
         return model.advance(state, m, commands, environment, parameters, dt)
@@ -100,17 +104,25 @@ def run_casadi(
     return np.stack(records, axis=1), np.stack(worst)
 
 
+_holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
+
+
 @contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold back Ctrl-C until a call into CasADi is over: there it would turn into a complaint about arguments."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
+def uninterrupted() -> Iterator[list[int]]:
+    """Hold back Ctrl-C until a call into CasADi is over: there it would turn into a complaint about arguments.
+
+    Gives what is held back, so that a long call can look and stop. Inside another, the outer one holds.
+    """
+    if _holding or threading.current_thread() is not threading.main_thread():
+        yield _holding[0] if _holding else []
         return
     held: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+    _holding.append(held)
     try:
-        yield
+        yield held
     finally:
+        _holding.clear()
         signal.signal(signal.SIGINT, before)
         if held:  # also where the interrupt made the work fail
             raise KeyboardInterrupt

@@ -166,13 +166,13 @@ def _rules(family: Family, base: Vessel, file: str | Path | None) -> list[_Rule]
     original, times, found = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb):
         where = f"family {family.name!r}.perturb.{index}"
-        remove = _select(block.remove, original, file, f"{where}.remove")
+        remove = select(block.remove, original, file, f"{where}.remove")
         for path in block.set:
             if path not in original:
                 raise DocumentError(
                     f"{base.key} has no parameter {path!r}: {choices(path, original)}", file=file, path=f"{where}.set"
                 )
-        paths = _select(block.parameters, original, file, f"{where}.parameters")
+        paths = select(block.parameters, original, file, f"{where}.parameters")
         keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
         times.update({key: times.get(key, -1) + 1 for key in keys.values()})
         found.append(_Rule(remove, block.set, block.factor, {path: (key, times[key]) for path, key in keys.items()}))
@@ -222,7 +222,7 @@ def uniform(*key: Any) -> float:
     return (int.from_bytes(digest[:8], "big") >> 11) / 2.0**53
 
 
-def _select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
+def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
     """Paths that the patterns select, each once, in the vessel's order; a pattern that selects nothing is an error."""
     chosen: set[str] = set()
     for pattern in patterns:

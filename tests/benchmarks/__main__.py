@@ -28,6 +28,7 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "cells": 1,
     "recipes": 1,
     "orchestration": 1,
+    "identification": 2,
 }
 RESULTS = Path("results/bench.json")
 WIDTH = 140

@@ -1,0 +1,1 @@
+"""Identification: the numbers of a vessel's physics fitted to recorded runs, with honest uncertainty."""

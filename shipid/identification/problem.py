@@ -1,0 +1,220 @@
+"""The `[identify]` block: which numbers of a vessel are unknown, and what is fitted; the same for files and Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeFloat, model_validator
+
+from shipid import document as documents
+from shipid.errors import DocumentError, choices
+from shipid.vessel.load import Vessel
+from shipid.vessel.perturb import select
+
+Array = NDArray[np.float64]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+BLOCK = "identify"
+ENVIRONMENT = "environment"
+SIGNALS = {"u": ("u",), "v": ("v",), "r": ("r",), "psi": ("psi",), "position": ("north", "east")}
+"""Name in `weights` -> columns of the data that it fits."""
+NUISANCES: dict[str, dict[str, float]] = {
+    "initial_state": {},
+    "current": {"current_north": 0.0, "current_east": 0.0},
+    "thrust_scale": {"thrust_scale": 1.0},
+    "latency": {"latency": 0.0},
+    "heading_bias": {"heading_bias": 0.0},
+    "velocity_bias": {"velocity_bias_u": 0.0, "velocity_bias_v": 0.0},
+    "lever_arm": {"lever_arm": 0.0},
+}
+"""Name in `nuisance` -> its scalars, each with the value that it has where nothing is wrong."""
+MOVING = ("current_north", "current_east", "thrust_scale", "latency")
+"""Scalars that change how the ship moves; the others change only what is seen of it."""
+WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 5.0} | {
+    "heading_bias": math.radians(3.0),
+    "velocity_bias": 0.1,
+}
+
+
+class Identify(BaseModel):
+    """`[identify]`: the unknowns are factors on the base values; each is a dotted path of the vessel's parameters.
+
+    weights hold standard deviations in m, rad, m/s, rad/s; nuisance widths are in standard deviations of the weights
+    (initial_state), m/s (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency), 1 (thrust_scale).
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    parameters: Annotated[list[str], Field(min_length=1)] = Field(
+        description="dotted paths; * and [order >= 3] select, as in a family"
+    )
+    fixed: list[str] = Field(default=[], description="selections taken out again")
+    together: list[Annotated[list[str], Field(min_length=1)]] = Field(
+        default=[], description="lists of selections that share one factor"
+    )
+    prior: dict[str, Positive] = Field(default={}, description="selection -> standard deviation of the factor")
+    bounds: dict[str, tuple[float, float]] = Field(default={}, description="selection -> [low, high] of the factor")
+    scale: dict[str, Positive] = Field(default={}, description="path -> value at factor 1, where the base value is 0")
+    horizon: NonNegativeFloat = Field(default=30.0, description="s of each prediction; 0: every run as a whole")
+    step: Positive = Field(default=1.0, description="s")
+    method: Literal["euler", "rk4"] = "rk4"
+    weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}
+    loss: Literal["squared", "huber"] = "squared"
+    threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")
+    nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
+    runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
+    start: Literal["inverse", "base"] = "inverse"
+    drop: Positive | None = Field(
+        default=None, description="standard errors under which a factor's distance from `drop_to` is dropped"
+    )
+    drop_to: Literal["base", "zero"] = "base"
+
+    @model_validator(mode="after")
+    def _known(self) -> Identify:
+        for names, valid, what in ((self.weights, SIGNALS, "weights"), (self.nuisance, NUISANCES, "nuisance")):
+            unknown = next((name for name in names if name not in valid), None)
+            if unknown is not None:
+                raise ValueError(f"{what}.{unknown} is none: {choices(unknown, valid)}")
+        for path, (low, high) in self.bounds.items():
+            if not low <= high:
+                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] runs backwards, give [low, high]")
+        if self.horizon and self.horizon < 2 * self.step:
+            raise ValueError(f"horizon {self.horizon:g} s must hold two steps of {self.step:g} s, or be 0")
+        return self
+
+    @property
+    def widths(self) -> dict[str, float]:
+        """Nuisance -> standard deviation of its prior, in the order of `NUISANCES`."""
+        given = self.nuisance if isinstance(self.nuisance, Mapping) else {name: WIDE[name] for name in self.nuisance}
+        return {name: given[name] for name in NUISANCES if name in given}
+
+    @property
+    def signals(self) -> dict[str, float]:
+        """Fitted column -> standard deviation."""
+        return {column: width for name, width in self.weights.items() for column in SIGNALS[name]}
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The factors to find.
+
+    groups : paths that share each factor; the first names it.
+    scale : per group, the value of each of its paths at factor 1.
+    centre : (n,) factor of the base, 1, or 0 where the base value is 0.
+    low, high : (n,) bounds; at least 0 where the vessel's own checks refuse the other sign.
+    prior : (n,) standard deviations, inf where there is none.
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+    scale: tuple[tuple[float, ...], ...]
+    centre: Array
+    low: Array
+    high: Array
+    prior: Array
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Name of each factor."""
+        return tuple(group[0] for group in self.groups)
+
+    def values(self, factors: Sequence[float] | Array) -> dict[str, float]:
+        """Value of every path that a factor acts on."""
+        return {
+            path: float(scale * factor)
+            for group, scales, factor in zip(self.groups, self.scale, factors, strict=True)
+            for path, scale in zip(group, scales, strict=True)
+        }
+
+
+def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
+    """What the settings leave free in a vessel; DocumentError names what selects nothing or cannot be scaled."""
+    base, file = vessel.parameters, vessel.file
+
+    def chosen(patterns: Sequence[str], key: str) -> list[str]:
+        return select(patterns, base, file, f"{BLOCK}.{key}")
+
+    fixed = set(chosen(settings.fixed, "fixed"))
+    free = [path for path in chosen(settings.parameters, "parameters") if path not in fixed]
+    if not free:
+        raise DocumentError("every parameter is fixed again: nothing is left", file=file, path=f"{BLOCK}.fixed")
+    unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
+    if unknown is not None:
+        hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
+        raise DocumentError(f"{unknown!r}: {hint}", file=file, path=f"{BLOCK}.scale")
+    groups = _groups(settings, free, chosen, file)
+    scales = []
+    for group in groups:
+        bare = next((path for path in group if base[path] == 0 and path not in settings.scale), None)
+        if bare is not None:
+            message = f"{bare} is 0, which no factor changes: give its size under scale, or fix it"
+            raise DocumentError(message, file=file, path=f"{BLOCK}.scale")
+        scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
+    centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
+    high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
+    low = np.array([0.0 if any(_keeps_sign(vessel, path) for path in group) else -np.inf for group in groups])
+    place = {path: i for i, group in enumerate(groups) for path in group}
+    for pattern, limits in settings.bounds.items():
+        for path in chosen([pattern], "bounds"):
+            if path in place:
+                low[place[path]], high[place[path]] = limits  # as the user says, also below 0
+    for pattern, width in settings.prior.items():
+        for path in chosen([pattern], "prior"):
+            if path in place:
+                prior[place[path]] = width
+    return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
+
+
+_SIGNED: dict[tuple[str, str], bool] = {}
+
+
+def _keeps_sign(vessel: Vessel, path: str) -> bool:
+    """Whether the vessel's own checks refuse the other sign: added mass, drag coefficients, lengths."""
+    key = (vessel.digest, path)
+    if key not in _SIGNED:
+        try:
+            vessel.with_values({path: -vessel.parameters[path]})
+            _SIGNED[key] = False
+        except DocumentError:
+            _SIGNED[key] = vessel.parameters[path] != 0
+    return _SIGNED[key]
+
+
+def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list[tuple[str, ...]]:
+    """Free paths, those tied together in one group each, in the vessel's order."""
+    of: dict[str, int] = {}
+    for number, patterns in enumerate(settings.together):
+        key = f"together.{number}"
+        for path in chosen(patterns, key):
+            if path not in free:
+                message = f"{path} is tied but not free: add it to parameters, or untie it"
+                raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+            if path in of:
+                message = f"{path} is in two groups: tie all of them in one"
+                raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+            of[path] = number
+    found: dict[Any, list[str]] = {}
+    for path in free:
+        found.setdefault(of.get(path, path), []).append(path)
+    return [tuple(group) for group in found.values()]
+
+
+def overrides(settings: Identify, runs: Sequence[str], vessel: Vessel, channels: Sequence[str]) -> dict[str, Any]:
+    """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name."""
+    result: dict[str, dict[str, float]] = {run: {} for run in runs}
+    valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]
+    for key, value in documents.leaves(settings.runs):
+        run = next((name for name in sorted(runs, key=len, reverse=True) if key.startswith(f"{name}.")), None)
+        where = f"{BLOCK}.runs.{key}"
+        if run is None:
+            hint = choices(key.split(".", 1)[0], runs)
+            raise DocumentError(f"begins with no run of the fit: {hint}", file=vessel.file, path=where)
+        path = key[len(run) + 1 :]
+        if path not in valid:
+            raise DocumentError(f"{path!r} is nothing to set: {choices(path, valid)}", file=vessel.file, path=where)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise DocumentError(f"{value!r} is no number", file=vessel.file, path=where)
+        result[run][path] = float(value)
+    return result

@@ -1,0 +1,377 @@
+"""A fit as numbers: weighted residuals of many predictions and their exact derivatives.
+
+Predictions are cut into intervals of equal length, each from a node, and all intervals run at once. One interval a
+prediction is single shooting; more of them, with their ends tied to the next nodes, are multiple shooting.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError, DocumentError
+from shipid.identification.compiled import pack, run_compiled
+from shipid.identification.problem import (
+    BLOCK,
+    ENVIRONMENT,
+    MOVING,
+    NUISANCES,
+    Identify,
+    Unknowns,
+    overrides,
+    unknowns,
+)
+from shipid.identification.segments import Segment, cut_segments
+from shipid.identification.variation import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
+from shipid.simulation.native import compiler
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "psi": math.radians(1.0)} | {
+    **dict.fromkeys(("phi", "theta"), math.radians(1.0)),
+    **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
+}
+"""Ordinary error of a state that is not fitted [SI]: the scale on which the solver sees it."""
+COMPILE_FROM = 1e5  # steps times entries of the sensitivities: below it the virtual machine is done sooner
+MOST_LATE = 4.0  # prior widths that a latency may reach
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """All numbers of one fit.
+
+    names, centres, widths : scalars of the per-run nuisances, (nq,) values where nothing is wrong and prior widths.
+    start_width : of the initial states in standard deviations of the signals; None where they are as measured.
+    base : (R, P) parameters of each run with its own overrides. deviations : (ny,) of the signals.
+    """
+
+    vessel: Vessel
+    runs: tuple[str, ...]
+    settings: Identify
+    unknown: Unknowns
+    layout: Layout
+    segments: tuple[Segment, ...]
+    base: Array
+    names: tuple[str, ...]
+    centres: Array
+    widths: Array
+    start_width: float | None
+    deviations: Array
+
+    @cached_property
+    def model(self) -> Variation:
+        """The compiled equations."""
+        return variation(self.layout)
+
+    @cached_property
+    def node_scale(self) -> Array:
+        """(nn,) size of the error of each entry of a node: of the signal where it is fitted."""
+        own = dict(zip(self.layout.signals, self.deviations, strict=True))
+        return np.array([own.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
+
+    @cached_property
+    def whole(self) -> Intervals:
+        """Every prediction as one interval."""
+        return Intervals(self, 0)
+
+    @property
+    def num_factors(self) -> int:
+        """Factors to find."""
+        return len(self.unknown.groups)
+
+    def fixed(self, factors: Array, nuisances: Array) -> Array:
+        """(R, .) numbers that stay the same along each run: factors, its nuisances, base parameters, scales."""
+        scale = np.concatenate([*map(np.array, self.unknown.scale)])
+        count = len(self.runs)
+        return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
+
+
+def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Fit:
+    """Everything that a fit needs; DocumentError or DataError says what is missing."""
+    if not runs:
+        raise DataError("no run to fit: name at least one", path="runs")
+    if len(set(runs)) < len(runs):
+        raise DataError("a run is named twice: name each once", path="runs")
+    widths = settings.widths
+    if "current" in widths and "current" not in vessel.document:
+        vessel = vessel.with_values({"current.kind": "uniform"})
+    if "thrust_scale" in widths and not any(map(is_thrust, vessel.parameters)):
+        message = f"{vessel.name} has no thrust coefficient: leave it out"
+        raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
+    model, unknown = dynamics(vessel), unknowns(vessel, settings)
+    own = overrides(settings, runs, vessel, model.environment)
+    scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
+    names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
+    lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
+    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags)
+    weather = _weather(segments, own, model.environment, [n for n in names if n.startswith("current")])
+    free = {path for group in unknown.groups for path in group}
+    twice = next(((run, path) for run, values in own.items() for path in values if path in free), None)
+    if twice is not None:
+        path = f"{BLOCK}.runs.{'.'.join(twice)}"
+        raise DocumentError("is free in the fit: fix it, or set it in no run", file=vessel.file, path=path)
+    return Fit(
+        vessel=vessel,
+        runs=tuple(runs),
+        settings=settings,
+        unknown=unknown,
+        layout=Layout(
+            model, unknown.groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
+        ),
+        segments=tuple(_with_weather(segment, weather, own[runs[segment.run]]) for segment in segments),
+        base=np.array([[own[run].get(path, value) for path, value in vessel.parameters.items()] for run in runs]),
+        names=names,
+        centres=np.array([scalars[name][0] for name in names]),
+        widths=np.array([scalars[name][1] for name in names]),
+        start_width=widths.get("initial_state"),
+        deviations=np.array(list(settings.signals.values())),
+    )
+
+
+def _weather(
+    segments: Sequence[Segment],
+    own: Mapping[str, Mapping[str, float]],
+    channels: Sequence[str],
+    estimated: Sequence[str],
+) -> list[str]:
+    """Environment channels that the data or an override give."""
+    given = {name for segment in segments for name, values in segment.columns.items() if np.any(values != 0)}
+    given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in own.values() for path in values}
+    return [name for name in channels if name in given and not (estimated and name in ("V_c", "beta_c"))]
+
+
+def _with_weather(segment: Segment, weather: Sequence[str], own: Mapping[str, float]) -> Segment:
+    zero = np.zeros_like(segment.t)
+    columns = {
+        **segment.columns,
+        **{name: segment.columns.get(name, zero) for name in weather},
+        **{name: zero + own[f"{ENVIRONMENT}.{name}"] for name in weather if f"{ENVIRONMENT}.{name}" in own},
+    }
+    return Segment(segment.run, segment.t, columns, segment.earlier, segment.memory, segment.measured)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Intervals at one place: nn entries a node, nc columns (node, factors, nuisances).
+
+    end : (K, nn). slope : (K, nn, nc) of the ends. r : (K, N ny) weighted residuals. R : (K, nc, N ny) their slopes.
+    """
+
+    end: Array
+    slope: Array
+    r: Array
+    R: Array
+
+
+class Intervals:
+    """Predictions of a fit cut into intervals of `length` steps (0: each as a whole), packed for the engine.
+
+    segment, run : (K,) of each interval; first : (K,) whether it begins its segment. guess : (K, nn) nodes as measured.
+    log : (K, columns) the log at the nodes, for the states there. weight : (K, N, ny), 0 where nothing was measured.
+    time : (K, N) [s] of each residual.
+    """
+
+    def __init__(self, fit: Fit, length: int) -> None:
+        self.fit = fit
+        longest = max(segment.num_steps for segment in fit.segments)
+        self.length = min(length, longest) or longest
+        places = [
+            (number, first)
+            for number, segment in enumerate(fit.segments)
+            for first in range(0, segment.num_steps, self.length)
+        ]
+        self.segment = np.array([number for number, _ in places])
+        self.run = np.array([fit.segments[number].run for number, _ in places])
+        self.first = np.array([first == 0 for _, first in places])
+        self.inner = np.flatnonzero(~self.first) - 1  # intervals whose end is the next one's node
+        self.log = np.array([self._log(*place) for place in places])
+        known = np.array([self._known(*place) for place in places])
+        seen, self.weight, self.time = (np.array(list(each)) for each in zip(*map(self._seen, places), strict=True))
+        work = self.length * len(places) * fit.model.size
+        self.native = work > COMPILE_FROM and compiler() is not None
+        self.known: Array = pack(known) if self.native else known
+        self.seen: Array = pack(seen) if self.native else seen
+        self.guess = self.begin(np.tile(fit.centres, (len(fit.runs), 1)))[0]
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    def _log(self, number: int, first: int) -> list[float]:
+        segment, entries = self.fit.segments[number], self.fit.model.begin.size1_in(0)
+        names = list(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *self.fit.model.states)))
+        assert len(names) == entries
+        columns = {**segment.columns, **{f: segment.columns[c] for f, c in COLUMNS.items() if c in segment.columns}}
+        own = [float(columns[name][first]) if name in columns else 0.0 for name in names]
+        if self.fit.layout.carried:
+            own += [float(segment.memory[name][first]) for name in self.fit.layout.model.memory]
+        return own
+
+    def _known(self, number: int, first: int) -> Array:
+        """Inputs of every step of an interval (N, .), the last ones held where it is longer than its segment."""
+        segment, layout = self.fit.segments[number], self.fit.layout
+        steps = np.minimum(first + np.arange(self.length), segment.num_steps - 1)
+        commands = {
+            name: np.concatenate([segment.earlier[name][::-1], segment.columns[name]]) for name in layout.model.commands
+        }
+        columns = [
+            commands[name][steps + layout.lags - j] for j in range(layout.lags + 1) for name in layout.model.commands
+        ]
+        columns += [segment.columns[name][steps] for name in layout.weather]
+        if not layout.carried:
+            columns += [segment.memory[name][steps] for name in layout.model.memory]
+        return np.array(columns).reshape(-1, self.length).T
+
+    def _seen(self, place: tuple[int, int]) -> tuple[Array, Array, Array]:
+        """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
+        segment, layout = self.fit.segments[place[0]], self.fit.layout
+        steps = place[1] + 1 + np.arange(self.length)
+        inside = steps <= segment.num_steps
+        at = np.minimum(steps, segment.num_steps)
+        weight = (inside & segment.measured[at])[:, None] / self.fit.deviations
+        y = np.array([segment.columns[name][at] for name in layout.signals]).T
+        return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
+
+    def begin(self, nuisances: Array) -> tuple[Array, Array]:
+        """Nodes that the log shows (K, nn), and their slopes in the nuisances (K, nn, nq), given those (R, nq)."""
+        model, count = self.fit.model, len(self)
+        entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
+        nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
+        slope = np.zeros((count, len(model.node), q.shape[1]))
+        if q.shape[1]:
+            found = np.array(model.begin_slope.map(count)(self.log[:, :entries].T, q.T))
+            slope[:, :states] = found.reshape(states, count, -1).transpose(1, 0, 2)
+        return np.hstack([nodes, self.log[:, entries:]]), slope
+
+    def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
+        """Run all intervals from nodes (K, nn) with factors (n,) and nuisances (R, nq); what diverges is not finite."""
+        model, count = self.fit.model, len(self)
+        num_nodes, num_states, width = len(model.node), len(model.states), model.num_columns
+        num_signals, split = len(self.fit.layout.signals), len(model.states) * (1 + model.num_columns)
+        x = np.zeros((count, model.size))
+        x[:, :num_states], x[:, split : split + num_nodes - num_states] = nodes[:, :num_states], nodes[:, num_states:]
+        own = np.arange(num_nodes)
+        rows = np.where(
+            own < num_states,
+            num_states + own * num_states + own,
+            split + (num_nodes - num_states) * (1 + own) + own - num_states,
+        )
+        x[:, rows] = 1.0
+        fixed = self.fit.fixed(factors, nuisances)[self.run]
+        with np.errstate(all="ignore"):
+            run = run_compiled if self.native else run_machine
+            end, record = run(self.fit.layout, x, fixed, self.known, self.seen)
+        parts = [
+            end[:, a:b].reshape(count, 1 + width, -1).transpose(0, 2, 1) for a, b in ((0, split), (split, model.size))
+        ]
+        both = np.concatenate(parts, axis=1)
+        slope = np.zeros((count, num_nodes, width + nuisances.shape[1] - self.fit.layout.num_moving))
+        slope[:, :, :width] = both[:, :, 1:]
+        r = record[:, :, :num_signals].reshape(count, -1)
+        R = record[:, :, num_signals:].reshape(count, self.length, -1, num_signals).transpose(0, 2, 1, 3)
+        return Evaluation(both[:, :, 0], slope, r, R.reshape(count, R.shape[1], -1))
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Every prediction as a whole, from its own start: single shooting.
+
+    factors (n,), nuisances (R, nq) and away (S, nn): starts less what was measured, all in prior widths (away is empty
+    where starts are as measured). r : (m,) weighted residuals; by_factor (m, n), by_nuisance (m, nq), by_start (m, nn)
+    their slopes. segment, run, time, signals : (m,) where each belongs.
+    """
+
+    fit: Fit
+    factors: Array
+    nuisances: Array
+    away: Array
+    r: Array
+    by_factor: Array
+    by_nuisance: Array
+    by_start: Array
+    segment: NDArray[np.intp]
+    run: NDArray[np.intp]
+    time: Array
+    signals: NDArray[np.str_]
+
+    def marginal(self, threshold: float = np.inf) -> tuple[Array, Array, Array]:
+        """Residuals (m,) and their slopes (m, n) with the nuisances taken out, and the share (m,) that those take.
+
+        With A the slopes in the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi): its squares sum to those of
+        r and xi where xi is best, and its slopes give the information on the factors. Robust weights are within.
+        """
+        root = np.where(np.abs(self.r) <= threshold, 1.0, np.sqrt(threshold / np.maximum(np.abs(self.r), 1e-300)))
+        e, J, spent = root * self.r, root[:, None] * self.by_factor, np.zeros(len(self.r))
+        if not (self.nuisances.size or self.away.size) or not np.isfinite(e).all():
+            return e, J, spent
+        for run in range(len(self.fit.runs)):
+            rows = np.flatnonzero(self.run == run)
+            A, xi = self._unknown(run, rows)
+            A *= root[rows, None]
+            U, s, _ = np.linalg.svd(A, full_matrices=False)
+            shrunk = U * (1 / np.sqrt(1 + s**2) - 1)
+            own = e[rows] - A @ xi
+            e[rows], J[rows] = own + shrunk @ (U.T @ own), J[rows] + shrunk @ (U.T @ J[rows])
+            spent[rows] = (U**2) @ (s**2 / (1 + s**2))
+        return e, J, spent
+
+    def _unknown(self, run: int, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Slopes (rows, nuisances and starts of the run's segments), and where those stand."""
+        parts, xi = [self.by_nuisance[rows]], [self.nuisances[run]]
+        if self.away.size:
+            for segment in np.unique(self.segment[rows]):
+                parts.append(self.by_start[rows] * (self.segment[rows] == segment)[:, None])
+                xi.append(self.away[segment])
+        return np.hstack(parts), np.concatenate(xi)
+
+    def named(self) -> dict[str, dict[str, float]]:
+        """Run -> nuisance -> value [SI]; initial states as differences from the measured ones."""
+        fit, result = self.fit, dict[str, dict[str, float]]()
+        values = fit.centres + fit.widths * self.nuisances
+        for number, run in enumerate(fit.runs):
+            result[run] = dict(zip(fit.names, values[number].tolist(), strict=True))
+            own = [i for i, segment in enumerate(fit.segments) if segment.run == number] if self.away.size else []
+            for place, i in enumerate(own):
+                for name, away, size in zip(fit.model.node, self.away[i], fit.node_scale, strict=True):
+                    key = f"initial_state.{name}" if len(own) == 1 else f"initial_state.{place + 1}.{name}"
+                    result[run][key] = float(away * size * (fit.start_width or 0.0))
+        return result
+
+
+def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = None) -> Prediction:
+    """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: the log)."""
+    intervals = fit.whole
+    q = fit.centres + fit.widths * nuisances
+    measured, slope = intervals.begin(q)
+    free = fit.start_width is not None and nodes is not None
+    begun = nodes if free and nodes is not None else measured
+    found = intervals.evaluate(begun, factors, q)
+    num_nodes, n, num_signals = len(fit.model.node), fit.num_factors, len(fit.layout.signals)
+    R = found.R.transpose(0, 2, 1)  # (S, N ny, nc)
+    by_node, by_factor, by_q = np.split(R, [num_nodes, num_nodes + n], axis=2)
+    width = fit.start_width or 0.0
+    with np.errstate(all="ignore"):
+        by_q, by_start = (by_q + by_node @ slope) * fit.widths, by_node * (fit.node_scale * width)
+    keep = (intervals.weight > 0).reshape(len(intervals), -1)
+    where, place = np.nonzero(keep)
+    away = (begun - measured) / (fit.node_scale * fit.start_width) if fit.start_width is not None else np.zeros((0, 0))
+    return Prediction(
+        fit=fit,
+        factors=factors,
+        nuisances=nuisances,
+        away=away,
+        r=found.r[keep],
+        by_factor=by_factor[keep],
+        by_nuisance=by_q[keep],
+        by_start=by_start[keep],
+        segment=where,
+        run=intervals.run[where],
+        time=np.repeat(intervals.time, num_signals, axis=1).reshape(len(intervals), -1)[keep],
+        signals=np.array(fit.layout.signals)[place % num_signals],
+    )

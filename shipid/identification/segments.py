@@ -1,0 +1,106 @@
+"""From runs to segments: what is predicted in one go, from one measured state on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset, clock_slack, pieces, sample
+from shipid.errors import DataError, choices
+from shipid.simulation.scan import memory_along
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+LEAST_STEPS = 2
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One prediction: a stretch of a run on the grid of the integrator.
+
+    run : index into the runs of the fit.
+    t : (N + 1,) [s], in equal steps.
+    columns : name -> (N + 1,), states, commands and environment, SI.
+    earlier : command -> (lags,) its values at the steps before, the latest first.
+    memory : hidden state -> (N + 1,), modelled from the orders.
+    measured : (N + 1,) whether a row of the log lies within half a step.
+    """
+
+    run: int
+    t: Array
+    columns: Mapping[str, Array]
+    earlier: Mapping[str, Array]
+    memory: Mapping[str, Array]
+    measured: NDArray[np.bool_]
+
+    @property
+    def num_steps(self) -> int:
+        """Steps of the integrator."""
+        return len(self.t) - 1
+
+
+def cut_segments(
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], step: float, horizon: float, lags: int = 0
+) -> list[Segment]:
+    """Cut the runs into predictions of `horizon` [s] (0: as long as a run is unbroken), one after the other.
+
+    What is left at the end of a run counts where it is at least half a horizon. Raises DataError for a run that is not
+    there, a command that was not recorded, or runs that are all too short.
+    """
+    unknown = next((run for run in runs if run not in dataset.runs), None)
+    if unknown is not None:
+        raise DataError(f"there is no run {unknown!r}: {choices(unknown, dataset.runs)}", path="runs")
+    model = dynamics(vessel)
+    missing = next((name for name in model.commands if name not in dataset.commands), None)
+    if missing is not None:
+        found = ", ".join(dataset.commands) or "none"
+        raise DataError(f"{vessel.name} takes this command; the data have {found}", path=missing)
+    result = []
+    for run, rows in pieces(dataset):
+        if run in runs:
+            result += _cut(vessel, rows, list(runs).index(run), step, horizon, lags)
+    without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
+    if without is not None:
+        wanted = max(LEAST_STEPS * step, horizon / 2)
+        message = f"{without!r} has no unbroken stretch of {wanted:g} s: take a shorter horizon, or leave it out"
+        raise DataError(message, path="runs")
+    return result
+
+
+def _cut(vessel: Vessel, rows: pd.DataFrame, run: int, step: float, horizon: float, lags: int) -> list[Segment]:
+    t = rows["t"].to_numpy(dtype=float)
+    count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
+    each = round(horizon / step) if horizon else max(count, 1)
+    least = max(LEAST_STEPS, each / 2 if horizon else 0)
+    if count < least:
+        return []
+    grid = t[0] + step * np.arange(count + 1)
+    columns = sample(rows, grid)
+    near = np.abs(t[np.clip(np.searchsorted(t, grid), 0, len(t) - 1)] - grid)
+    before = np.abs(t[np.clip(np.searchsorted(t, grid) - 1, 0, len(t) - 1)] - grid)
+    measured = np.minimum(near, before) <= step / 2 + clock_slack(t)
+    commands = {name: columns[name] for name in dynamics(vessel).commands}
+    memory = memory_along(vessel, commands, grid) or {}
+    found = []
+    for first in range(0, count, each):
+        last = min(first + each, count)
+        if last - first < least:
+            continue
+        here = slice(first, last + 1)
+        past = np.clip(first - 1 - np.arange(lags), 0, None)
+        found.append(
+            Segment(
+                run,
+                grid[here],
+                {name: np.asarray(values[here], dtype=float) for name, values in columns.items()},
+                {name: values[past] for name, values in commands.items()},
+                {name: values[here] for name, values in memory.items()},
+                measured[here],
+            )
+        )
+    return found

@@ -1,0 +1,288 @@
+"""The variational step: how a ship moves and how her motion changes with what is unknown, in one integration.
+
+The state z is carried with its sensitivities S = dz/d[node, factors, nuisances]: S' = (df/dz) S + df/d[...], through
+the same integrator, so that S is the exact derivative of the discrete motion. Numbers are inputs; one structure is
+made once. What no fitted signal feels (the position, say) is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from shipid.identification.problem import MOVING
+from shipid.simulation.integrate import Method, integrate
+from shipid.simulation.scan import summed_rates, uninterrupted
+from shipid.vessel.dynamics import Dynamics
+
+Array = NDArray[np.float64]
+COLUMNS = {"down": "z"}
+"""State -> column of a log, where the names differ."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is compiled: the structure of a fit without its numbers.
+
+    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, the moving ones first.
+    weather : environment channels that are given; the others are zero. lags : steps that commands may be late by.
+    """
+
+    model: Dynamics
+    groups: tuple[tuple[str, ...], ...]
+    signals: tuple[str, ...]
+    nuisances: tuple[str, ...]
+    weather: tuple[str, ...]
+    lags: int
+    step: float
+    method: Method
+
+    @property
+    def num_moving(self) -> int:
+        """Nuisances that change how the ship moves."""
+        return sum(name in MOVING for name in self.nuisances)
+
+    @property
+    def carried(self) -> bool:
+        """Whether the memory of actuators depends on what is unknown."""
+        free = any(".actuator." in path for group in self.groups for path in group)
+        return bool(self.model.memory) and (free or "latency" in self.nuisances)
+
+
+def is_thrust(path: str) -> bool:
+    """Whether a parameter is a thrust coefficient, which `thrust_scale` multiplies."""
+    parts = path.split(".")
+    return parts[-1] == "k_T" or "K_T" in parts[-2:-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """The variational equations of one layout as SX functions of dense vectors.
+
+    rates : (z, m, fixed, known) -> d(z)/dt; z holds the states and the columns of S, m memories (and theirs).
+    advance : (m, fixed, known, dt) -> m after dt.
+    outputs : (z, m, fixed, seen) -> weighted residuals and their sensitivities, column by column.
+    begin : (measured, nuisances) -> what the states of a node are where the log says `measured`.
+    node : names of the node's entries: states, then memories where they depend on what is unknown.
+    """
+
+    layout: Layout
+    rates: ca.Function
+    advance: ca.Function
+    outputs: ca.Function
+    begin: ca.Function
+    begin_slope: ca.Function
+    states: tuple[str, ...]
+    node: tuple[str, ...]
+
+    @property
+    def num_columns(self) -> int:
+        """Columns of S: node, factors, nuisances that move the ship."""
+        return len(self.node) + len(self.layout.groups) + self.layout.num_moving
+
+    @property
+    def size(self) -> int:
+        """Entries of the state with its sensitivities, memories included where they are carried."""
+        return len(self.node) * (1 + self.num_columns)
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """(x, fixed, known, seen) -> (x after one step, outputs there); x is the node with its sensitivities."""
+        layout, num = self.layout, len(self.states) * (1 + self.num_columns)
+        x, fixed = SX.sym("x", self.size), SX.sym("fixed", self.rates.size1_in(2))
+        known, seen = SX.sym("known", self.rates.size1_in(3)), SX.sym("seen", 2 * len(layout.signals))
+        count = len(layout.model.memory)
+        memory = x[num:] if layout.carried else known[known.shape[0] - count :]
+        after, later = integrate(
+            lambda z, m: self.rates(z, m, fixed, known),
+            lambda m, dt: self.advance(m, fixed, known, dt),
+            lambda z, a, k: z + a * k,
+            x[:num],
+            memory,
+            layout.step,
+            layout.method,
+        )
+        record = self.outputs(after, later, fixed, seen)
+        following = ca.vertcat(after, later) if layout.carried else after
+        return ca.Function("step", [x, fixed, known, seen], [following, record], {"cse": True})
+
+
+@lru_cache(maxsize=32)
+def variation(layout: Layout) -> Variation:
+    """Variational equations of a layout, made once."""
+    model = layout.model
+    num_memory, names = len(model.memory), (*model.state, *model.hidden)
+    theta, q = SX.sym("theta", len(layout.groups)), SX.sym("q", len(layout.nuisances))
+    base = SX.sym("base", len(model.parameters))
+    scale = SX.sym("scale", sum(map(len, layout.groups)))
+    commands = SX.sym("commands", len(model.commands) * (1 + layout.lags))
+    weather = SX.sym("weather", len(layout.weather))
+    value_of = dict(zip(layout.nuisances, ca.vertsplit(q) if layout.nuisances else [], strict=True))
+    parameters = _parameters(layout, base, scale, theta, value_of)
+    told = _told(layout, commands, value_of)
+    environment = _environment(layout, weather, value_of)
+    memory = SX.sym("memory", num_memory)
+    drawn = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in model.drawn}
+
+    def rates_of(state: SX) -> SX:
+        inputs = [state, memory, told, environment, parameters]
+        return SX(summed_rates(model, inputs, SX(model.num_dof, 1), drawn))
+
+    needed = _needed(layout, names, rates_of)
+    states = tuple(names[i] for i in needed)
+    z = SX.sym("states", len(needed))
+    whole = SX(len(names), 1)
+    whole[needed] = z
+    f = rates_of(whole)[needed]
+    node = (*states, *model.memory) if layout.carried else states
+    moving = ca.vertcat(theta, q[: layout.num_moving])
+    width = len(node) + moving.shape[0]
+    S, D = SX.sym("S", len(states), width), SX.sym("D", num_memory if layout.carried else 0, width)
+
+    def turned(result: SX, over: SX, of: SX, own: SX) -> SX:
+        """Sensitivities of a result that feels states or memories `of` with sensitivities `over`, and the unknown."""
+        direct = ca.horzcat(SX(result.shape[0], len(node)), ca.jacobian(result, moving))
+        return ca.jacobian(result, of) @ over + own + direct
+
+    from_memory = ca.jacobian(f, memory) @ D if layout.carried else SX(len(states), width)
+    slope = turned(f, S, z, from_memory)
+    dt = SX.sym("dt")
+    later = model.advance(SX(len(names), 1), memory, told, environment, parameters, dt)
+    more = turned(later, D, memory, SX(num_memory, width)) if layout.carried else SX(0, width)
+    seen, h = (
+        SX.sym("seen", 2 * len(layout.signals)),
+        _signals(layout.signals, dict(zip(states, ca.vertsplit(z), strict=True)), value_of),
+    )
+    y, w = seen[: len(layout.signals)], seen[len(layout.signals) :]
+    others = ca.jacobian(h, q[layout.num_moving :])
+    R = ca.horzcat(ca.jacobian(h, z) @ S, others)
+    fixed = ca.vertcat(theta, q, base, scale)
+    known = ca.vertcat(commands, weather, *([] if layout.carried else [memory]))
+    zs, ms = ca.vertcat(z, ca.vec(S)), ca.vertcat(memory, ca.vec(D))
+    begin_in, begin = _begin(states, value_of)
+
+    def function(name: str, inputs: Mapping[str, SX], result: SX) -> ca.Function:
+        return ca.Function(name, list(inputs.values()), [ca.densify(result)], list(inputs), ["result"], {"cse": True})
+
+    both = {"z": zs, "m": ms, "fixed": fixed}
+    return Variation(
+        layout=layout,
+        rates=function("rates", {**both, "known": known}, ca.vertcat(f, ca.vec(slope))),
+        advance=function(
+            "advance", {"m": ms, "fixed": fixed, "known": known, "dt": dt}, ca.vertcat(later, ca.vec(more))
+        ),
+        outputs=function(
+            "outputs", {**both, "seen": seen}, ca.vertcat(w * (h - y), ca.vec(ca.repmat(w, 1, R.shape[1]) * R))
+        ),
+        begin=ca.Function("begin", [begin_in, q], [ca.densify(begin)]),
+        begin_slope=ca.Function("begin_slope", [begin_in, q], [ca.densify(ca.jacobian(begin, q))]),
+        states=states,
+        node=node,
+    )
+
+
+def _parameters(layout: Layout, base: SX, scale: SX, theta: SX, value_of: Mapping[str, SX]) -> SX:
+    """Every parameter of the vessel: its base value, or scale x factor; thrust coefficients times their scale."""
+    place = {path: i for i, path in enumerate(layout.model.parameters)}
+    result, number = SX(base), 0
+    for i, group in enumerate(layout.groups):
+        for path in group:
+            result[place[path]] = scale[number] * theta[i]
+            number += 1
+    if "thrust_scale" in value_of:
+        for path in filter(is_thrust, layout.model.parameters):
+            result[place[path]] *= value_of["thrust_scale"]
+    return result
+
+
+def _told(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
+    """Commands in force, late by `latency`: linear between the steps' values, the present ones first."""
+    parts = ca.vertsplit(commands, [i * len(layout.model.commands) for i in range(layout.lags + 2)])
+    if "latency" not in value_of:
+        return parts[0]
+    late = value_of["latency"] / layout.step
+    return sum((ca.fmax(0, 1 - ca.fabs(late - j)) * part for j, part in enumerate(parts)), SX(parts[0].shape[0], 1))
+
+
+def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
+    """Every channel: as given, from the nuisances, or zero."""
+    channel = dict(zip(layout.weather, ca.vertsplit(weather) if layout.weather else [], strict=True))
+    if "current_north" in value_of:
+        north, east = value_of["current_north"], value_of["current_east"]
+        channel |= {"V_c": ca.sqrt(north**2 + east**2), "beta_c": ca.atan2(east, north)}
+    return ca.vertcat(SX(0, 1), *(channel.get(name, SX(1, 1)) for name in layout.model.environment))
+
+
+def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
+    """What a log with these faults would show.
+
+    heading_bias is what the compass reads too much; u and v are resolved along what it reads, so that the velocity over
+    ground stays. The logged point lies lever_arm ahead of the origin.
+    """
+    zero = SX(1, 1)
+    b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
+    u, v, r, psi = (state.get(name, zero) for name in ("u", "v", "r", "psi"))
+    across = v + x * r
+    read = {
+        "u": lambda: ca.cos(b) * u + ca.sin(b) * across + value_of.get("velocity_bias_u", zero),
+        "v": lambda: ca.cos(b) * across - ca.sin(b) * u + value_of.get("velocity_bias_v", zero),
+        "r": lambda: r,
+        "psi": lambda: psi + b,
+        "north": lambda: state["north"] + x * ca.cos(psi),
+        "east": lambda: state["east"] + x * ca.sin(psi),
+    }
+    return ca.vertcat(*(read[name]() for name in signals))
+
+
+def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
+    """Columns of a log at an instant, and the states that `_signals` turns into them."""
+    entry = {name: SX.sym(name) for name in dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states))}
+    zero = SX(1, 1)
+    b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
+    u, v = (entry[name] - value_of.get(f"velocity_bias_{name}", zero) for name in ("u", "v"))
+    psi = entry["psi"] - b
+    true = dict(entry)
+    true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * entry["r"], "psi": psi}
+    true |= {"north": entry["north"] - x * ca.cos(psi), "east": entry["east"] - x * ca.sin(psi)}
+    return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
+
+
+def _needed(layout: Layout, names: Sequence[str], rates_of: Any) -> list[int]:
+    """States that the fitted signals feel, sooner or later."""
+    x = SX.sym("x", len(names))
+    state = dict(zip(names, ca.vertsplit(x), strict=True))
+    free = {name: SX.sym(name) for name in layout.nuisances}
+    felt = np.array(ca.DM(ca.jacobian_sparsity(rates_of(x), x), 1)) != 0
+    wanted = (np.array(ca.DM(ca.jacobian_sparsity(_signals(layout.signals, state, free), x), 1)) != 0).any(axis=0)
+    wanted |= np.isin(names, ("u", "v", "r"))  # the motion itself
+    while (more := wanted | felt[wanted].any(axis=0)).sum() > wanted.sum():
+        wanted = more
+    return [int(i) for i in np.flatnonzero(wanted)]
+
+
+@lru_cache(maxsize=32)
+def scan(layout: Layout, num_steps: int) -> ca.Function:
+    """One interval on CasADi's virtual machine: (x, fixed, known, seen) -> (x at the end, outputs of each step)."""
+    model = variation(layout)
+    one = model.step
+    x, fixed = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("fixed", one.size1_in(1))
+    known, seen = (ca.MX.sym(name, one.size1_in(i), num_steps) for i, name in ((2, "known"), (3, "seen")))
+    path, record = one.mapaccum(num_steps)(x, ca.repmat(fixed, 1, num_steps), known, seen)
+    return ca.Function("interval", [x, fixed, known, seen], [path[:, -1], record])
+
+
+def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
+    """Ends (K, size) and outputs (K, N, entries) of K intervals; x (K, size), fixed (K, .), known, seen (K, N, .)."""
+    count, num_steps = known.shape[:2]
+    with uninterrupted():
+        end, record = scan(layout, num_steps).map(count)(
+            x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
+        )
+    return np.array(end).T, np.array(record).T.reshape(count, num_steps, -1)

@@ -1,0 +1,151 @@
+"""Identification, side by side: by hand, single shooting with exact Jacobians, and `identify`; and how it grows.
+
+32 hull derivatives of the 28.9 m Gunnerus, runs of 80 s at 1 Hz with noise, every factor off by up to 20 % at first.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from shipid.data.dataset import Dataset
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import Evaluation, Fit, Intervals, build
+from shipid.identification.solve import identify
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.benchmarks.by_hand import DERIVATIVES, Model
+from tests.benchmarks.timing import best_of, clock
+from tests.identification.trials import changed, trials
+
+RUNS, STEPS, MORE_RUNS, FEWER = 20, 80, 80, 8
+NOISE = {"u": 0.05, "v": 0.05, "r": np.radians(0.1)}
+SPREADS, STARTS = (1.0, 3.0), 8  # factors off by up to so much, so many draws
+ROUNDS = 5
+NEAR = 1e-3  # relative difference of two objectives that are the same optimum
+
+
+def run() -> dict[str, Any]:
+    """Times, optima and convergence of the three ways; growth of the third."""
+    vessel = load_vessel("gunnerus-28.9")
+    data, settings = (
+        _noisy(vessel, RUNS),
+        Identify(parameters=["hull.derivatives.*"], weights=NOISE, horizon=0, start="base"),
+    )
+    fit = build(vessel, data, data.runs, settings)
+    begin = 1 + 0.2 * np.sin(np.arange(fit.num_factors))
+    start = dict(zip(fit.unknown.paths, begin.tolist(), strict=True))
+    first = clock(lambda: identify(vessel, data, data.runs, settings, start=start))
+    ways = {
+        "single": lambda: single(build(vessel, data, data.runs, settings), begin),
+        "identify": lambda: identify(vessel, data, data.runs, settings, start=start),
+    }
+    seconds = best_of(ways, ROUNDS)
+    mine, exact = identify(vessel, data, data.runs, settings, start=start), single(fit, begin)
+    begun = time.perf_counter()
+    theirs = by_hand(vessel, data, fit, begin)
+    slow = time.perf_counter() - begun
+    fine = {
+        name: float((_differences(vessel, data, fit, x) ** 2).sum())
+        for name, x in (("a", theirs.x), ("c", mine.factors))
+    }
+    result: dict[str, Any] = {
+        "by hand [s]": round(slow, 1),
+        "by hand: evaluations, Jacobians": f"{theirs.nfev}, {theirs.njev}",
+        "single shooting, exact Jacobians [s]": round(seconds["single"], 4),
+        "single shooting: evaluations, Jacobians": f"{exact.nfev}, {exact.njev}",
+        "identify [s]": round(seconds["identify"], 4),
+        "identify: iterations": mine.iterations,
+        "identify, first call [s]": round(first, 2),
+        "by hand / identify": round(slow / seconds["identify"], 1),
+        "single shooting / identify": round(seconds["single"] / seconds["identify"], 3),
+        "objective, identify / by hand": round(fine["c"] / fine["a"], 6),
+        "objective, identify / single shooting": round(mine.objective / (2 * exact.cost), 6),
+    }
+    for spread in SPREADS:
+        result |= _convergence(vessel, data, settings, fit, mine.objective, spread)
+    return result | _growth(vessel, settings)
+
+
+def _noisy(vessel: Vessel, runs: int, steps: int = STEPS) -> Dataset:
+    data, rng = trials(vessel, runs, steps), np.random.default_rng(11)
+    return changed(data, **{name: data.frame[name] + rng.normal(0, s, len(data.frame)) for name, s in NOISE.items()})
+
+
+def single(fit: Fit, begin: np.ndarray) -> Any:
+    """`least_squares` (trf) on whole runs with exact Jacobians from the compiled variational rollout."""
+    whole, last = Intervals(fit, 0), dict[bytes, Evaluation]()
+    none, used = np.zeros((len(fit.runs), 0)), whole.weight.reshape(len(whole), -1) > 0
+    nodes = len(fit.model.node)
+
+    def at(x: np.ndarray) -> Evaluation:
+        key = x.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = whole.evaluate(whole.guess, x, none)
+        return last[key]
+
+    return least_squares(lambda x: at(x).r[used], begin, jac=lambda x: at(x).R[:, nodes:].transpose(0, 2, 1)[used])
+
+
+def _differences(vessel: Vessel, data: Dataset, fit: Fit, theta: np.ndarray) -> np.ndarray:
+    """Weighted residuals of the model by hand."""
+    model, found = Model(vessel), []
+    for _, rows in data.frame.groupby("run", sort=False):
+        measured = rows[["u", "v", "r"]].to_numpy()
+        orders = rows[["port.n", "port.alpha"]].to_numpy()[:-1]
+        found.append((model.motion(measured[0], orders, theta, 1.0) - measured[1:]) / fit.deviations)
+    return np.concatenate(found).ravel()
+
+
+def by_hand(vessel: Vessel, data: Dataset, fit: Fit, begin: np.ndarray) -> Any:
+    """`least_squares` (trf, defaults) with finite differences; its model is checked against shipid's first."""
+    model, own = Model(vessel), dynamics(vessel)
+    nu, orders = np.array([3.0, 0.4, -0.03]), (2.0, 0.3)
+    told = [orders[name.endswith("alpha")] for name in own.commands]
+    state = [0, 0, 0, *nu]
+    rates = own.rates(state, [], told, np.zeros(len(own.environment)), list(vessel.parameters.values()), np.zeros(3))
+    assert np.allclose(model.rates(nu, orders, np.ones(fit.num_factors)), np.array(rates).ravel()[3:], rtol=1e-9)
+    return least_squares(lambda theta: _differences(vessel, data, fit, theta), begin)
+
+
+def _convergence(
+    vessel: Vessel, data: Dataset, settings: Identify, fit: Fit, best: float, spread: float
+) -> dict[str, Any]:
+    """From how many of so many starts single shooting and `identify` reach the best optimum."""
+    reached = {"single shooting": 0, "identify": 0}
+    for seed in range(STARTS):
+        begin = 1 + spread * np.random.default_rng(seed).uniform(-1, 1, fit.num_factors)
+        start = dict(zip(fit.unknown.paths, begin.tolist(), strict=True))
+        with suppress(ValueError):  # residuals are not finite in the initial point
+            reached["single shooting"] += 2 * single(fit, begin).cost < best * (1 + NEAR)
+        reached["identify"] += identify(vessel, data, data.runs, settings, start=start).objective < best * (1 + NEAR)
+    return {f"starts off by {spread:.0%}: {name} converges": f"{n} of {STARTS}" for name, n in reached.items()}
+
+
+def _growth(vessel: Vessel, settings: Identify) -> dict[str, Any]:
+    """Time per unit of four times the runs, and of four times the parameters, over time per unit."""
+    few = settings.model_copy(
+        update={"fixed": [f"{DERIVATIVES}{axis}_*" for axis in "XY"] + ["hull.*r|", "hull.*v|", "hull.*rrr"]}
+    )
+    cases = {
+        "runs": {RUNS: (RUNS, settings), MORE_RUNS: (MORE_RUNS, settings)},
+        "parameters": {FEWER: (RUNS, few), 4 * FEWER: (RUNS, settings)},
+    }
+    result: dict[str, Any] = {}
+    for name, sizes in cases.items():
+        ways = {}
+        for size, (runs, wanted) in sizes.items():
+            data = _noisy(vessel, runs)
+            ways[str(size)] = lambda data=data, wanted=wanted: identify(vessel, data, data.runs, wanted)
+        seconds = best_of(ways, ROUNDS)
+        small, large = sizes
+        result |= {f"{size} {name} [s]": round(seconds[str(size)], 4) for size in sizes}
+        result[f"{name}: time per unit, {large} / {small}"] = round(
+            seconds[str(large)] / seconds[str(small)] * small / large, 3
+        )
+    return result

@@ -1,0 +1,115 @@
+"""Laws of the variational step: derivatives are differences, engines agree, single and multiple shooting meet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.identification import residuals
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import Intervals, build, predict
+from shipid.simulation.native import compiler
+from shipid.simulation.rollout import rollout
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from tests.conftest import PATCHED, variety
+from tests.identification.trials import trials
+
+ALL = ["initial_state", "current", "thrust_scale", "latency", "heading_bias", "velocity_bias", "lever_arm"]
+EVERY = {"u": 0.1, "v": 0.1, "r": 0.003, "psi": 0.02, "position": 1.0}
+#: structure -> what is free in it
+CASES = {
+    "gunnerus-28.9": ["hull.derivatives.Y_u*", "thruster.*.k_T", "inertia.m"],
+    "gunnerus-33.9": ["hull.crossflow.C_d", "hull.resistance.*", "wind.C_Dt"],
+    "actuators": ["hull.derivatives.N_u*", "thruster.port.actuator.*"],
+    "many-strips": ["hull.crossflow.C_d"],
+    "roll": ["hull.derivatives.K_p", "hull.derivatives.N_uv"],
+    "kvlcc2-l7": ["hull.mmg.Y_*", "thruster.*.K_T.*"],
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_slopes_are_differences(name: str) -> None:
+    vessel = variety()[name] if name in PATCHED else load_vessel(name)
+    nuisance = [key for key in ALL if key != "thrust_scale" or any("k_T" in path for path in vessel.parameters)]
+    slow = 0.2 if name == "kvlcc2-l7" else 1.0
+    dataset = trials(vessel, runs=2, steps=12, step=slow)
+    wanted = Identify(parameters=CASES[name], weights=EVERY, nuisance=nuisance, horizon=0, step=slow)
+    fit = build(vessel, dataset, dataset.runs, wanted)
+    rng = np.random.default_rng(3)
+    factors = fit.unknown.centre + rng.normal(0, 0.02, fit.num_factors)
+    nuisances = np.abs(rng.normal(0.5, 0.1, (2, len(fit.names))))
+    start = Intervals(fit, 0).guess + rng.normal(0, 1e-3, (2, len(fit.model.node)))
+    here = predict(fit, factors, nuisances, start)
+    own = [(here.by_factor[:, i], _moved(i), 0) for i in range(fit.num_factors)]
+    own += [(here.by_nuisance[:, i], 0, _moved(i)) for i in range(len(fit.names))]
+    for slope, by_factor, by_nuisance in own:
+        ends = []
+        for sense in (1, -1):
+            factor = factors.copy()
+            other = nuisances.copy()
+            if by_factor:
+                factor[by_factor - 1] += sense * 1e-5
+            if by_nuisance:
+                other[:, by_nuisance - 1] += sense * 1e-5
+            # a start that is free stays as far from the measured one as it was
+            moved = start + Intervals(fit, 0).begin(fit.centres + fit.widths * other)[0]
+            moved -= Intervals(fit, 0).begin(fit.centres + fit.widths * nuisances)[0]
+            ends.append(predict(fit, factor, other, moved).r)
+        difference = (ends[0] - ends[1]) / 2e-5
+        assert np.abs(slope - difference).max() < 1e-5 * (1 + np.abs(difference).max())
+    for i, size in enumerate(fit.node_scale):
+        ends = [
+            predict(fit, factors, nuisances, start + sense * 1e-5 * size * np.eye(len(fit.node_scale))[i]).r
+            for sense in (1, -1)
+        ]
+        difference = (ends[0] - ends[1]) / 2e-5
+        assert np.abs(here.by_start[:, i] - difference).max() < 1e-5 * (1 + np.abs(difference).max())
+
+
+def _moved(i: int) -> int:
+    return i + 1
+
+
+def test_residuals_are_those_of_the_rollout() -> None:
+    vessel = load_vessel("gunnerus-28.9")
+    dataset = trials(vessel, runs=2, steps=30)
+    other = vessel.with_values({"hull.derivatives.N_ur": 1.3 * vessel.parameters["hull.derivatives.N_ur"]})
+    fit = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
+    found = predict(fit, np.array([1.3]), np.zeros((2, 0)))
+    for number, (_, rows) in enumerate(dataset.frame.groupby("run")):
+        start = {name: rows[name].to_numpy()[:1] for name in dynamics(other).state}
+        commands = {name: rows[name].to_numpy()[:-1, None] for name in dataset.commands}
+        weather = {name: np.zeros(1) for name in dynamics(other).environment}
+        path = rollout(other, start, commands, weather, step=1.0, num_steps=30, method="rk4", engine="casadi")
+        for name, width in zip(("u", "v", "r"), fit.deviations, strict=True):
+            mine = found.r[(found.run == number) & (found.signals == name)]
+            assert np.allclose(mine * width, path[name][1:, 0, 0] - rows[name].to_numpy()[1:], atol=1e-12)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "actuators"])
+def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    vessel = variety()[name]
+    dataset = trials(vessel, runs=3, steps=20)
+    wanted = Identify(parameters=["hull.derivatives.N_u*"], nuisance=["current", "latency", "lever_arm"], horizon=0)
+    fit = build(vessel, dataset, dataset.runs, wanted)
+    found = []
+    for least in (np.inf, 0.0):
+        monkeypatch.setattr(residuals, "COMPILE_FROM", least)
+        intervals = Intervals(fit, 5)
+        assert intervals.native is (least == 0.0)
+        nuisances = fit.centres + 0.5 * fit.widths * np.ones((3, 1))
+        found.append(intervals.evaluate(intervals.guess, np.full(fit.num_factors, 1.1), nuisances))
+    for key in ("end", "slope", "r", "R"):
+        one, other = (getattr(each, key) for each in found)
+        assert np.abs(one - other).max() <= 1e-12 * (1 + np.abs(one).max())
+
+
+def test_what_no_signal_feels_is_left_out() -> None:
+    vessel = load_vessel("gunnerus-28.9")
+    dataset = trials(vessel, runs=1, steps=10)
+    plain = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.*"], horizon=0))
+    assert plain.model.node == ("u", "v", "r")
+    wanted = Identify(parameters=["hull.derivatives.*"], horizon=0, weights={"position": 1.0})
+    assert build(vessel, dataset, dataset.runs, wanted).model.node == ("north", "east", "psi", "u", "v", "r")

@@ -1,0 +1,345 @@
+"""Laws of identify: what made the data is found again, what is declared holds, and each failure is one sentence."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import ShipidError
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import build, predict
+from shipid.identification.shooting import Problem, solve
+from shipid.identification.solve import WORDS, Solution, identify
+from shipid.vessel.load import Vessel, load_vessel
+from tests.identification.trials import changed, orders, trials
+
+SHIP = load_vessel("gunnerus-28.9")
+FEW = ["hull.derivatives.Y_uv", "hull.derivatives.Y_ur", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
+SHARP = {"u": 1e-3, "v": 1e-3, "r": 1e-4}
+
+
+def settings(**more: object) -> Identify:
+    return Identify(**{"parameters": FEW, "start": "base", "horizon": 0, "weights": SHARP, **more})
+
+
+def degraded(vessel: Vessel, patterns: str = "hull.derivatives.", spread: float = 0.2) -> Vessel:
+    """The same ship with every such number off by up to `spread`: what a fit has to mend."""
+    rng = np.random.default_rng(5)
+    paths = [path for path in vessel.parameters if path.startswith(patterns)]
+    return vessel.with_values({path: vessel.parameters[path] * rng.uniform(1 - spread, 1 + spread) for path in paths})
+
+
+def ranges(dataset: Dataset) -> np.ndarray:
+    return np.array([np.ptp(dataset.frame[name]) for name in ("u", "v", "r")])
+
+
+@pytest.mark.parametrize("horizon", [0.0, 25.0])
+@pytest.mark.parametrize("method", ["rk4", "euler"])
+def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> None:
+    dataset = trials(SHIP, runs=6, method=method)
+    base = degraded(SHIP)
+    found = identify(
+        base, dataset, dataset.runs, settings(parameters=["hull.derivatives.*"], method=method, horizon=horizon)
+    )
+    assert found.status == "ok"
+    assert found.objective < 1e-6 * found.objective_start
+    for path in found.paths:  # 32 numbers, all of them seen by these manoeuvres
+        assert found.values[path] == pytest.approx(SHIP.parameters[path], rel=1e-4)
+    fit = build(found.identified, dataset, dataset.runs, settings(method=method))
+    free = predict(fit, np.ones(len(FEW)), np.zeros((6, 0)))
+    for name, width, extent in zip(("u", "v", "r"), fit.deviations, ranges(dataset), strict=True):
+        assert np.sqrt(np.mean((free.r[free.signals == name] * width) ** 2)) < 1e-4 * extent
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_it_converges_from_where_single_shooting_diverges(seed: int) -> None:
+    dataset, rng = trials(SHIP, runs=4), np.random.default_rng(seed)
+    wanted = settings(parameters=["hull.derivatives.*"])
+    fit = build(SHIP, dataset, dataset.runs, wanted)
+    begin = {path: 1 + 3 * rng.uniform(-1, 1) for path in fit.unknown.paths}
+    whole = Problem(fit, 0)
+    assert WORDS.get(solve(whole, whole.start(np.array(list(begin.values())))).word) != "ok"
+    found = identify(SHIP, dataset, dataset.runs, wanted, start=begin)
+    assert not np.isfinite(found.objective_start)
+    assert found.status == "ok"
+    assert np.allclose(found.factors, 1, atol=1e-4)
+
+
+def test_ties_share_a_factor_and_what_is_fixed_stays() -> None:
+    truth = SHIP.with_values({path: 1.2 * SHIP.parameters[path] for path in FEW[:2]})
+    dataset = trials(truth, runs=4)
+    found = identify(SHIP, dataset, dataset.runs, settings(together=[FEW[:2]], fixed=FEW[2:3]))
+    assert found.paths == (FEW[0], FEW[3])
+    assert np.allclose(found.factors, [1.2, 1.0], atol=1e-5)
+    assert set(found.values) == {FEW[0], FEW[1], FEW[3]}
+    assert found.values[FEW[1]] == pytest.approx(1.2 * SHIP.parameters[FEW[1]], rel=1e-5)
+    assert found.identified.parameters[FEW[2]] == SHIP.parameters[FEW[2]]
+
+
+def test_bounds_hold_and_are_flagged() -> None:
+    dataset = trials(SHIP, runs=4)
+    found = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 2.0), "hull.*.N_uv": (0.5, 1.5)}))
+    assert found.factors[0] == pytest.approx(1.1, abs=1e-5)
+    assert (found.factors >= [1.1, -np.inf, 0.5, -np.inf]).all()
+    assert found.at_bound.tolist() == [True, False, False, False]
+    assert FEW[0] in found.sentence
+    held = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 1.1)}), start=found)
+    assert held.factors[0] == 1.1
+    assert not held.at_bound.any()
+    assert held.objective == pytest.approx(found.objective, rel=1e-4)
+
+
+def test_a_prior_pulls_as_linear_theory_says() -> None:
+    truth = SHIP.with_values({path: 1.002 * SHIP.parameters[path] for path in FEW})
+    dataset = trials(truth, runs=2, steps=30)
+    free = identify(SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}))
+    information = free.jacobian.T @ free.jacobian
+    width = 1 / np.sqrt(np.diag(information)).mean()
+    found = identify(
+        SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}, prior={"hull.*": width})
+    )
+    expected = 1 + np.linalg.solve(information + np.eye(4) / width**2, information @ np.full(4, 0.002))
+    assert np.allclose(found.prior_widths, width)
+    assert np.allclose(found.factors - 1, expected - 1, rtol=0.02, atol=1e-6)
+    assert np.abs(expected - 1.002).max() > 3e-4  # it does pull
+
+
+def test_what_each_run_has_of_its_own_is_found() -> None:
+    runs, steps = 4, 60
+    vessel = SHIP.with_values({"current.kind": "uniform"})
+    rng = np.random.default_rng(8)
+    scale = 1 + rng.uniform(-0.1, 0.1, runs)
+    V_c, beta_c = rng.uniform(0.1, 0.4, runs), rng.uniform(-3, 3, runs)
+    numbers = np.tile(list(vessel.parameters.values()), (runs, 1))
+    for i, path in enumerate(vessel.parameters):
+        if path.endswith("k_T"):
+            numbers[:, i] *= scale
+    dataset = trials(vessel, runs, steps, weather={"V_c": V_c, "beta_c": beta_c}, parameters=numbers)
+    wanted = settings(nuisance={"current": 1.0, "thrust_scale": 0.5}, weights={"u": 1e-4, "v": 1e-4, "r": 1e-5})
+    found = identify(SHIP, dataset, dataset.runs, wanted, start=dict.fromkeys(FEW, 1.1))
+    assert found.status == "ok"
+    assert np.allclose(found.factors, 1, atol=1e-3)
+    own = [found.nuisances[run] for run in dataset.runs]
+    assert np.allclose([one["thrust_scale"] for one in own], scale, atol=1e-3)
+    assert np.allclose([one["current_north"] for one in own], V_c * np.cos(beta_c), atol=2e-3)
+    assert np.allclose([one["current_east"] for one in own], V_c * np.sin(beta_c), atol=2e-3)
+
+
+def test_faults_of_the_log_are_found() -> None:
+    runs, steps, rng = 4, 60, np.random.default_rng(9)
+    dataset = trials(SHIP, runs, steps)
+    each = np.repeat(np.arange(runs), steps + 1)
+    bias, arm = rng.uniform(-0.05, 0.05, runs), rng.uniform(-4, 4, runs)
+    slip = rng.uniform(-0.1, 0.1, (2, runs))
+    frame = dataset.frame
+    b, x = bias[each], arm[each]
+    across = frame["v"] + x * frame["r"]
+    log = changed(
+        dataset,
+        psi=frame["psi"] + b,
+        u=np.cos(b) * frame["u"] + np.sin(b) * across + slip[0][each],
+        v=np.cos(b) * across - np.sin(b) * frame["u"] + slip[1][each],
+        north=frame["north"] + x * np.cos(frame["psi"]),
+        east=frame["east"] + x * np.sin(frame["psi"]),
+    )
+    wanted = settings(
+        nuisance={"heading_bias": 0.1, "velocity_bias": 0.5, "lever_arm": 10.0},
+        weights={"u": 1e-4, "v": 1e-4, "r": 1e-5, "position": 1e-2},
+    )
+    found = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
+    assert found.status == "ok"
+    assert np.allclose(found.factors, 1, atol=1e-3)
+    for name, truth in (
+        ("heading_bias", bias),
+        ("lever_arm", arm),
+        ("velocity_bias_u", slip[0]),
+        ("velocity_bias_v", slip[1]),
+    ):
+        assert np.allclose([found.nuisances[run][name] for run in log.runs], truth, atol=5e-3)
+
+
+def test_late_commands_and_wrong_starts_are_found() -> None:
+    runs, steps, late = 3, 60, 1.4
+    logged = orders(SHIP, runs, steps, 1)
+    before = {k: np.concatenate([x[:1], x[:1], x])[: steps + 1] for k, x in logged.items()}
+    told = {k: (2 - late) * np.concatenate([x[:1], x])[: steps + 1] + (late - 1) * before[k] for k, x in logged.items()}
+    dataset = trials(SHIP, runs, steps, told=told)
+    frame = dataset.frame
+    first = (frame["t"] == 0).to_numpy()
+    log = changed(dataset, u=frame["u"] + 0.002 * first, r=frame["r"] - 2e-4 * first)
+    wanted = settings(nuisance={"latency": 1.0, "initial_state": 50.0})
+    found = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
+    assert found.status == "ok"
+    assert np.allclose(found.factors, 1, atol=2e-3)
+    for run in log.runs:
+        own = found.nuisances[run]
+        assert own["latency"] == pytest.approx(late, abs=2e-3)
+        assert own["initial_state.u"] == pytest.approx(-0.002, abs=4e-4)
+        assert own["initial_state.r"] == pytest.approx(2e-4, abs=4e-5)
+
+
+def test_an_override_counts_for_its_run_alone() -> None:
+    vessel = SHIP.with_values({"current.kind": "uniform"})
+    dataset = trials(vessel, 3, 40, weather={"V_c": np.array([0.0, 0.4, 0.0]), "beta_c": np.array([0.0, 1.0, 0.0])})
+    own = {"M02": {"environment": {"V_c": 0.4, "beta_c": 1.0}}}
+    without = identify(vessel, dataset, dataset.runs, settings())
+    found = identify(vessel, dataset, dataset.runs, settings(runs=own))
+    assert np.allclose(found.factors, 1, atol=1e-5)
+    assert without.objective > 1e6 * found.objective
+
+
+def test_the_nuisances_are_projected_out() -> None:
+    """J^T J is the inverse of the factors' block of the whole covariance, and e^T e what is left of the objective."""
+    dataset, rng = trials(SHIP, runs=3, steps=30), np.random.default_rng(1)
+    noisy = changed(dataset, u=dataset.frame["u"] + rng.normal(0, 0.05, len(dataset.frame)))
+    wanted = settings(nuisance=["initial_state", "velocity_bias"], weights={"u": 0.05, "v": 0.05, "r": 0.003})
+    found = identify(SHIP, noisy, noisy.runs, wanted)
+    assert (found.residuals**2).sum() == pytest.approx(found.objective, rel=1e-6)
+    assert np.abs(found.jacobian.T @ found.residuals).max() < 1e-3 * np.abs(found.jacobian).sum(axis=0).max()
+    fit = build(SHIP, noisy, noisy.runs, wanted)
+    assert found.point is not None
+    firsts = found.point.nodes[[0, 2, 4]]
+    whole = predict(fit, found.factors, found.point.nuisances, firsts)
+    columns = [whole.by_factor]
+    for run in range(3):
+        mine = (whole.run == run)[:, None]
+        columns += [whole.by_nuisance * mine, whole.by_start * mine]
+    A = np.hstack(columns)
+    information = A.T @ A + np.diag([0.0] * 4 + [1.0] * (A.shape[1] - 4))
+    covariance = np.linalg.inv(information)[:4, :4]
+    assert np.allclose(np.linalg.inv(found.jacobian.T @ found.jacobian), covariance, rtol=1e-6)
+
+
+def test_order_of_runs_and_repetition_change_nothing() -> None:
+    dataset, rng = trials(SHIP, runs=4, steps=40), np.random.default_rng(2)
+    noisy = changed(dataset, v=dataset.frame["v"] + rng.normal(0, 0.05, len(dataset.frame)))
+    one, again = (identify(SHIP, noisy, noisy.runs, settings()) for _ in range(2))
+    assert np.array_equal(one.factors, again.factors)
+    assert np.array_equal(one.jacobian, again.jacobian)
+    turned = identify(SHIP, noisy, noisy.runs[::-1], settings())
+    assert np.allclose(turned.factors, one.factors, atol=1e-6)
+
+
+def test_huber_withstands_outliers() -> None:
+    dataset, rng = trials(SHIP, runs=4, steps=40), np.random.default_rng(2)
+    bad = rng.uniform(size=len(dataset.frame)) < 0.05
+    log = changed(dataset, v=dataset.frame["v"] + np.where(bad & (dataset.frame["t"] > 0), 2.0, 0.0))
+    weights = {"u": 0.05, "v": 0.05, "r": 0.003}
+    off = [
+        np.abs(identify(SHIP, log, log.runs, settings(weights=weights, loss=loss)).factors - 1).max()
+        for loss in ("squared", "huber")
+    ]
+    assert off[1] < 0.2 * off[0]
+
+
+def test_what_the_data_do_not_support_is_dropped() -> None:
+    dataset, rng = trials(SHIP, runs=4, steps=40), np.random.default_rng(4)
+    noisy = changed(dataset, **{k: dataset.frame[k] + rng.normal(0, s, len(dataset.frame)) for k, s in SHARP.items()})
+    base = SHIP.with_values({"hull.derivatives.N_ur": 0.5 * SHIP.parameters["hull.derivatives.N_ur"]})
+    found = identify(base, noisy, noisy.runs, settings(drop=3.0))
+    assert FEW[3] not in found.dropped
+    assert len(found.dropped) >= 2
+    for path in found.dropped:
+        assert found.values[path] == base.parameters[path]
+    assert found.factors[3] == pytest.approx(2.0, rel=0.02)
+
+
+def test_progress_is_told() -> None:
+    dataset = trials(SHIP, runs=2, steps=30)
+    told: list[tuple[int, float]] = []
+    found = identify(
+        SHIP,
+        dataset,
+        dataset.runs,
+        settings(),
+        start=dict.fromkeys(FEW, 1.2),
+        progress=lambda i, f: told.append((i, f)),
+    )
+    assert [i for i, _ in told] == list(range(found.iterations + 1))
+    assert told[-1][1] == pytest.approx(found.objective, abs=1e-6)
+
+
+def test_progress_can_stop_and_fail() -> None:
+    dataset, start = trials(SHIP, runs=2, steps=30), dict.fromkeys(FEW, 1.2)
+    found = identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: i == 1)
+    assert (found.status, found.iterations) == ("stopped", 1)
+    with pytest.raises(ZeroDivisionError):
+        identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: 1 / i)
+
+
+def test_ctrl_c_ends_it() -> None:
+    dataset, told = trials(SHIP, runs=2, steps=30), list[int]()
+
+    def interrupt(iteration: int, _objective: float) -> None:
+        told.append(iteration)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        identify(SHIP, dataset, dataset.runs, settings(), start=dict.fromkeys(FEW, 1.2), progress=interrupt)
+    assert told == [0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def solution_of(**more: object) -> Solution:
+    dataset = trials(SHIP, runs=1, steps=30)
+    given = {key: more.pop(key) for key in ("start", "runs_wanted") if key in more}
+    return identify(SHIP, dataset, given.get("runs_wanted", dataset.runs), settings(**more), start=given.get("start"))  # type: ignore[arg-type]
+
+
+def test_a_start_that_diverges_is_told() -> None:
+    found = solution_of(start={FEW[0]: -1e6})
+    assert found.status == "diverged"
+    assert "'M01'" in found.sentence
+    assert "\n" not in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"runs_wanted": ["M07"]}, "there is no run 'M07'"),
+        ({"runs_wanted": []}, "no run to fit"),
+        ({"runs_wanted": ["M01", "M01"]}, "named twice"),
+        ({"horizon": 100.0}, "no unbroken stretch of 50 s"),
+        ({"parameters": ["hull.derivatives.Y_u"]}, "selects nothing"),
+        ({"fixed": ["hull.*"]}, "nothing is left"),
+        ({"together": [[FEW[0], "hull.derivatives.X_rr"]]}, "is tied but not free"),
+        ({"together": [FEW[:2], FEW[1:3]]}, "is in two groups"),
+        ({"parameters": ["inertia.x_G"]}, "give its size under scale"),
+        ({"scale": {FEW[0]: 2.0}}, "scale is for a 0"),
+        ({"runs": {"M09.environment.V_w": 1.0}}, "begins with no run"),
+        ({"runs": {"M01.environment.V_x": 1.0}}, "is nothing to set"),
+        ({"runs": {"M01.environment.V_w": "calm"}}, "is no number"),
+        ({"runs": {f"M01.{FEW[0]}": 1.0}}, "is free in the fit"),
+        ({"start": {"hull.derivatives.X_rr": 1.0}}, "is not free in the fit"),
+    ],
+)
+def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
+    with pytest.raises(ShipidError) as error:
+        solution_of(**more)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"weights": {"w": 0.1}}, "weights.w is none"),
+        ({"nuisance": ["currant"]}, "did you mean 'current'"),
+        ({"bounds": {FEW[0]: (2.0, 1.0)}}, "runs backwards"),
+        ({"horizon": 1.5}, "must hold two steps"),
+        ({"weights": {"u": 0.0}}, "greater than 0"),
+    ],
+)
+def test_a_wrong_block_is_told(more: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        settings(**more)
+
+
+def test_a_number_that_is_zero_needs_its_size() -> None:
+    truth = SHIP.with_values({"inertia.x_G": -0.8})
+    dataset = trials(truth, runs=3, steps=40)
+    found = identify(SHIP, dataset, dataset.runs, settings(parameters=["inertia.x_G"], scale={"inertia.x_G": 1.0}))
+    assert found.values["inertia.x_G"] == pytest.approx(-0.8, rel=1e-4)
