@@ -18,6 +18,7 @@ from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.estimation.recipe import Recipe
+from shipid.identification.problem import Identify, unknowns
 from shipid.simulation.truth import Truth, check_truth
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
@@ -167,7 +168,10 @@ class Study(Strict):
 
 @dataclass(frozen=True)
 class Model:
-    """A foundation of the study: a variant of a vessel, or no physics at all (`variant` is None)."""
+    """A foundation of the study: a variant of a vessel, or no physics at all (`variant` is None).
+
+    identify : what is identified from the runs of each batch before anything is compensated; None: nothing.
+    """
 
     name: str
     family: str
@@ -175,6 +179,7 @@ class Model:
     variant: Variant | None
     vessel: Vessel | None
     description: str = ""
+    identify: Identify | None = None
 
 
 @dataclass(frozen=True)
@@ -371,12 +376,29 @@ def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, 
             )
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
-        found += [Model(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
+        drawn = members(family, vessel, file)
+        settings = _identify(study, family, index, vessel, file)
+        found += [Model(v.name, v.family, v.member, v, vessel, words, settings) for v in drawn]
     names = [model.name for model in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DocumentError(f"two models would be called {twice!r}: rename a family", file=file, path="family")
     return (*found, Model(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+
+
+def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Identify | None:
+    """What a family identifies, with the horizon, step and method of the study's own prediction unless it says else."""
+    if family.identify is None:
+        return None
+    ahead, prefix = study.prediction, f"family.{index}.identify"
+    own = {"horizon": ahead.horizon * ahead.step, "step": ahead.step, "method": ahead.method}
+    settings: Identify = documents.parse(Identify, own | family.identify, file, prefix)
+    try:
+        unknowns(vessel, settings)
+    except DocumentError as error:
+        where = (error.path or "identify").replace("identify", prefix, 1)
+        raise DocumentError(error.message, file=file, path=where) from None
+    return settings
 
 
 def _recipe(study: Study, file: Path) -> Recipe:

@@ -35,19 +35,25 @@ VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % 
 class Prepared:
     """All that cells need, the same for every worker.
 
+    data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
     models : foundations, after redraws.
     pool_paths, test_paths : model -> (T, S, 2) [m] in the frame (11); zeros for the model without physics.
     notes : what was assumed, redrawn or left out, in sentences.
     """
 
+    data: Dataset
     pool: Windows
     test: Windows
     models: tuple[Model, ...]
-    commands: tuple[str, ...]
     pool_paths: Mapping[str, Array]
     test_paths: Mapping[str, Array]
     notes: tuple[str, ...]
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Command columns of the runs."""
+        return tuple(self.data.commands)
 
     def accuracy(self, model: str) -> Summary:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
@@ -165,10 +171,10 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
                 notes.append(f"{model.vessel.name}: {', '.join(missing)} not measured, assumed 0")
     models, paths = _roll_out(plan, dataset, both, notes, device)
     return Prepared(
+        data=dataset,
         pool=rest,
         test=test,
         models=models,
-        commands=tuple(dataset.commands),
         pool_paths={name: pair[0] for name, pair in paths.items()},
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
@@ -264,6 +270,12 @@ def _one_round(
             paths = (pool[:, position], test[:, position])
             paths[1][:, test_bad[position]] = np.nan
             yield model, paths, float(pool_bad[position].mean())
+
+
+def paths_of(plan: Plan, dataset: Dataset, parts: Sequence[Windows], model: Model, device: str) -> Pair:
+    """Paths of one model on (pool, test); where it diverges they are not numbers."""
+    _, paths, share = next(_one_round(plan, dataset, parts, [model], device))
+    return (np.full_like(paths[0], np.nan), paths[1]) if share else paths
 
 
 def _redraw(plan: Plan, model: Model, family: Family, share: float) -> Model:

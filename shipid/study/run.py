@@ -21,12 +21,13 @@ from shipid.data.windows import covered, planned_means
 from shipid.errors import ShipidError
 from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
-from shipid.metrics import position_error, summary
+from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, planned, prepare
+from shipid.study.reidentify import foundations
 from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
@@ -79,7 +80,9 @@ def run_study(
     prepared = prepare(plan, dataset, device)
     store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
     store.write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
-    store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(prepared, m)} for m in prepared.models])
+    store.write_json(
+        folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared.accuracy(m.name))} for m in prepared.models]
+    )
     for note in prepared.notes:
         yield Event("note", note)
     done = store.finished(folder, plan.batches)
@@ -114,8 +117,8 @@ def run_batch(
     runs = prepared.runs(plan, batch)
     mask = np.isin(prepared.pool.run, runs)
     windows = prepared.pool.select(mask)
-    usable = {m.name: np.isfinite(prepared.test_paths[m.name]).all() for m in prepared.models}
-    targets = {m.name: windows.future - prepared.pool_paths[m.name][:, mask] for m in prepared.models}
+    standing = foundations(plan, prepared, batch, device)
+    targets = {name: windows.future - foundation.paths for name, foundation in standing.items()}
     means = planned_means(windows.columns, planned(plan, windows) or {})
     tuned = tune(
         {**windows.columns, **means},
@@ -128,27 +131,30 @@ def run_batch(
     )
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
-    for model in prepared.models:
-        found = tuned[model.name]
-        row = {"cell": batch.cell(model.name), "model": model.name, "kind": model.family, "member": model.member}
-        row |= {**shared, **_accuracy(prepared, model), "H": np.nan, "H_90": np.nan, "rms": np.nan}
-        row |= {"status": "ok", "sentence": "", "seconds": found.seconds, "trials": found.trials, "hyperparameters": ""}
+    for name, foundation in standing.items():
+        found, model, test = tuned[name], foundation.model, prepared.test
+        row = {"cell": batch.cell(name), "model": name, "kind": model.family, "member": model.member}
+        row |= {**shared, **_accuracy(model, foundation.accuracy(test)), "H": np.nan, "H_90": np.nan, "rms": np.nan}
+        row |= {"status": "ok", "sentence": foundation.sentence, "hyperparameters": ""}
+        row |= {"seconds": found.seconds, "trials": found.trials}
         predictor = None
         if found.compensator is None:
-            row |= {"status": "failed", "sentence": "no training converged"}
+            row |= {"status": "failed", "sentence": foundation.sentence or "no training converged"}
         else:
             chosen = found.compensator.hyperparameters
             searched = {name: chosen[name] for name in plan.recipe.varied() if name in chosen}
             row["hyperparameters"] = ", ".join(f"{name} {value:.3g}" for name, value in searched.items())
             predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
-            if usable[model.name]:
-                test = prepared.test
-                paths = prepared.test_paths[model.name] + predictor.compensation(test.columns, test.planned)
-                error = summary(position_error(paths, prepared.test.future))
-                row |= {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
+            failed = ~np.isfinite(foundation.test_paths).all(axis=(0, 2))
+            if failed.any():
+                row |= {
+                    "status": "diverged",
+                    "sentence": f"physics diverges on {failed.mean():.1%} of the test windows",
+                }
             else:
-                share = (~np.isfinite(prepared.test_paths[model.name]).all(axis=(0, 2))).mean()
-                row |= {"status": "diverged", "sentence": f"physics diverges on {share:.1%} of the test windows"}
+                paths = foundation.test_paths + predictor.compensation(test.columns, test.planned)
+                error = summary(position_error(paths, test.future))
+                row |= {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
         results.append((row, predictor))
     return results
 
@@ -160,10 +166,9 @@ def machine() -> dict[str, Any]:
     return {**system, "cores": os.cpu_count(), "packages": packages}
 
 
-def _accuracy(prepared: Prepared, model: Model) -> dict[str, Any]:
+def _accuracy(model: Model, found: Summary) -> dict[str, Any]:
     if model.vessel is None:
         return {"A": np.nan, "A_90": np.nan, "A_rms": np.nan}
-    found = prepared.accuracy(model.name)
     return {"A": found["mean"], "A_90": found["p90"], "A_rms": found["rms"]}
 
 

@@ -66,6 +66,9 @@ class Family(BaseModel):
     seed: int = 0
     description: str | None = None
     perturb: list[Perturbation] = []
+    identify: dict[str, Any] | None = Field(
+        default=None, description="numbers identified from the training runs of each batch: an [identify] block"
+    )
 
 
 @dataclass(frozen=True)
@@ -120,16 +123,17 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         where = f"family.{list(by_name).index(family.name)}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
-        base, perturb = family.base, family.perturb
+        base, perturb, identify = family.base, family.perturb, family.identify
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = choices(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
             base, perturb = base or parent.base, [*parent.perturb, *perturb]
+            identify = parent.identify if identify is None else identify
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        return family.model_copy(update={"base": base, "perturb": perturb, "extends": None})
+        return family.model_copy(update={"base": base, "perturb": perturb, "identify": identify, "extends": None})
 
     return [written_out(family, ()) for family in families]
 
