@@ -341,6 +341,31 @@ def study_list() -> None:
     _print(_table(["name", "question"], ((name, read(file)["question"]) for name, file in bundled("studies").items())))
 
 
+@study_app.command("new")
+def study_new(
+    vessel: Annotated[list[str], typer.Option(help="bundled name, or path of a vessel or patch; may be repeated")],
+    data: Annotated[
+        Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="TOML file to write; default: <data or vessel>-study.toml beside you")
+    ] = None,
+) -> None:
+    """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
+    from shipid.data.draft import check_new, write_new
+    from shipid.study.new import draft_study
+
+    file = out or Path(f"{Path(str(data or vessel[0])).stem}-study.toml")
+    check_new(file, "study")
+    draft = draft_study(vessel, data, file)
+    write_new(draft.text, file, "study")
+    rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
+    _print(_table(["choice", "value", "because"], rows))
+    names = ", ".join(model.name for model in draft.plan.models)
+    typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.models)} models ({names}) -> {file}")
+    typer.echo(f"run it with: shipid study run {file}")
+
+
 @study_app.command("variants")
 def study_variants(
     study: Annotated[str, typer.Argument(help="bundled study or path of one")],

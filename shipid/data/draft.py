@@ -61,12 +61,17 @@ def segments_text(segments: Iterable[Segment]) -> str:
     return "\n".join(blocks) + "\n"
 
 
-def write_new(text: str, file: Path) -> Path:
-    """Write a TOML document whole; one that exists is never written over."""
+def check_new(file: Path, kind: str) -> None:
+    """Raise DataError unless a new TOML document of this kind can be written there."""
     if file.suffix != ".toml":
-        raise DataError("a mapping is a TOML file: let the name end in .toml", file=file)
+        raise DataError(f"a {kind} is a TOML file: let the name end in .toml", file=file)
     if file.exists():
         raise DataError("exists already and is not written over: name another with --out", file=file)
+
+
+def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
+    """Write a TOML document whole; one that exists is never written over."""
+    check_new(file, kind)
     write_whole(file, lambda part: part.write_text(text, encoding="utf-8"))
     return file
 
