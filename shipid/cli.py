@@ -253,12 +253,14 @@ def data_segment(
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
     from shipid.data.catalogue import fetch
-    from shipid.data.draft import segment_log, segments_text, write_new
+    from shipid.data.draft import moment, segment_log, segments_text, write_new
     from shipid.data.mapping import read_mapping
 
-    found = segment_log(read_mapping(mapping), log or fetch(mapping))
-    file = write_new(segments_text(found), out or Path(f"{Path(mapping).stem}-segments.toml"))
-    _print(_table(["run", "start", "end"], ((s.run, f"{s.start:g}", f"{s.end:g}") for s in found)))
+    declared = read_mapping(mapping)
+    unit = declared.clock.unit
+    found = segment_log(declared, log or fetch(mapping))
+    file = write_new(segments_text(found, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    _print(_table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in found)))
     typer.echo(f"{len(found)} segments -> {file}")
 
 
@@ -355,7 +357,7 @@ def study_new(
     from shipid.data.draft import check_new, write_new
     from shipid.study.new import draft_study
 
-    file = out or Path(f"{Path(str(data or vessel[0])).stem}-study.toml")
+    file = out or Path(f"{_stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
     write_new(draft.text, file, "study")
@@ -569,7 +571,7 @@ def manoeuvre(
         source = f"simulated: {ship.name}, {chosen.title}"
         typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
     content = _manoeuvre_content(ship, chosen, record, rows, judged)
-    page = out or Path(f"{Path(vessel).name.removesuffix('.toml')}-{name}.html")
+    page = out or Path(f"{_stem(vessel)}-{name}.html")
     typer.echo(f"page -> {write_manoeuvre(content, page)}")
 
 
@@ -732,6 +734,11 @@ def _line(event: Event) -> str:
         else f"{row['status']}: {row['sentence']}"
     )
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"
+
+
+def _stem(name: str | Path) -> str:
+    """Name of a document or dataset without folder and ending; a dot in the name of a vessel is no ending."""
+    return Path(name).name.removesuffix(".toml").removesuffix(".parquet")
 
 
 def _report(folder: Path) -> Path:

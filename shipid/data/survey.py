@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, cumulative_integral, pieces
 from shipid.data.segmentation import kind_of
 
 KINDS = ("zigzag", "turning")
@@ -78,6 +78,23 @@ def _factor(dataset: Dataset) -> complex:
     ran, was = np.concatenate(run), np.concatenate(seen)
     size = float(np.vdot(ran, ran).real)
     return complex(np.vdot(ran, was) / size) if size > 0 else 1.0 + 0.0j
+
+
+def separation(dataset: Dataset, lag: float) -> float:
+    """RMS distance [m] by which positions and integrated velocities part within a lag [s]; 0 where no run is so long.
+
+    Jitter of the positions does not grow with the lag, errors of the velocities do.
+    """
+    parted = []
+    for _, rows in pieces(dataset):
+        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
+        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
+        run = cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag)
+        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - run
+        early = t <= t[-1] - lag
+        parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
+    every = np.abs(np.concatenate(parted))
+    return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
 
 
 def typical_runs(runs: pd.DataFrame) -> list[str]:

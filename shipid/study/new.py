@@ -19,7 +19,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
-from shipid.data.survey import Survey, survey, typical_runs
+from shipid.data.survey import Survey, separation, survey, typical_runs
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.predictor import assumed, check_columns
@@ -41,6 +41,7 @@ HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEPS, LONGEST_STEP = 15, 2.0  # steps ahead at least; s
 SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
+GROWING = 1.2  # times as far apart after twice the time: less is jitter
 UNTRUE_PATHS = 0.25  # of the runs whose positions leave their velocities
 FEW_RUNS, FOLDS = 6, 3
 MANOEUVRES, TESTS, INSTANTS, MEMBERS = 60, 10, 50, {"moderate": 3, "high": 2}
@@ -136,7 +137,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     fixed = [
         *_question(vessels, dataset, seen, horizon),
         Choice("data.dataset", _relative(str(data), out), _measured(vessels, dataset)),
-        _path(seen, dataset),
+        _path(seen, dataset, horizon),
         Choice("split.test", tests, _why_test(runs, tests)),
     ]
     ahead = [
@@ -233,12 +234,19 @@ def _measured(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
     return "; ".join(parts)
 
 
-def _path(seen: Survey, dataset: Dataset) -> Choice:
+def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
+    """The true path: positions, unless they scatter where the integral of the velocities does not."""
     share = float(seen.runs["straying"].mean())
     away = f"positions leave the integral of u, v, psi in {int(seen.runs['straying'].sum())} of {len(seen.runs)} runs"
     size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
+    half, whole = (separation(dataset, lag) for lag in (horizon / 2, horizon))
+    parting = f"{half:.2g} m in {horizon / 2:g} s, {whole:.2g} m in {horizon:g} s"
+    apart = f"positions and the integral of u, v, psi part by {parting}"
+    if share <= UNTRUE_PATHS and whole < GROWING * half:
+        why = f"{apart} (RMS): that does not grow, so it is jitter of the positions, and the true path is the integral"
+        return Choice("data.path", "velocity", why)
     if share <= UNTRUE_PATHS:
-        return Choice("data.path", "position", f"true path: the positions; {away} by more than 5 % of the way")
+        return Choice("data.path", "position", f"{apart} (RMS): that is little, and the true path is the positions")
     if abs(seen.factor - 1) > SYSTEMATIC and not set(STANDARD_DEVIATIONS.values()) & set(dataset.frame):
         faulty = f"they say {size:.3g} times the way, turned by {turn:.2g} deg: mend u, v or psi (`shipid data check`)"
         return Choice("data.path", "position", f"{away}, and not by scatter: {faulty}")
