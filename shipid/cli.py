@@ -354,6 +354,8 @@ def study_new(
     ] = None,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
+    import shlex
+
     from shipid.data.draft import check_new, write_new
     from shipid.study.new import draft_study
 
@@ -363,9 +365,11 @@ def study_new(
     write_new(draft.text, file, "study")
     rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
     _print(_table(["choice", "value", "because"], rows))
+    for warning in draft.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     names = ", ".join(model.name for model in draft.plan.models)
     typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.models)} models ({names}) -> {file}")
-    typer.echo(f"run it with: shipid study run {file}")
+    typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
 
 
 @study_app.command("variants")

@@ -103,8 +103,8 @@ def agreement(track: Complex, psi: Array) -> complex:
 def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap an angle that jumps at a whole turn; false samples between, if any, are replaced and told.
 
-    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn; one over a hole in
-    time t (N,) [s] says nothing.
+    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn; one over a hole
+    in time t (N,) [s] says nothing.
     """
     signed = np.diff(values) / turn
     steps = np.abs(signed)

@@ -97,6 +97,18 @@ def separation(dataset: Dataset, lag: float) -> float:
     return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
 
 
+def helm_sense(dataset: Dataset) -> dict[str, float]:
+    """Correlation of every angle command that moves with the yaw acceleration that follows: > 0 turns to starboard."""
+    found: dict[str, float] = {}
+    for name in (name for name in dataset.commands if not name.endswith(".n")):
+        pairs = [(rows[name].to_numpy()[:-1], np.diff(rows["r"])) for _, rows in pieces(dataset)]
+        angle, change = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        size = float(np.linalg.norm(angle) * np.linalg.norm(change))
+        if size > 0:
+            found[name] = float(angle @ change) / size
+    return found
+
+
 def typical_runs(runs: pd.DataFrame) -> list[str]:
     """Typical runs: from each kind that turns the ship and has three runs or more, the one in the middle.
 

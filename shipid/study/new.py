@@ -19,7 +19,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
-from shipid.data.survey import Survey, separation, survey, typical_runs
+from shipid.data.survey import Survey, helm_sense, separation, survey, typical_runs
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.predictor import assumed, check_columns
@@ -40,6 +40,7 @@ LENGTHS_AHEAD = (
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEPS, LONGEST_STEP = 15, 2.0  # steps ahead at least; s
+LEAST_SENSE = 0.1  # correlation of an angle with the change of r
 SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
 GROWING = 1.2  # times as far apart after twice the time: less is jitter
 UNTRUE_PATHS = 0.25  # of the runs whose positions leave their velocities
@@ -65,11 +66,13 @@ class Draft:
     """A study that has been checked to run.
 
     text : TOML with the reasons as comments.
+    warnings : what is wrong with the log, as far as it shows, one sentence each.
     """
 
     text: str
     choices: tuple[Choice, ...]
     plan: Plan
+    warnings: tuple[str, ...] = ()
 
 
 def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
@@ -151,7 +154,8 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     amounts = ladder(len(partition(least, dataset)[0].spans))
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts)]
-    return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset)
+    warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset)]
+    return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
 
 
 def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:
@@ -176,6 +180,7 @@ def _first_that_runs(
     out: Path,
     vessels: Mapping[str, Vessel],
     dataset: Dataset | None = None,
+    warnings: Sequence[str] = (),
 ) -> Draft:
     """Explicit Euler, else RK4, else RK4 at half the step; milder families in turn: the first that rolls out."""
     horizon, step = ahead
@@ -195,7 +200,7 @@ def _first_that_runs(
                 raise
             last = error
         else:
-            return Draft(_text(choices, chosen), tuple(choices), plan)
+            return Draft(_text(choices, chosen, warnings), tuple(choices), plan, tuple(warnings))
     raise last
 
 
@@ -247,11 +252,34 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
         return Choice("data.path", "velocity", why)
     if share <= UNTRUE_PATHS:
         return Choice("data.path", "position", f"{apart} (RMS): that is little, and the true path is the positions")
-    if abs(seen.factor - 1) > SYSTEMATIC and not set(STANDARD_DEVIATIONS.values()) & set(dataset.frame):
-        faulty = f"they say {size:.3g} times the way, turned by {turn:.2g} deg: mend u, v or psi (`shipid data check`)"
-        return Choice("data.path", "position", f"{away}, and not by scatter: {faulty}")
+    if abs(seen.factor - 1) > SYSTEMATIC:
+        return Choice("data.path", "position", f"{away}, and not by scatter: u, v or psi are wrong, see above")
     scatter = f"they scatter (factor {size:.3g}, {turn:.2g} deg), so the true path is that integral"
     return Choice("data.path", "velocity", f"{away} by more than 5 % of the way; {scatter}")
+
+
+def _wrong_velocities(seen: Survey) -> Iterator[str]:
+    if abs(seen.factor - 1) > SYSTEMATIC:
+        size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
+        yield (
+            f"positions say {size:.3g} times the way that u, v and psi say, turned by {turn:.2g} deg: "
+            "a wrong unit or direction? Look at `shipid data check`, mend the mapping and import again"
+        )
+
+
+def _wrong_helm(vessel: Vessel, dataset: Dataset) -> Iterator[str]:
+    """Angles that turn the vessel one way and the ship of the log the other."""
+    seen = helm_sense(dataset)
+    try:
+        expected = Controls.of(vessel).helm
+    except ShipidError:
+        return  # nothing drives or turns her on her own
+    for name, sign in expected.items():
+        if sign * seen.get(name, 0.0) < -LEAST_SENSE:
+            yield (
+                f"{name} > 0 turns {vessel.name} to {'starboard' if sign > 0 else 'port'}, in the log the other way: "
+                "should its `sign` in the mapping be the other one? Mend it and import again"
+            )
 
 
 def _why_test(runs: pd.DataFrame, tests: Sequence[str]) -> str:
@@ -429,7 +457,7 @@ def _shapeless(paths: Sequence[str]) -> list[str]:
     return [path for path in paths if path.rpartition(".")[2] not in ("x_aft", "x_fwd", "T")]
 
 
-def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]]) -> str:
+def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warnings: Sequence[str] = ()) -> str:
     """The study as TOML, each reason above its value."""
     document = tomlkit.document()
     document.add(
@@ -437,6 +465,8 @@ def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]]) -> s
             "Written by `shipid study new`: the reasons stand above the values; change what you know better."
         )
     )
+    for line in (line for warning in warnings for line in textwrap.wrap(f"WRONG? {warning}", 110)):
+        document.add(tomlkit.comment(line))
     tables: dict[str, Table] = {}
     for choice in choices:
         block, _, key = choice.path.rpartition(".")
