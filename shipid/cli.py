@@ -660,6 +660,8 @@ def _criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
 
 
 def _digits(value: float) -> str:
+    if abs(value) >= 1e6:  # a moment on a clock of dates
+        return f"{value:.1f}"
     return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
 
 
