@@ -253,12 +253,14 @@ def data_segment(
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
     from shipid.data.catalogue import fetch
-    from shipid.data.draft import segment_log, segments_text, write_new
+    from shipid.data.draft import moment, segment_log, segments_text, write_new
     from shipid.data.mapping import read_mapping
 
-    found = segment_log(read_mapping(mapping), log or fetch(mapping))
-    file = write_new(segments_text(found), out or Path(f"{Path(mapping).stem}-segments.toml"))
-    _print(_table(["run", "start", "end"], ((s.run, f"{s.start:g}", f"{s.end:g}") for s in found)))
+    declared = read_mapping(mapping)
+    unit = declared.clock.unit
+    found = segment_log(declared, log or fetch(mapping))
+    file = write_new(segments_text(found, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    _print(_table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in found)))
     typer.echo(f"{len(found)} segments -> {file}")
 
 
@@ -339,6 +341,35 @@ def study_list() -> None:
     from shipid.document import bundled, read
 
     _print(_table(["name", "question"], ((name, read(file)["question"]) for name, file in bundled("studies").items())))
+
+
+@study_app.command("new")
+def study_new(
+    vessel: Annotated[list[str], typer.Option(help="bundled name, or path of a vessel or patch; may be repeated")],
+    data: Annotated[
+        Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="TOML file to write; default: <data or vessel>-study.toml beside you")
+    ] = None,
+) -> None:
+    """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
+    import shlex
+
+    from shipid.data.draft import check_new, write_new
+    from shipid.study.new import draft_study
+
+    file = out or Path(f"{_stem(data or vessel[0])}-study.toml")
+    check_new(file, "study")
+    draft = draft_study(vessel, data, file)
+    write_new(draft.text, file, "study")
+    rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
+    _print(_table(["choice", "value", "because"], rows))
+    for warning in draft.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    names = ", ".join(model.name for model in draft.plan.models)
+    typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.models)} models ({names}) -> {file}")
+    typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
 
 
 @study_app.command("variants")
@@ -594,7 +625,7 @@ def manoeuvre(
         source = f"simulated: {ship.name}, {chosen.title}"
         typer.echo(f"log -> {write_dataset(Dataset(frame, {'clock': 'run', 'flags': [], 'source': source}), log)}")
     content = _manoeuvre_content(ship, chosen, record, rows, judged)
-    page = out or Path(f"{Path(vessel).name.removesuffix('.toml')}-{name}.html")
+    page = out or Path(f"{_stem(vessel)}-{name}.html")
     typer.echo(f"page -> {write_manoeuvre(content, page)}")
 
 
@@ -679,6 +710,8 @@ def _criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
 
 
 def _digits(value: float) -> str:
+    if abs(value) >= 1e6:  # a moment on a clock of dates
+        return f"{value:.1f}"
     return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
 
 
@@ -757,6 +790,11 @@ def _line(event: Event) -> str:
         else f"{row['status']}: {row['sentence']}"
     )
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"
+
+
+def _stem(name: str | Path) -> str:
+    """Name of a document or dataset without folder and ending; a dot in the name of a vessel is no ending."""
+    return Path(name).name.removesuffix(".toml").removesuffix(".parquet")
 
 
 def _report(folder: Path) -> Path:

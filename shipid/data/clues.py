@@ -83,7 +83,8 @@ def stem(name: str) -> str:
 def unit_said(name: str, si: str) -> str | None:
     """Unit that a name says, if a column of this SI unit can have it."""
     inside = re.search(r"[\[(]([^\])]*)[\])]", name)
-    words = inside.group(1) if inside else name.rpartition("_")[2] if "_" in name else name if si == "rev/s" else ""
+    *before, last = re.split("[_ ]", name)
+    words = inside.group(1) if inside else last if before or si == "rev/s" else ""
     said = words.strip().lower()
     return next(
         (unit for unit, expected in UNIT_WORDS.items() if unit in UNITS[si] and re.fullmatch(expected, said)), None

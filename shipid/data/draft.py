@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def draft_mapping(found: Guess) -> str:
         segments = segment_log(_read(text), found.file)
     except ShipidError as error:
         return text + f"\n# Cannot be imported as it stands: {error.path or ''}: {error.message}\n"
-    return text + segments_text(segments)
+    return text + segments_text(segments, found.sniffed.clock.get("unit", "s"))
 
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
@@ -51,22 +52,37 @@ def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
     return manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
 
 
-def segments_text(segments: Iterable[Segment]) -> str:
-    """Segments as TOML, to be corrected by hand."""
+def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
+    """Segments as TOML, to be corrected by hand; `unit` is that of the log's clock."""
     blocks = ["\n# Found by helm and heading: correct names, starts and ends, and remove what is no run."]
+    if unit == "date":
+        blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
     for segment in segments:
         values = {key: value for key, value in segment.model_dump().items() if value is not None}
         values |= {end: round(values[end], 3) for end in ("start", "end")}
-        blocks.append("\n".join(["[[segment]]", *_lines(values)]))
+        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if unit == "date" else ""
+        blocks.append("\n".join([f"[[segment]]{dates}", *_lines(values)]))
     return "\n".join(blocks) + "\n"
 
 
-def write_new(text: str, file: Path) -> Path:
-    """Write a TOML document whole; one that exists is never written over."""
+def moment(value: float, unit: str) -> str:
+    """A moment on the log's clock as people read it: the date in UTC, or the number."""
+    if unit == "date":
+        return datetime.fromtimestamp(value, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    return f"{value:.10g}"
+
+
+def check_new(file: Path, kind: str) -> None:
+    """Raise DataError unless a new TOML document of this kind can be written there."""
     if file.suffix != ".toml":
-        raise DataError("a mapping is a TOML file: let the name end in .toml", file=file)
+        raise DataError(f"a {kind} is a TOML file: let the name end in .toml", file=file)
     if file.exists():
         raise DataError("exists already and is not written over: name another with --out", file=file)
+
+
+def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
+    """Write a TOML document whole; one that exists is never written over."""
+    check_new(file, kind)
     write_whole(file, lambda part: part.write_text(text, encoding="utf-8"))
     return file
 

@@ -20,6 +20,7 @@ GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
 WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
 FEW = 30  # values: fewer may be round by chance
+HOLE = 3.0  # times the usual step
 NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
 
 
@@ -99,15 +100,17 @@ def agreement(track: Complex, psi: Array) -> complex:
     return complex(np.sum(turned)) / size if size > 0 else 0j
 
 
-def heal(values: Array, turn: float) -> tuple[Array, NDArray[np.bool_]]:
+def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap an angle that jumps at a whole turn; false samples between, if any, are replaced and told.
 
-    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn.
+    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn; one over a hole
+    in time t (N,) [s] says nothing.
     """
     signed = np.diff(values) / turn
     steps = np.abs(signed)
     ordinary = np.percentile(steps, 90) if len(steps) else 0.0
     large = steps > max(FALSE_STEP / (2 * np.pi), 5 * ordinary)
+    large &= np.diff(t) <= HOLE * np.median(np.diff(t)) if len(t) > 1 else True
     between = large & (steps < 1.0 - max(FALSE_STEP / (2 * np.pi), 5 * ordinary))
     # the steps through false samples add up to about a whole turn; those of a spike to nothing
     near = np.abs(np.convolve(signed, np.ones(NEIGHBOURS), "same")) if len(signed) > NEIGHBOURS else steps

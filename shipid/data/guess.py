@@ -99,7 +99,7 @@ def _pose(state: State, file: str | Path) -> None:
             if heading in (north, east):
                 continue
             for unit in ("deg", "rad"):
-                psi, _ = evidence.heal(state.columns[heading], 2 * np.pi / to_si(unit, "psi"))
+                psi, _ = evidence.heal(state.columns[heading], 2 * np.pi / to_si(unit, "psi"), state.t)
                 middle = to_si(unit, "psi") * psi[(state.chosen.first + state.chosen.last) // 2]
                 same, mirrored = evidence.agreement(track, middle), evidence.agreement(track, -middle)
                 said = unit_said(heading, "rad")
@@ -156,7 +156,7 @@ def _take_pose(
     for name, source in zip(names, (north, east), strict=True):
         state.suggest(name, source, position_unit, confidence, why)
     own_turn = 2 * np.pi / to_si(unit, "psi")
-    psi, false = evidence.heal(state.columns[heading], own_turn)
+    psi, false = evidence.heal(state.columns[heading], own_turn, state.t)
     if false.any():
         across = "360" if unit == "deg" else "2 pi"
         sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
@@ -304,7 +304,7 @@ def _speed_and_course(state: State, seen: Complex) -> bool:
     """Take speed and course over ground, if the log has them, instead of velocities."""
     for speed in state.called("speed"):
         for course in state.called("course"):
-            angle, _ = evidence.heal(state.columns[course], 360.0)
+            angle, _ = evidence.heal(state.columns[course], 360.0, state.t)
             path = evidence.integral(state.t, state.columns[speed] * np.exp(1j * np.radians(angle)))
             fit = evidence.fit(seen, state.chosen.change(path))
             if fit.left > 0.2:

@@ -240,7 +240,7 @@ def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where
         found = documents.match(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])
-            orders = {path: _order(path) for path in found}
+            orders = {path: order_of(path) for path in found}
             found = [path for path, order in orders.items() if order is not None and relation(order, limit)]
         if not found:
             raise DocumentError(f"{pattern!r} selects nothing: {choices(pattern, paths)}", file=file, path=where)
@@ -248,7 +248,7 @@ def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where
     return [path for path in paths if path in chosen]
 
 
-def _order(path: str) -> int | None:
+def order_of(path: str) -> int | None:
     """Number of factors of a derivative of hull or rudder; None for any other number."""
     name = path.rsplit(".", 1)[-1]
     for formula in (derivative, deviation):

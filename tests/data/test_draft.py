@@ -9,6 +9,7 @@ from shipid.data.checks import check_dataset
 from shipid.data.draft import draft_mapping, segment_log, segments_text, write_new
 from shipid.data.guess import guess
 from shipid.data.importing import import_log, read_mapping
+from shipid.data.mapping import Segment
 from shipid.data.segmentation import kind_of
 from shipid.errors import DataError
 from tests.data.simulated import KNOT, SCHEDULE, as_bridge, si_log
@@ -90,6 +91,13 @@ def test_segments_are_text_to_edit(tmp_path: Path) -> None:
     mapping.write_text(text)
     assert "circle, 25 deg" in import_log(read_mapping(mapping), tmp_path / "trial.csv").runs
     assert segments_text(read_mapping(mapping).segment).count("[[segment]]") == 7
+
+
+def test_segments_of_a_dated_log_say_when() -> None:
+    """1715673605 s after 1970 is 14 May 2024, 08:00:05 UTC."""
+    text = segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)], "date")
+    assert "[[segment]]    # 2024-05-14 08:00:05 to 2024-05-14 08:03:00" in text
+    assert "2024-05-14" not in segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)])
 
 
 def test_a_document_is_never_written_over(tmp_path: Path) -> None:

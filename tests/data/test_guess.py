@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.data.clues import unit_said
 from shipid.data.guess import Guess, guess
 from shipid.errors import DataError
 from tests.data.simulated import KNOT, Change, as_bridge, si_log
@@ -321,3 +322,19 @@ def test_position_on_the_earth_with_speed_and_course(tmp_path: Path) -> None:
 def test_a_log_without_a_heading_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no column can be the heading"):
         guessed(as_bridge(si_log()).drop(columns="psi"), tmp_path)
+
+
+def test_a_turn_while_the_logger_was_off_is_no_interpolation_across_360(tmp_path: Path) -> None:
+    """Ten runs with pauses in which the ship comes round: large steps of the heading, each over a hole in time."""
+    log = as_bridge(si_log()).round(4)
+    rows, pauses = np.arange(len(log)), len(log) // 10
+    turned = (log["psi"] + 200.0 * (rows // pauses)) % 360.0
+    found = guessed(log.assign(psi=turned, time=log["time"] + 300.0 * (rows // pauses)), tmp_path)
+    assert "interpolation across 360" not in found.kinds
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("Wind kn", "kn"), ("wind_kn", "kn"), ("Wind [kn]", "kn"), ("Wind", None), ("Wind speed", None)]
+)
+def test_a_name_says_its_unit(name: str, unit: str | None) -> None:
+    assert unit_said(name, "m/s") == unit

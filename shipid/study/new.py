@@ -1,0 +1,521 @@
+"""Write a study file for a vessel and its runs: sensible choices, each with its reason, to be read and changed."""
+
+from __future__ import annotations
+
+import os
+import re
+import textwrap
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import tomlkit
+from tomlkit.items import Table
+
+from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
+from shipid.data.survey import Survey, helm_sense, separation, survey, typical_runs
+from shipid.data.windows import cut_windows
+from shipid.errors import DataError, DocumentError, ShipidError
+from shipid.predictor import assumed, check_columns
+from shipid.simulation.approach import Controls
+from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
+from shipid.simulation.truth import RPM
+from shipid.study.plan import NO_MODEL, Plan, build_plan
+from shipid.study.prepare import obtain, partition, prepare
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import order_of
+
+LEAST_RUNS = 2  # the smallest amount of data of a study
+MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
+LENGTHS_AHEAD = (
+    2.5  # ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead
+)
+HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
+SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
+STEPS, LONGEST_STEP = 15, 2.0  # steps ahead at least; s
+LEAST_SENSE = 0.1  # correlation of an angle with the change of r
+SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
+GROWING = 1.2  # times as far apart after twice the time: less is jitter
+UNTRUE_PATHS = 0.25  # of the runs whose positions leave their velocities
+FEW_RUNS, FOLDS = 6, 3
+MANOEUVRES, TESTS, INSTANTS, MEMBERS = 60, 10, 50, {"moderate": 3, "high": 2}
+HELM_DEG, STEPS_A_LENGTH = 35.0, 150
+STEERING = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed: products with u or scaled by U
+HIGHER = "hull.*[order >= 3]"
+INERTIA = ("inertia.m", "inertia.I_z", "added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A value of the study and the reason for it, one sentence or more."""
+
+    path: str
+    value: Any
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A study that has been checked to run.
+
+    text : TOML with the reasons as comments.
+    warnings : what is wrong with the log, as far as it shows, one sentence each.
+    """
+
+    text: str
+    choices: tuple[Choice, ...]
+    plan: Plan
+    warnings: tuple[str, ...] = ()
+
+
+def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
+    """Draft a study of vessels on recorded runs, or on simulated ones where `data` is None, to be written to `out`.
+
+    Parameters
+    ----------
+    vessels : bundled names or paths; the first one is made inaccurate, too, and gives the ship length.
+
+    Raises
+    ------
+    ShipidError : a vessel or dataset that cannot be read or do not fit each other, or too few runs.
+    """
+    found = {_named(name, out): load_vessel(name) for name in vessels}
+    if not found:
+        raise ShipidError("name a vessel: a bundled name (see `shipid vessel list`) or a path", path="--vessel")
+    if data is None:
+        return _simulated(found, out)
+    dataset = read_dataset(data)
+    columns = {str(name): dataset.frame[name].to_numpy() for name in dataset.frame}
+    for vessel in found.values():
+        check_columns(vessel, columns, str(data))
+    return _recorded(found, dataset, data, out)
+
+
+def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:
+    """Horizon [s], and why: some ship lengths at the usual speed, but a part of the median run."""
+    longest = float(np.median(durations)) * SHARE_OF_RUN
+    possible = [seconds for seconds in HORIZONS if seconds <= longest] or [HORIZONS[0]]
+    if length is None or speed <= 0:
+        return possible[-1], "a third of the median run at most: without particulars.L_pp and speed there is no L/U"
+    wanted = LENGTHS_AHEAD * length / speed
+    chosen = min(possible, key=lambda seconds: abs(np.log(seconds / wanted)))
+    why = (
+        f"{chosen:g} s, in which she runs {chosen * speed / length:.2g} ship lengths at {speed:.3g} m/s "
+        f"(L/U = {length / speed:.3g} s): over about {LENGTHS_AHEAD:g} her dynamics decide, later the next orders"
+    )
+    short = f"; no longer than a third of the median run, {3 * longest:.3g} s" if wanted > longest else ""
+    return chosen, why + short
+
+
+def step_of(horizon: float, log_step: float) -> float:
+    """Step of the predictor [s]: a round number, a fifteenth of the horizon at most, but no shorter than the log's."""
+    most = min(horizon / STEPS, LONGEST_STEP)
+    return min(max(_round_down(most), log_step), horizon / 2)
+
+
+def ladder(total: int, least: int = LEAST_RUNS) -> list[int]:
+    """Amounts of data from the least to all runs, by equal factors of at least two."""
+    factor = max(2.0, (total / least) ** (1 / (MOST_AMOUNTS - 1)))
+    amounts = [round(least * factor**power) for power in range(MOST_AMOUNTS)]
+    return [amount for amount in amounts if amount < 0.8 * total] + [total]
+
+
+def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: Path) -> Draft:
+    seen = survey(dataset)
+    first = next(iter(vessels.values()))
+    horizon, why = horizon_of(length_of(first), seen.speed, seen.runs["duration"].tolist())
+    step = step_of(horizon, seen.step)
+    steps = max(round(horizon / step), 2)
+    usable = _usable(dataset, steps, step, data)
+    runs = seen.runs.loc[usable]
+    interval = max(step, seen.step, _round_up(float(runs["duration"].sum()) / MOST_WINDOWS))
+    tests = typical_runs(runs)
+    fixed = [
+        *_question(vessels, dataset, seen, horizon),
+        Choice("data.dataset", _relative(str(data), out), _measured(vessels, dataset)),
+        _path(seen, dataset, horizon),
+        Choice("split.test", tests, _why_test(runs, tests)),
+    ]
+    ahead = [
+        Choice("prediction.horizon", steps, why + _left_out(seen.runs, usable)),
+        Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
+    ]
+    rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
+    families = _families(vessels)
+    some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
+    least = _planned([*fixed, *some], families[:1], out, vessels)
+    amounts = ladder(len(partition(least, dataset)[0].spans))
+    fixed += [_folds(amounts[-1])]
+    tail = [*rest, *_grid(amounts)]
+    warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset)]
+    return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+
+
+def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:
+    """Runs as long as the horizon; DataError where they are too few for a study."""
+    try:
+        names = cut_windows(dataset, horizon=steps, step=step, interval=step).spans
+    except DataError as error:
+        raise DataError(error.message, file=data) from None
+    usable = [run for run in dataset.runs if run in names]
+    if len(usable) <= LEAST_RUNS:
+        few = f"{len(usable)} {'run' if len(usable) == 1 else 'runs'} of {steps * step:g} s or more"
+        remedy = "cut the log into its manoeuvres, [[segment]]s of the mapping (`shipid data segment` proposes them)"
+        raise DataError(f"{few}, a study needs {LEAST_RUNS + 1}, one of them for the test: {remedy}", file=data)
+    return usable
+
+
+def _first_that_runs(
+    before: Sequence[Choice],
+    ahead: Sequence[Choice],
+    after: Sequence[Choice],
+    families: Sequence[list[Any]],
+    out: Path,
+    vessels: Mapping[str, Vessel],
+    dataset: Dataset | None = None,
+    warnings: Sequence[str] = (),
+) -> Draft:
+    """Explicit Euler, else RK4, else RK4 at half the step; milder families in turn: the first that rolls out."""
+    horizon, step = ahead
+    euler = Choice("prediction.method", "euler", "the paper's; take rk4 if you take a longer step")
+    rk4 = Choice("prediction.method", "rk4", "explicit Euler diverges on these runs")
+    halved = [
+        Choice(horizon.path, 2 * horizon.value, horizon.why),
+        Choice(step.path, step.value / 2, f"{step.why}; twice as long diverges"),
+    ]
+    for (front, method), chosen in product(((ahead, euler), (ahead, rk4), (halved, rk4)), families):
+        choices = [*before, *front, method, *after, *_claims([family["name"] for family in chosen])]
+        plan = _planned(choices, chosen, out, vessels)
+        try:
+            _check_runs(plan, obtain(plan) if dataset is None else dataset)
+        except DocumentError as error:
+            if "diverges" not in error.message:
+                raise
+            last = error
+        else:
+            return Draft(_text(choices, chosen, warnings), tuple(choices), plan, tuple(warnings))
+    raise last
+
+
+def _check_runs(plan: Plan, dataset: Dataset) -> None:
+    """Do all that a run of the plan does but the training."""
+    prepared = prepare(plan, dataset)
+    for batch in plan.batches:
+        prepared.folds(plan, batch, prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch))))
+
+
+def _planned(choices: Sequence[Choice], families: Sequence[Any], out: Path, vessels: Mapping[str, Vessel]) -> Plan:
+    return build_plan(tomllib.loads(_text(choices, families)), out, vessels)
+
+
+def _question(vessels: Mapping[str, Vessel], dataset: Dataset, seen: Survey, horizon: float) -> Iterator[Choice]:
+    name = next(iter(vessels.values())).name
+    yield Choice("question", f"How well can {name} be predicted {horizon:g} s ahead, with how many runs?")
+    counts = Counter(seen.runs["kind"])
+    kinds = ", ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in counts.most_common())
+    low, high = seen.runs["duration"].min(), seen.runs["duration"].max()
+    slow, fast = seen.runs["speed"].min(), seen.runs["speed"].max()
+    said = f"{len(seen.runs)} runs ({kinds}) of {low:.0f} to {high:.0f} s at {slow:.2g} to {fast:.2g} m/s"
+    wind = "" if "V_w" in dataset.frame else ", wind not measured"
+    yield Choice("description", f"{said}, {len(dataset.frame)} rows{wind}", "what the log holds")
+
+
+def _measured(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
+    columns = [str(name) for name in dataset.frame]
+    orders = ", ".join(dataset.commands)
+    lacking = {name: assumed(vessel, dict.fromkeys(columns, np.empty(0))) for name, vessel in vessels.items()}
+    missing = [f"{key} takes {', '.join(names)} as 0" for key, names in lacking.items() if names]
+    estimated = [name for name, std in STANDARD_DEVIATIONS.items() if std in columns]
+    wind = "wind is measured" if "V_w" in columns else "wind is not measured and is no input"
+    parts = [f"commands {orders or 'none'}", wind, *missing]
+    parts += [f"{', '.join(estimated)} are estimated from positions and heading"] if estimated else []
+    return "; ".join(parts)
+
+
+def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
+    """The true path: positions, unless they scatter where the integral of the velocities does not."""
+    share = float(seen.runs["straying"].mean())
+    away = f"positions leave the integral of u, v, psi in {int(seen.runs['straying'].sum())} of {len(seen.runs)} runs"
+    size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
+    half, whole = (separation(dataset, lag) for lag in (horizon / 2, horizon))
+    parting = f"{half:.2g} m in {horizon / 2:g} s, {whole:.2g} m in {horizon:g} s"
+    apart = f"positions and the integral of u, v, psi part by {parting}"
+    if share <= UNTRUE_PATHS and whole < GROWING * half:
+        why = f"{apart} (RMS): that does not grow, so it is jitter of the positions, and the true path is the integral"
+        return Choice("data.path", "velocity", why)
+    if share <= UNTRUE_PATHS:
+        return Choice("data.path", "position", f"{apart} (RMS): that is little, and the true path is the positions")
+    if abs(seen.factor - 1) > SYSTEMATIC:
+        return Choice("data.path", "position", f"{away}, and not by scatter: u, v or psi are wrong, see above")
+    scatter = f"they scatter (factor {size:.3g}, {turn:.2g} deg), so the true path is that integral"
+    return Choice("data.path", "velocity", f"{away} by more than 5 % of the way; {scatter}")
+
+
+def _wrong_velocities(seen: Survey) -> Iterator[str]:
+    if abs(seen.factor - 1) > SYSTEMATIC:
+        size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
+        yield (
+            f"positions say {size:.3g} times the way that u, v and psi say, turned by {turn:.2g} deg: "
+            "a wrong unit or direction? Look at `shipid data check`, mend the mapping and import again"
+        )
+
+
+def _wrong_helm(vessel: Vessel, dataset: Dataset) -> Iterator[str]:
+    """Angles that turn the vessel one way and the ship of the log the other."""
+    seen = helm_sense(dataset)
+    try:
+        expected = Controls.of(vessel).helm
+    except ShipidError:
+        return  # nothing drives or turns her on her own
+    for name, sign in expected.items():
+        if sign * seen.get(name, 0.0) < -LEAST_SENSE:
+            yield (
+                f"{name} > 0 turns {vessel.name} to {'starboard' if sign > 0 else 'port'}, in the log the other way: "
+                "should its `sign` in the mapping be the other one? Mend it and import again"
+            )
+
+
+def _why_test(runs: pd.DataFrame, tests: Sequence[str]) -> str:
+    words = []
+    for name in tests:
+        run = runs.loc[name]
+        alike = int((runs["kind"] == run["kind"]).sum())
+        words.append(
+            f"{name!r} is in the middle of {alike} {run['kind']}s: {run['speed']:.2g} m/s, "
+            f"{np.degrees(run['rate']):.2g} deg/s, {run['duration']:.0f} s"
+        )
+    return f"{'; '.join(words)}. Never look at them while you choose models. More tests make surer answers"
+
+
+def _left_out(runs: pd.DataFrame, usable: Sequence[str]) -> str:
+    short = [str(name) for name in runs.index if name not in usable]
+    return f"; too short for it: {', '.join(short)}" if short else ""
+
+
+def _folds(total: int) -> Choice:
+    if total < FEW_RUNS:
+        return Choice("split.folds", 1, f"{total} runs train: each validates in turn")
+    return Choice(
+        "split.folds", FOLDS, f"{total} runs train and validate: two thirds train, one third validates, in turn"
+    )
+
+
+def _grid(amounts: list[int]) -> Iterator[Choice]:
+    yield Choice("grid.N_D", amounts, "runs for training and validation: from the fewest to all, the learning curve")
+    yield Choice("grid.seeds", [0, 1, 2], "three draws of which runs come first: with fewer no range can be told")
+
+
+def _claims(families: Sequence[str]) -> Iterator[Choice]:
+    """Which family each finding speaks of; none where there is nothing to compare."""
+    if "inaccurate" in families:
+        yield Choice("claims.accurate", families[0], "asks for verdicts on the findings R1-R4 of experiment 2")
+        yield Choice("claims.inaccurate", "inaccurate")
+    elif {"moderate", "high"} <= set(families):
+        yield Choice("claims.moderate", "moderate", "asks for verdicts on the findings S1-S7 of experiment 1")
+        yield Choice("claims.high", "high")
+        yield Choice("claims.nominal", "nominal")
+
+
+def _families(vessels: Mapping[str, Vessel]) -> list[Any]:
+    """Every vessel as it is, and the first made inaccurate as in the paper's experiment 2."""
+    taken = {NO_MODEL, "inaccurate"}
+    found: list[Any] = []
+    for named, vessel in vessels.items():
+        name = re.sub(r"[^A-Za-z0-9_.+-]", "-", vessel.key)
+        name = name if name[:1].isalpha() else f"ship-{name}"
+        while name in taken:
+            name += "-own"
+        taken.add(name)
+        found.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
+    named, vessel = next(iter(vessels.items()))
+    blocks = _inaccurate(vessel)
+    words = f"{found[0]['name']} made wrong on purpose: what does it cost to know her less well?"
+    if blocks:
+        found.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
+    return found
+
+
+def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:
+    """Higher-order damping removed and steering derivatives times 0.6 (method, section 5), as far as she has them."""
+    hull = [path for path in vessel.parameters if path.startswith("hull.")]
+    steering = [path for path in hull if path.rpartition(".")[2] in STEERING]
+    blocks: list[dict[str, Any]] = []
+    if any((order_of(path) or 0) >= 3 for path in hull):
+        blocks.append({"remove": [HIGHER]})
+    if steering or (hull and not blocks):
+        blocks.append({"parameters": steering or _shapeless(hull), "factor": 0.6})
+    return blocks
+
+
+def _softer(families: list[Any]) -> list[list[Any]]:
+    """The families, then without removing, then without the inaccurate one."""
+    *standing, last = families
+    if "perturb" not in last:
+        return [families]
+    scaled = [block for block in last["perturb"] if "factor" in block]
+    milder = [[*standing, {**last, "perturb": scaled}]] if scaled and scaled != last["perturb"] else []
+    return [families, *milder, standing]
+
+
+def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
+    """A study of degraded models of the first vessel, which makes the truth (method, section 4)."""
+    if len(vessels) > 1:
+        message = "one vessel makes the truth of a simulated study: give one, or --data with recorded runs"
+        raise ShipidError(message, path="--vessel")
+    (named, vessel), *_ = vessels.items()
+    length = length_of(vessel)
+    if length is None:
+        raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
+    service = float(vessel.document["particulars"].get("U_0", FROUDE * np.sqrt(GRAVITY * length)))
+    rpm = shaft_speed(Controls.of(vessel), service) / RPM
+    speed = 0.75 * service
+    horizon, why = horizon_of(length, speed, [np.inf])
+    step = step_of(horizon, 0.0)
+    amounts = ladder(MANOEUVRES - TESTS)
+    families = _degraded(named, vessel)
+    fixed = [
+        Choice(
+            "question", f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {horizon:g} s?"
+        ),
+        Choice("description", f"simulated: {vessel.name} as she is makes the truth, and degraded models predict her"),
+        *_truth(named, vessel, service, rpm, horizon, step),
+        Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
+        Choice("split.folds", 1, "with the recipe `fast` every run validates in turn"),
+    ]
+    ahead = [
+        Choice("prediction.horizon", round(horizon / step), why),
+        Choice("prediction.step", step, "s; the truth is stepped more finely, that is a part of what models get wrong"),
+    ]
+    tail = [
+        Choice("prediction.interval", step, "s between instants of prediction"),
+        Choice("prediction.samples", INSTANTS, "instants a manoeuvre"),
+        Choice("grid.N_D", amounts, f"from the fewest to all {amounts[-1]} that are not for the test"),
+        Choice("grid.seeds", [0], "take [0, 1, 2, 3, 4] for verdicts: findings about scatter need five"),
+    ]
+    return _first_that_runs(fixed, ahead, tail, [families], out, vessels)
+
+
+def _truth(named: str, vessel: Vessel, service: float, rpm: float, horizon: float, step: float) -> Iterator[Choice]:
+    length = length_of(vessel) or 0.0
+    fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
+    low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
+    yield Choice("truth.vessel", named)
+    yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")
+    yield Choice("truth.duration", float(f"{horizon + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
+    yield Choice("truth.step", fine, f"s: she takes {length / service:.3g} s for her length")
+    yield Choice("truth.interval", step, "s between logged rows")
+    yield Choice("truth.n_rpm", [low, high], f"up to {high:g} rpm, which hold {service:.3g} m/s in calm water")
+    yield Choice("truth.alpha_deg", [-HELM_DEG, HELM_DEG], "rudder or azimuth: hard over either way")
+    yield Choice("truth.start_speed", [float(f"{service / 2:.3g}"), float(f"{service:.3g}")], "m/s ahead")
+    weather = dynamics(vessel).environment
+    if "V_w" in weather:
+        yield Choice("truth.wind_speed", [0.0, 6.0], "m/s, from anywhere: up to a moderate breeze")
+
+
+def _degraded(named: str, vessel: Vessel) -> list[Any]:
+    """Nominal, moderate and high: the families of experiment 1 (method, section 4), as far as the vessel has them."""
+    hull = [path for path in vessel.parameters if path.startswith("hull.")]
+    damping = ["hull.*[order >= 1]"] if any(order_of(path) for path in hull) else _shapeless(hull)
+    heavy = [path for path in INERTIA if path in vessel.parameters]
+    if not damping:
+        raise ShipidError("has no [hull] numbers to degrade: declare families by hand", file=vessel.file)
+    blocks = [{"parameters": damping, "factor": [0.4, 1.6]}]
+    return [
+        {
+            "name": "nominal",
+            "description": "the truth's own numbers: the floor that steps and held orders leave",
+            "base": named,
+        },
+        {
+            "name": "moderate",
+            "description": "each hull coefficient times a factor of its own in 0.4-1.6",
+            "base": named,
+            "members": MEMBERS["moderate"],
+            "seed": 1,
+            "perturb": blocks,
+        },
+        {
+            "name": "high",
+            "description": "as moderate, and mass, yaw inertia and added mass times factors in 0.6-1.4",
+            "extends": "moderate",
+            "members": MEMBERS["high"],
+            "seed": 2,
+            "perturb": [{"parameters": heavy, "factor": [0.6, 1.4]}],
+        },
+    ]
+
+
+def _shapeless(paths: Sequence[str]) -> list[str]:
+    """Paths of coefficients, without those of geometry."""
+    return [path for path in paths if path.rpartition(".")[2] not in ("x_aft", "x_fwd", "T")]
+
+
+def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warnings: Sequence[str] = ()) -> str:
+    """The study as TOML, each reason above its value."""
+    document = tomlkit.document()
+    document.add(
+        tomlkit.comment(
+            "Written by `shipid study new`: the reasons stand above the values; change what you know better."
+        )
+    )
+    for line in (line for warning in warnings for line in textwrap.wrap(f"WRONG? {warning}", 110)):
+        document.add(tomlkit.comment(line))
+    tables: dict[str, Table] = {}
+    for choice in choices:
+        block, _, key = choice.path.rpartition(".")
+        place: Any = document
+        if block:
+            if block not in tables:
+                document.add(tomlkit.nl())
+                tables[block] = tomlkit.table()
+                document.add(block, tables[block])
+            place = tables[block]
+        for line in textwrap.wrap(choice.why, 110):
+            place.add(tomlkit.comment(line))
+        place.add(key, choice.value)
+    text = tomlkit.dumps(document).rstrip("\n")
+    return "\n".join([text, "", *_family_lines(families)]) + "\n"
+
+
+def _family_lines(families: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    yield "# Models, each compensated by data; `none`, without physics, and constant u, v, r are beside them all."
+    for family in families:
+        yield "[[family]]"
+        yield from _pairs({key: value for key, value in family.items() if key != "perturb"})
+        for block in family.get("perturb", []):
+            yield "[[family.perturb]]"
+            yield from _pairs(block)
+        yield ""
+
+
+def _pairs(block: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in block.items():
+        yield f"{key} = {tomlkit.item(value).as_string()}"
+
+
+def _named(name: str, out: Path) -> str:
+    """A vessel as the study names it: a bundled name as it is, a path from the study's folder."""
+    return _relative(name, out) if "/" in name or "\\" in name or name.endswith(".toml") else name
+
+
+def _relative(name: str, out: Path) -> str:
+    path = Path(os.path.relpath(name, out.parent)).as_posix()
+    return path if "/" in path or path.endswith((".toml", ".parquet")) else f"./{path}"
+
+
+def _round_down(value: float) -> float:
+    """Greatest of 1, 2, 5 and their tens, up to a value."""
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(f"{max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)):.6g}")
+
+
+def _round_up(value: float) -> float:
+    below = _round_down(value)
+    return below if below >= value else _round_down(2.5 * below)

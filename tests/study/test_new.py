@@ -1,0 +1,261 @@
+"""A study that is written for a vessel and its runs: it parses, it prepares, and its choices follow the data."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.data.dataset import Dataset, cumulative_integral, write_dataset
+from shipid.data.importing import import_log
+from shipid.data.mapping import read_mapping
+from shipid.data.survey import helm_sense, separation, survey, typical_runs
+from shipid.errors import ShipidError
+from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, draft_study, horizon_of, ladder, step_of
+from shipid.study.plan import read_plan
+from shipid.study.prepare import obtain, prepare
+from shipid.vessel.template import Particulars, first_guess
+from tests.study.tiny import logged
+
+SHIP = "gunnerus-33.9"
+
+
+def zigzag(speed: float, period: float, duration: float) -> dict[str, np.ndarray]:
+    """Columns of a ship whose yaw rate follows a helm put over from side to side; aft units turn her the other way."""
+    t = np.arange(0.0, duration + 0.5)
+    side, u, r = np.where(np.sin(2 * np.pi * t / period) >= 0, 1.0, -1.0), np.full(len(t), speed), np.zeros(len(t))
+    for row in range(1, len(t)):
+        r[row] = r[row - 1] + 0.2 * (0.03 * side[row - 1] - r[row - 1])
+    psi = cumulative_integral(t, r)
+    track = {"north": cumulative_integral(t, u * np.cos(psi)), "east": cumulative_integral(t, u * np.sin(psi))}
+    orders = {f"{unit}.alpha": -0.2 * side for unit in ("port", "starboard")}
+    return {"psi": psi, "r": r, "u": u, **track, **orders, "port.n": u / 2, "starboard.n": u / 2}
+
+
+def trial(count: int = 8, duration: float = 120.0, **changes: Any) -> Dataset:
+    """Zigzags at speeds from 4 m/s on, 0.1 m/s apart; `changes` are factors of columns."""
+    runs = {f"zz {i}": zigzag(4.0 + 0.1 * i, 40.0 + 2 * i, duration) for i in range(count)}
+    scaled = {run: {key: x * changes.get(key, 1.0) for key, x in columns.items()} for run, columns in runs.items()}
+    return logged(scaled, np.arange(0.0, duration + 0.5))
+
+
+def drafted(folder: Path, dataset: Dataset, *vessels: str) -> tuple[Any, dict[str, Any]]:
+    """Draft of a study of a dataset and its document, written to the folder."""
+    data, out = write_dataset(dataset, folder / "log.parquet"), folder / "study.toml"
+    draft = draft_study(vessels or [SHIP], data, out)
+    out.write_text(draft.text)
+    return draft, tomllib.loads(draft.text)
+
+
+@pytest.mark.parametrize("total", [2, 3, 5, 8, 12, 22, 100, 1000])
+def test_amounts_rise_from_the_least_to_all_runs(total: int) -> None:
+    amounts = ladder(total)
+    assert amounts == sorted(set(amounts))
+    assert amounts[0] == min(LEAST_RUNS, total)
+    assert amounts[-1] == total
+    assert len(amounts) <= 7
+
+
+def test_amounts_begin_where_a_study_may() -> None:
+    assert ladder(22, least=1) == [1, 2, 4, 8, 16, 22]
+
+
+@pytest.mark.parametrize(
+    ("length", "speed", "expected"),
+    [(33.9, 5.0, 15.0), (28.9, 2.3, 30.0), (7.0, 1.0, 20.0), (320.0, 7.97, 90.0)],  # the first two: method, 4 and 5
+)
+def test_horizon_is_a_few_ship_lengths(length: float, speed: float, expected: float) -> None:
+    horizon, why = horizon_of(length, speed, [600.0])
+    assert horizon == expected
+    assert "L/U" in why
+
+
+def test_horizon_leaves_most_of_a_short_run() -> None:
+    horizon, why = horizon_of(320.0, 8.0, [90.0, 60.0, 120.0])
+    assert horizon <= 90.0 * SHARE_OF_RUN
+    assert "third of the median run" in why
+
+
+@pytest.mark.parametrize("horizon", [1.0, 15.0, 60.0, 300.0])
+@pytest.mark.parametrize("log_step", [0.05, 0.5, 5.0])
+def test_step_is_no_finer_than_the_log_and_leaves_two(horizon: float, log_step: float) -> None:
+    step = step_of(horizon, log_step)
+    assert step <= horizon / 2
+    assert step >= min(log_step, horizon / 2)
+
+
+def test_test_run_is_typical_and_sound() -> None:
+    """Neither the slowest nor the fastest, nor the longest, nor one that fails its checks."""
+    speeds = {"slow": 1.0, "usual": 4.0, "usual too": 4.1, "longest": 4.05, "faulty": 4.05, "fast": 7.0}
+    rows = [
+        {
+            "duration": 300.0 if name == "longest" else 100.0 + speed,
+            "kind": "zigzag",
+            "speed": speed,
+            "rate": 0.02,
+            "helm": 0.2,
+            "whole": True,
+            "sound": name != "faulty",
+            "straying": False,
+        }
+        for name, speed in speeds.items()
+    ]
+    (chosen,) = typical_runs(pd.DataFrame(rows, index=list(speeds)))
+    assert chosen in ("usual", "usual too")
+
+
+def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
+    """Read from its file it is the very plan that was checked, and each value has a reason from the data."""
+    draft, document = drafted(tmp_path, trial())
+    plan = read_plan(tmp_path / "study.toml")
+    assert plan.document == document
+    assert [model.name for model in plan.models] == [SHIP, "inaccurate", "none"]
+    prepared = prepare(plan, obtain(plan))
+    assert len(prepared.pool.spans) == plan.study.grid.N_D[-1] == 7
+    assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
+    assert document["prediction"]["horizon"] == 20  # 2.5 x 33.9 m / 4.35 m/s
+    assert "8 zigzags" in document["description"]
+    assert "wind is not measured" in draft.text
+    assert not draft.warnings
+    reasons = {choice.path for choice in draft.choices if not choice.why}
+    assert reasons <= {"question", "claims.inaccurate"}
+
+
+def test_what_jitters_is_not_the_true_path(tmp_path: Path) -> None:
+    """Positions that scatter by 0.5 m leave the velocities by as much after 10 s as after 20 s: they give way."""
+    dataset = trial()
+    random = np.random.default_rng(5)
+    noise = {name: dataset.frame[name] + random.normal(0, 0.5, len(dataset.frame)) for name in ("north", "east")}
+    noisy = Dataset(dataset.frame.assign(**noise), dataset.metadata)
+    assert separation(noisy, 20.0) == pytest.approx(2 * 0.5, rel=0.1)  # two coordinates, two instants: sqrt(4) sigma
+    assert drafted(tmp_path, noisy)[1]["data"]["path"] == "velocity"
+
+
+def test_velocities_that_drift_are_not_the_true_path(tmp_path: Path) -> None:
+    _, document = drafted(tmp_path, trial(u=1.02))
+    assert document["data"]["path"] == "position"
+
+
+def test_a_wrong_unit_is_told(tmp_path: Path) -> None:
+    """Knots taken for m/s: positions say half the way."""
+    draft, document = drafted(tmp_path, trial(u=3600 / 1852))
+    assert document["data"]["path"] == "position"
+    assert any("0.514 times" in warning for warning in draft.warnings)
+    assert "# WRONG?" in draft.text
+
+
+def test_a_wrong_sign_of_the_helm_is_told(tmp_path: Path) -> None:
+    mirrored = trial(**{"port.alpha": -1.0, "starboard.alpha": -1.0})
+    assert {np.sign(value) for value in helm_sense(mirrored).values()} == {1.0}
+    warnings = drafted(tmp_path, mirrored)[0].warnings
+    assert sum(".alpha > 0 turns" in warning for warning in warnings) == 2
+
+
+def test_runs_shorter_than_the_horizon_are_named(tmp_path: Path) -> None:
+    long = trial(6)
+    short = long.frame[(long.frame["run"] == "zz 0") & (long.frame["t"] < 10)].assign(run="stub")
+    frame = pd.concat([long.frame, short.astype({"run": long.frame["run"].dtype})], ignore_index=True)
+    draft, document = drafted(tmp_path, Dataset(frame, long.metadata))
+    assert "too short for it: stub" in draft.text.replace("\n# ", " ")
+    assert document["grid"]["N_D"][-1] == 5
+
+
+def test_kinds_are_counted() -> None:
+    assert set(survey(trial(3)).runs["kind"]) == {"zigzag"}
+
+
+@pytest.fixture
+def template(tmp_path: Path) -> Path:
+    """A first guess from main particulars, as `shipid vessel new` writes it, in a folder with a blank in its name."""
+    file = tmp_path / "my ship" / "ada.toml"
+    file.parent.mkdir()
+    file.write_text(first_guess(Particulars(30.0, 8.0, 2.8, 0.55, propulsor="azimuth"), "Ada", str(file)).text)
+    return file
+
+
+def test_a_template_vessel_is_studied(tmp_path: Path, template: Path) -> None:
+    """Named by its path from the study; beside a bundled one, both as they are."""
+    _, document = drafted(tmp_path, trial(), str(template), SHIP)
+    assert [family["name"] for family in document["family"]] == ["ada", SHIP, "inaccurate"]
+    assert document["family"][0]["base"] == "my ship/ada.toml"
+    assert document["claims"] == {"accurate": "ada", "inaccurate": "inaccurate"}
+    read_plan(tmp_path / "study.toml")
+
+
+@pytest.mark.parametrize("vessel", ["kvlcc2-l7", "mariner"])
+def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> None:
+    out = tmp_path / "study.toml"
+    draft = draft_study([vessel], None, out)
+    out.write_text(draft.text)
+    plan = read_plan(out)
+    assert plan.truth is not None
+    assert {model.family for model in plan.models} == {"nominal", "moderate", "high", "none"}
+    truth = plan.study.truth
+    assert truth is not None
+    assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
+    assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("vessels", "runs", "said"),
+    [
+        (["kvlcc2-l7"], 5, "propeller.n: KVLCC2 tanker, 7 m model (MMG) takes this command; the data have"),
+        ([SHIP], 2, "2 runs of 20 s or more, a study needs 3"),
+        ([SHIP], 1, "1 run of 20 s or more, a study needs 3"),
+        (["gunnerus"], 5, "no vessel of this name comes with shipid"),
+        (["./no.toml"], 5, "no such file"),
+        ([], 5, "name a vessel"),
+    ],
+)
+def test_what_cannot_be_studied_is_one_line(tmp_path: Path, vessels: list[str], runs: int, said: str) -> None:
+    data = write_dataset(trial(runs), tmp_path / "log.parquet")
+    with pytest.raises(ShipidError) as error:
+        draft_study(vessels, data, tmp_path / "study.toml")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_one_vessel_makes_a_truth(tmp_path: Path) -> None:
+    with pytest.raises(ShipidError, match="one vessel makes the truth"):
+        draft_study([SHIP, "mariner"], None, tmp_path / "study.toml")
+
+
+def test_the_command_writes_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_dataset(trial(), Path("log.parquet"))
+    command = ["study", "new", "--vessel", SHIP, "--data", "log.parquet"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert "shipid study run log-study.toml" in result.output
+    before = Path("log-study.toml").read_text()
+    again = CliRunner().invoke(app, command)
+    assert isinstance(again.exception, ShipidError)
+    assert "not written over" in str(again.exception)
+    assert Path("log-study.toml").read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("mapping", "log", "vessel", "path", "tests"),
+    [
+        ("gunnerus-2022", "gunnerus_2022/RVG_ManeuveringTests.csv", "gunnerus-28.9", "velocity", ["ZZ", "TC"]),
+        ("kvlcc2-hsva", "kvlcc2_hsva", "kvlcc2-l7", "position", ["15_05"]),
+    ],
+)
+def test_recorded_sets(
+    tmp_path: Path, shared_data: Path, mapping: str, log: str, vessel: str, path: str, tests: list[str]
+) -> None:
+    """Public trials: GPS of some metres gives way, a towing carriage does not; 15 s as in the paper for both."""
+    dataset = import_log(read_mapping(mapping), shared_data / log)
+    draft, document = drafted(tmp_path, dataset, vessel)
+    assert document["data"]["path"] == path
+    assert document["prediction"]["horizon"] * document["prediction"]["step"] == 15
+    assert [name[: len(start)] for name, start in zip(document["split"]["test"], tests, strict=True)] == tests
+    assert not draft.warnings
+    runs = survey(dataset).runs["duration"]
+    assert all(runs[name] < runs.max() for name in document["split"]["test"])
