@@ -472,7 +472,7 @@ def study_rotate(
         rows.append([row["model"], *(_digits(row[name]) for name in columns), better])
     _print(_table(["model", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
     typer.echo(f"naive floor {_digits(frame.groupby('test')['naive'].first().mean())} m")
-    found = rotate.contrasts(frame, plan.study.claims).to_dict("records")
+    found = rotate.contrasts(frame, plan).to_dict("records")
     if found:
         typer.echo("paired differences over the turns [m], with a 95 % interval:")
         pairs = [

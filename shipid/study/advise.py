@@ -37,7 +37,7 @@ def by_model(results: Results) -> pd.DataFrame:
 def answer(results: Results) -> list[tuple[str, str]]:
     """Four to nine sentences built from the results, each with the anchor of the figure that carries it."""
     claims, every_model = results.plan.study.claims, by_model(results)
-    table = every_model[~every_model["kind"].isin(claims.not_judged if claims else ())]
+    table = every_model[~every_model["kind"].isin(results.plan.aside)]
     sentences = [(text, "cells") for text in _caveats(results)]
     largest = int(table["N_D"].max()) if len(table) else 0
     top = table[table["N_D"] == largest]

@@ -63,7 +63,8 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
     parts = []
     for world, results in enumerate(worlds):
         good = results.cells[results.cells["status"] == "ok"]
-        alone = good[good["kind"] != NO_MODEL].drop_duplicates("model").assign(N_D=0, H=lambda rows: rows["A"])
+        known = ~good["kind"].isin([NO_MODEL, *results.plan.identified])
+        alone = good[known].drop_duplicates("model").assign(N_D=0, H=lambda rows: rows["A"])
         means = pd.concat([alone, good]).groupby(["kind", "N_D"], sort=False)["H"].mean()
         parts.append(means.reset_index().assign(world=world))
     grouped = pd.concat(parts).groupby(["kind", "N_D"], sort=False)["H"]

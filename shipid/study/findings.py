@@ -80,8 +80,7 @@ def _gaps(results: Results, claims: Claims, N_D: int) -> pd.Series:
 def _worst_share(results: Results, N_D: int) -> tuple[str, float]:
     """Which predictor, physics alone included, is most often worst over the horizon; share of steps where `none` is."""
     curves: dict[str, list[np.ndarray]] = {}
-    claims = results.plan.study.claims
-    aside = {model.name for model in results.plan.models if claims and model.family in claims.not_judged}
+    aside = {model.name for model in results.plan.models if model.family in results.plan.aside}
     for row in results.cells[results.cells["N_D"] == N_D].itertuples():
         if row.cell in results.paths and row.model not in aside:
             error = position_error(results.paths[str(row.cell)], results.test.future)

@@ -32,7 +32,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
 
-LEAST_RUNS = 2  # the smallest amount of data of a study
+LEAST_RUNS = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
 MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
 LENGTHS_AHEAD = (
     2.5  # ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead

@@ -24,6 +24,7 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
+ALONE = "-alone"  # added to the name of a family that is identified: the same without a compensator
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 PUBLISHED = {  # key of a published envelope -> signal, factor to SI
     **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
@@ -171,6 +172,7 @@ class Model:
     """A foundation of the study: a variant of a vessel, or no physics at all (`variant` is None).
 
     identify : what is identified from the runs of each batch before anything is compensated; None: nothing.
+    compensated : whether a compensator is trained on it; else it predicts alone.
     """
 
     name: str
@@ -180,6 +182,7 @@ class Model:
     vessel: Vessel | None
     description: str = ""
     identify: Identify | None = None
+    compensated: bool = True
 
 
 @dataclass(frozen=True)
@@ -241,6 +244,18 @@ class Plan:
         vessels = sorted({vessel.digest for vessel in self.standing})
         depends = {"vessels": vessels, "sources": dict(self.sources), "recipe": self.recipe.model_dump()}
         return documents.digest({"study": document, **depends})
+
+    @property
+    def identified(self) -> set[str]:
+        """Families whose numbers, and so their A, depend on the data of the batch."""
+        return {model.family for model in self.models if model.identify is not None}
+
+    @property
+    def aside(self) -> set[str]:
+        """Families that are shown, but that no claim and no sentence of the answer counts."""
+        claims = self.study.claims
+        alone = {model.family for model in self.models if not model.compensated}
+        return alone | (claims.not_judged if claims else set())
 
     @property
     def cells(self) -> int:
@@ -379,6 +394,11 @@ def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, 
         drawn = members(family, vessel, file)
         settings = _identify(study, family, index, vessel, file)
         found += [Model(v.name, v.family, v.member, v, vessel, words, settings) for v in drawn]
+        if settings is not None:
+            found += [
+                Model(f"{v.name}{ALONE}", f"{v.family}{ALONE}", v.member, v, vessel, words, settings, compensated=False)
+                for v in drawn
+            ]
     names = [model.name for model in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

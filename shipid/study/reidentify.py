@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification.solve import identify
-from shipid.metrics import Summary, position_error, summary
+from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, own_vessel, paths_of
 
@@ -32,7 +33,7 @@ class Foundation:
     test_paths: Array
     sentence: str = ""
 
-    def accuracy(self, test: Windows) -> Summary:
+    def accuracy(self, test: Windows) -> Mapping[str, Any]:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
         return summary(position_error(self.test_paths, test.future))
 
@@ -50,7 +51,14 @@ def foundations(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> di
     if waiting:
         runs = prepared.runs(plan, batch)
         data = apart(prepared.data, prepared.test)
-        found |= {model.name: _identified(plan, prepared, model, runs, data, windows, device) for model in waiting}
+        known: dict[str, Foundation] = {}  # by variant: with a compensator and without one are the same physics
+        for model in waiting:
+            assert model.variant is not None
+            key = model.variant.name
+            if key not in known:
+                known[key] = _identified(plan, prepared, model, runs, data, windows, device)
+            same = replace(known[key].model, name=model.name, family=model.family, compensated=model.compensated)
+            found[model.name] = replace(known[key], model=same)
     return {model.name: found[model.name] for model in prepared.models}
 
 

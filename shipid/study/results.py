@@ -19,7 +19,7 @@ from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import SAILORS, envelope_table
 from shipid.study.plan import NO_MODEL, Plan
-from shipid.study.prepare import constant_motion
+from shipid.study.prepare import constant_motion, window_memory
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
@@ -60,11 +60,17 @@ def read_results(folder: Path) -> Results:
     plan = store.stored_plan(folder)
     cells = store.read_rows(folder)
     test, physics, naive = store.read_test(folder)
+    dataset = read_dataset(folder / store.DATASET)
     paths = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
             predictor = Predictor.load(store.cell_file(folder, row["cell"]))
-            paths[row["cell"]] = physics[row["model"]] + predictor.compensation(test.columns, test.planned)
+            alone = physics.get(row["model"])
+            if alone is None:  # its numbers depend on the cell
+                assert predictor.vessel is not None
+                memory = window_memory(predictor.vessel, dataset, test)
+                alone = predictor.physics(test.columns, memory, test.planned)
+            paths[row["cell"]] = alone + predictor.compensation(test.columns, test.planned)
     return Results(
         folder=folder,
         plan=plan,
@@ -74,7 +80,7 @@ def read_results(folder: Path) -> Results:
         physics=physics,
         naive=naive,
         paths=paths,
-        dataset=read_dataset(folder / store.DATASET),
+        dataset=dataset,
         provenance=store.read_json(folder / store.PROVENANCE),
     )
 
@@ -85,7 +91,7 @@ def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> p
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
-    frame["status"] = ["diverged" if diverged[name] else "ok" for name in frame["model"]]
+    frame["status"] = ["diverged" if diverged.get(name) else "ok" for name in frame["model"]]
     known = {name: error_by_axis(path, test.future) for name, path in physics.items() if name != NO_MODEL}
     for axis, column in enumerate(("A_along", "A_across")):
         frame[column] = [known[name][axis] if name in known else np.nan for name in frame["model"]]

@@ -12,7 +12,7 @@ from scipy import stats
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.study.plan import NO_MODEL, Batch, Claims, Plan
+from shipid.study.plan import NO_MODEL, Batch, Plan
 from shipid.study.prepare import partition, prepare
 from shipid.study.run import run_batch
 
@@ -65,18 +65,19 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def contrasts(frame: pd.DataFrame, claims: Claims | None) -> pd.DataFrame:
+def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     """What R1-R4 compare, as paired differences over the turns: id, difference, mean, low, high [m], turns above 0.
 
     Seeds are averaged first; low and high are Student's 95 % interval over the turns, which share training runs and so
     are not independent: it is too narrow rather than too wide. No rows without `accurate` and `inaccurate`.
     """
+    claims = plan.study.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return pd.DataFrame(columns=["id", "difference", "mean", "low", "high", "above", "turns"])
     per_turn = _per_turn(frame)
     A, H = (per_turn.pivot(index="test", columns="kind", values=name) for name in ("A", "H"))
     good, bad = claims.accurate, claims.inaccurate
-    others = [kind for kind in H.columns if kind != NO_MODEL and kind not in claims.not_judged]
+    others = [kind for kind in H.columns if kind != NO_MODEL and kind not in plan.aside]
     found = {
         ("R1", f"{good}: A less H"): A[good] - H[good],
         ("R1", f"{bad}: A less H"): A[bad] - H[bad],

@@ -7,7 +7,7 @@ import platform
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
@@ -17,20 +17,23 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.data.windows import covered, planned_means
+from shipid.data.windows import Windows, covered, planned_means
 from shipid.errors import ShipidError
+from shipid.estimation.compensator import Tuned
 from shipid.estimation.training import check_device, use_threads
 from shipid.estimation.tuning import tune
-from shipid.metrics import Summary, position_error, summary
+from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, planned, prepare
-from shipid.study.reidentify import foundations
+from shipid.study.reidentify import Foundation, foundations
 from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+
+ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,11 @@ def run_study(
     dataset = read_dataset(folder / store.DATASET)
     yield Event("note", "rolling out the models")
     prepared = prepare(plan, dataset, device)
-    store.write_test(folder, prepared.test, prepared.test_paths, prepared.naive)
+    fixed = {m.name: prepared.test_paths[m.name] for m in prepared.models if m.identify is None}
+    store.write_test(folder, prepared.test, fixed, prepared.naive)
     store.write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
     store.write_json(
-        folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared.accuracy(m.name))} for m in prepared.models]
+        folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models]
     )
     for note in prepared.notes:
         yield Event("note", note)
@@ -118,7 +122,7 @@ def run_batch(
     mask = np.isin(prepared.pool.run, runs)
     windows = prepared.pool.select(mask)
     standing = foundations(plan, prepared, batch, device)
-    targets = {name: windows.future - foundation.paths for name, foundation in standing.items()}
+    targets = {name: windows.future - one.paths for name, one in standing.items() if one.model.compensated}
     means = planned_means(windows.columns, planned(plan, windows) or {})
     tuned = tune(
         {**windows.columns, **means},
@@ -132,31 +136,43 @@ def run_batch(
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for name, foundation in standing.items():
-        found, model, test = tuned[name], foundation.model, prepared.test
-        row = {"cell": batch.cell(name), "model": name, "kind": model.family, "member": model.member}
-        row |= {**shared, **_accuracy(model, foundation.accuracy(test)), "H": np.nan, "H_90": np.nan, "rms": np.nan}
-        row |= {"status": "ok", "sentence": foundation.sentence, "hyperparameters": ""}
-        row |= {"seconds": found.seconds, "trials": found.trials}
-        predictor = None
-        if found.compensator is None:
-            row |= {"status": "failed", "sentence": foundation.sentence or "no training converged"}
+        found = tuned.get(name, Tuned(None, [], 0.0))
+        row = {"cell": batch.cell(name), **shared, "seconds": found.seconds, "trials": found.trials}
+        if foundation.model.compensated and found.compensator is None:
+            told, predictor = _failed(foundation.sentence or "no training converged"), None
         else:
-            chosen = found.compensator.hyperparameters
-            searched = {name: chosen[name] for name in plan.recipe.varied() if name in chosen}
-            row["hyperparameters"] = ", ".join(f"{name} {value:.3g}" for name, value in searched.items())
-            predictor = _predictor(plan, prepared, model, batch, found.compensator, windows)
-            failed = ~np.isfinite(foundation.test_paths).all(axis=(0, 2))
-            if failed.any():
-                row |= {
-                    "status": "diverged",
-                    "sentence": f"physics diverges on {failed.mean():.1%} of the test windows",
-                }
-            else:
-                paths = foundation.test_paths + predictor.compensation(test.columns, test.planned)
-                error = summary(position_error(paths, test.future))
-                row |= {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
-        results.append((row, predictor))
+            predictor = _predictor(plan, prepared, foundation.model, batch, found.compensator, windows)
+            told = _judged(plan, prepared.test, foundation, predictor)
+        results.append(({**row, **_named(foundation, prepared.test), **told}, predictor))
     return results
+
+
+def _named(foundation: Foundation, test: Windows) -> dict[str, Any]:
+    """Which model a row is of, and how accurate its physics alone."""
+    model = foundation.model
+    known = foundation.accuracy(test) if model.vessel is not None else None
+    row = {"model": model.name, "kind": model.family, "member": model.member}
+    return row | {key: known[name] if known else np.nan for key, name in ACCURACY.items()}
+
+
+def _failed(sentence: str, status: str = "failed") -> dict[str, Any]:
+    """What a row says that has no result."""
+    blank = dict.fromkeys(("H", "H_90", "rms"), np.nan)
+    return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
+
+
+def _judged(plan: Plan, test: Windows, foundation: Foundation, predictor: Predictor) -> dict[str, Any]:
+    """Errors [m] of a predictor on the test windows, and what its search chose."""
+    chosen = predictor.compensator.hyperparameters if predictor.compensator else {}
+    words = ", ".join(f"{name} {chosen[name]:.3g}" for name in plan.recipe.varied() if name in chosen)
+    failed = ~np.isfinite(foundation.test_paths).all(axis=(0, 2))
+    if failed.any():
+        sentence = foundation.sentence or f"physics diverges on {failed.mean():.1%} of the test windows"
+        return _failed(sentence, "diverged") | {"hyperparameters": words}
+    paths = foundation.test_paths + predictor.compensation(test.columns, test.planned)
+    error = summary(position_error(paths, test.future))
+    errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
+    return {**errors, "status": "ok", "sentence": foundation.sentence, "hyperparameters": words}
 
 
 def machine() -> dict[str, Any]:
@@ -166,10 +182,12 @@ def machine() -> dict[str, Any]:
     return {**system, "cores": os.cpu_count(), "packages": packages}
 
 
-def _accuracy(model: Model, found: Summary) -> dict[str, Any]:
-    if model.vessel is None:
-        return {"A": np.nan, "A_90": np.nan, "A_rms": np.nan}
-    return {"A": found["mean"], "A_90": found["p90"], "A_rms": found["rms"]}
+def _accuracy(model: Model, prepared: Prepared) -> dict[str, Any]:
+    """A, A_90, A_rms [m] of a model; not a number without physics, and where it depends on the batch."""
+    if model.vessel is None or model.identify is not None:
+        return dict.fromkeys(ACCURACY, np.nan)
+    found: Mapping[str, Any] = prepared.accuracy(model.name)
+    return {key: found[name] for key, name in ACCURACY.items()}
 
 
 def _predictor(plan: Plan, prepared: Prepared, model: Model, batch: Batch, compensator: Any, windows: Any) -> Predictor:

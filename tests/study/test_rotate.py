@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,13 +12,21 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
-from shipid.study.plan import Claims, Plan
+from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.rotate import contrasts, rotate, spread, turns
 from shipid.study.run import run_batch
 from tests.study.test_commands import weaving
+from tests.study.tiny import tiny_plan
 
-CLAIMS = Claims(accurate="good", inaccurate="bad", aside=["tuned"])
+
+@pytest.fixture
+def claimed(made: Callable[..., Any]) -> Plan:
+    """A plan whose claims are about the models by hand."""
+    cells = {(model, 2, 0): 1.0 for model in ("good", "bad", "tuned", "none")}
+    claims = {"accurate": "good", "inaccurate": "bad", "aside": ["tuned"]}
+    plan: Plan = made(cells, claims=claims, alone={"good": 1.0, "bad": 2.0, "tuned": 0.5}).plan
+    return plan
 
 
 def by_hand() -> pd.DataFrame:
@@ -62,9 +72,9 @@ def test_spread_by_hand() -> None:
     assert rows["better"].tolist() == pytest.approx([3, 3, 0, np.nan], nan_ok=True)
 
 
-def test_contrasts_by_hand() -> None:
+def test_contrasts_by_hand(claimed: Plan, tmp_path: Path) -> None:
     """Student's t for 3 turns is 4.303; the differences of R1, bad, are 2.5, 3.5, 4.5."""
-    rows = contrasts(by_hand(), CLAIMS).set_index("difference")
+    rows = contrasts(by_hand(), claimed).set_index("difference")
     one = rows.loc["bad: A less H"]
     assert one["mean"] == pytest.approx(3.5)
     assert (one["low"], one["high"]) == pytest.approx((3.5 - 4.303 / 3**0.5, 3.5 + 4.303 / 3**0.5), abs=1e-3)
@@ -72,12 +82,12 @@ def test_contrasts_by_hand() -> None:
     assert rows.loc["gap of A less gap of H", "mean"] == pytest.approx(3.0 - 1.5)
     assert rows.loc["H of none less the worst other H", "mean"] == pytest.approx(0.5)  # tuned stands aside
     assert rows.loc["H of none less the worst other H", "above"] == 2
-    assert contrasts(by_hand(), None).empty
+    assert contrasts(by_hand(), tiny_plan(tmp_path)).empty
 
 
-def test_a_failed_cell_is_left_out() -> None:
+def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
     frame = by_hand()
     frame.loc[(frame["model"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
-    rows = contrasts(frame, CLAIMS).set_index("difference")
+    rows = contrasts(frame, claimed).set_index("difference")
     assert rows.loc["good: A less H", "turns"] == 2
     assert spread(frame).set_index("model").loc["good", "turns"] == 2
