@@ -54,7 +54,7 @@ class Fit:
     Parameters
     ----------
     paths, factors : names and estimates (n,), factors on the base values (dimensionless).
-    residuals : (m,) measured minus predicted over the declared standard deviation; of each run in the order of time.
+    residuals : (m,) predicted less measured over the declared standard deviation; of each run in the order of time.
     jacobian : (m, n) d residual / d factor, per-run nuisances projected out.
     clusters, signals : run number and signal of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
@@ -318,6 +318,14 @@ def fisher(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covaria
     coloured = [name for name, colour in colours.items() if not colour.white]
     reason = "residuals are white" if not coloured else f"residuals of {', '.join(coloured)} remember earlier ones"
     return Covariance("fisher", matrix, _freedom(total, np.asarray(squares)), not coloured, reason)
+
+
+def declared_error(fit: Fit, path: str) -> float:
+    """Standard error of one factor if residuals err independently, by the declared standard deviations."""
+    inner = _free(fit, np.flatnonzero(~_at_bound(fit)))
+    inverse = _Basis.of(inner).inverse
+    j = inner.paths.index(path)
+    return float(np.sqrt(inverse[j, j]))
 
 
 def _freedom(total: Array, squares: Array) -> Array:
