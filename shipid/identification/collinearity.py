@@ -34,25 +34,32 @@ UNSEEN = 1e-10  # of the largest eigenvalue, with columns of unit length: below 
 class Combination:
     """Parameters that only their combination is known of.
 
-    paths : its members. weights : change of each factor along the unseen direction, the largest 1.
-    gamma : collinearity index of the members; infinite for one that has no effect at all.
+    paths : its members, and names : as short as is clear. weights : change of each factor along the unseen direction,
+    the largest 1. gamma : collinearity index of the members; infinite for one that has no effect at all.
     """
 
     paths: tuple[str, ...]
+    names: tuple[str, ...]
     weights: tuple[float, ...]
     gamma: float
 
     def sentence(self) -> str:
         """What is not seen, in words."""
-        if len(self.paths) == 1:
-            return f"{self.paths[0]} has no effect on what these data hold"
-        moves = " with ".join(f"{100 * w:+.2g} %" + f" of {p}" for p, w in zip(self.paths, self._tenths(), strict=True))
-        return f"only {' and '.join(self.paths)} together: {moves} is not seen by these data"
+        if len(self.names) == 1:
+            return f"{self.names[0]} has no effect on what these data hold"
+        moves = [f"{10 * w:+.2g} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
+        return f"only {listed(self.names)} together; {' with '.join(moves)} is not seen by these data"
 
-    def _tenths(self) -> list[float]:
-        """Weights as relative changes, the largest +10 %."""
-        most = max(self.weights, key=abs)
-        return [0.1 * weight / most for weight in self.weights]
+
+def short(paths: Sequence[str]) -> tuple[str, ...]:
+    """Names for people: the last part of a path where it is the only one so called."""
+    last = [path.rsplit(".", 1)[-1] for path in paths]
+    return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
+
+
+def listed(names: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 @dataclass(frozen=True)
@@ -111,14 +118,16 @@ def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLI
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     silent = np.flatnonzero(lengths <= np.sqrt(UNSEEN) * lengths.max(initial=0.0)).tolist()
-    found = [Combination((paths[j],), (1.0,), float("inf")) for j in silent]
+    names = short(paths)
+    found = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
     gram = _gram(jacobian)
     left = [j for j in range(len(paths)) if j not in silent]
     while len(left) > 1 and _gamma(gram, left) > most:
         own = _shrunk(gram, left, most)
         weights = _weakest(gram, own) / lengths[own]
         weights = weights / weights[np.argmax(np.abs(weights))]
-        found.append(Combination(tuple(paths[j] for j in own), tuple(map(float, weights)), _gamma(gram, own)))
+        members = tuple(paths[j] for j in own), tuple(names[j] for j in own)
+        found.append(Combination(*members, tuple(map(float, weights)), _gamma(gram, own)))
         left.remove(own[int(np.argmax(np.abs(_weakest(gram, own))))])
     return tuple(found)
 

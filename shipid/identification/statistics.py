@@ -22,14 +22,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import UNSEEN, Collinearity, collinearity
+from shipid.identification.collinearity import UNSEEN, Collinearity, collinearity, listed, short
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -44,6 +44,7 @@ WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS = 10
 BLOCK = 10.0  # length of a block in integrated correlation times
+LEAST = 0.1  # weight under which a factor is left out of a direction
 KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
 
 
@@ -71,6 +72,11 @@ class Fit:
     prior_widths: Array | None = None
     spent: Array | None = None
     at_bound: NDArray[np.bool_] | None = None
+
+    @classmethod
+    def of(cls, solution: Any) -> Fit:
+        """What a `Solution` of `identify` holds of it, name by name."""
+        return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
 
     def __post_init__(self) -> None:
         m, n = self.jacobian.shape
@@ -150,6 +156,23 @@ class Statistics:
     sentences: tuple[str, ...]
     collinearity: Collinearity
     whiteness: Mapping[str, Whiteness]
+
+    def directions(self) -> list[tuple[dict[str, float], float]]:
+        """Combinations of factors at right angles in what is seen, best known first: (path -> weight, standard error).
+
+        The weight of the greatest is 1 and those under 0.1 are left out; the error is how far factors may move along
+        it until the data object, priors not counted.
+        """
+        levels = np.array([self.whiteness[name].level for name in self.fit.signals])
+        found = []
+        for direction in self.collinearity.directions:
+            weights = direction / direction[np.argmax(np.abs(direction))]
+            own = {self.collinearity.paths[j]: float(weights[j]) for j in np.flatnonzero(np.abs(weights) >= LEAST)}
+            full = np.zeros(len(self.fit.paths))
+            full[[self.fit.paths.index(path) for path in self.collinearity.paths]] = weights
+            seen = float(np.linalg.norm(self.fit.jacobian @ full / levels))
+            found.append((own, 1 / seen if seen > 0 else float("inf")))
+        return sorted(found, key=lambda one: one[1])
 
 
 def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
@@ -406,27 +429,25 @@ def _sentences(
     fit: Fit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
 ) -> tuple[str, ...]:
     """One sentence for each parameter: how well it is known or why not."""
-    bound = _at_bound(fit)
-    told = []
-    for j, path in enumerate(fit.paths):
+    bound, told = _at_bound(fit), []
+    for j, (path, name) in enumerate(zip(fit.paths, short(fit.paths), strict=True)):
         together = next((own for own in seen.combinations if path in own.paths), None)
+        known = f"{name} is known to +-{100 * half[j]:.2g} % of its base value"
         if bound[j]:
-            told.append(f"{path} stands at its bound, {fit.factors[j]:.4g}: no interval")
+            told.append(f"{name} stands at its bound, {fit.factors[j]:.4g}: no interval")
         elif identifiable[j] and together is None:
-            told.append(f"{path} is known to +-{100 * half[j]:.2g} % of its base value")
+            told.append(known)
         elif identifiable[j]:
             assert together is not None
-            others = " and ".join(own for own in together.paths if own != path)
-            told.append(
-                f"{path} is known to +-{100 * half[j]:.2g} % of its base value, if the model is right: its effect is "
-                f"nearly that of {others} (collinearity index {together.gamma:.0f})"
-            )
+            others = listed([own for own in together.names if own != name])
+            index = f"collinearity index {together.gamma:.0f}"
+            told.append(f"{known}, if the model is right: {others} do nearly the same ({index})")
         elif together is not None:
-            told.append(f"{path} is not identified: {together.sentence()}")
+            told.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
-            told.append(f"{path} is not identified: +-{100 * alone[j]:.2g} % of its base value, hardly excited")
+            told.append(f"{name} is not identified: +-{100 * alone[j]:.2g} % of its base value, hardly excited")
         else:
-            told.append(f"{path} is not identified: no effect of its own on what these data hold")
+            told.append(f"{name} is not identified: no effect of its own on what these data hold")
     return tuple(told)
 
 

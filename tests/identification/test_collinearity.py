@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.collinearity import collinearity, combinations, index_of
+from shipid.identification.collinearity import collinearity, combinations, index_of, listed, short
 
 RNG = np.random.default_rng(0)
 FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
@@ -63,3 +63,10 @@ def test_columns_at_right_angles_have_no_set_and_silent_ones_their_own() -> None
     (own,) = combinations(silent, "abc")
     assert own.sentence() == "c has no effect on what these data hold"
     assert collinearity(silent, "abc").gamma == pytest.approx(1)
+
+
+def test_names_are_as_short_as_is_clear() -> None:
+    assert short(["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]) == ("Y_v", "port.D_p", "starboard.D_p")
+    assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
+    (own,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
+    assert own.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur is not seen by these data"

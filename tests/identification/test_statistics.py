@@ -125,7 +125,19 @@ def test_a_pair_that_acts_as_one_is_named() -> None:
     jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
     found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
     assert found.identifiable.tolist() == [False, False, True, True, True, True]
-    assert "only p0 and p1 together: +10 % of p0 with -5 % of p1 is not seen" in found.sentences[0]
+    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 is not seen" in found.sentences[0]
+
+
+def test_directions_say_how_well_combinations_are_known() -> None:
+    """Of p0 + p1 / 2 and p0 - p1 / 2, one is known and one is not; errors are those of a fit along each alone."""
+    jacobian = JACOBIAN[:, :2].copy()
+    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-4 * jacobian[:, 1]
+    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    (seen, small), (unseen, wide) = found.directions()
+    assert seen == pytest.approx({"p0": 1.0, "p1": 0.5}, rel=1e-3)
+    assert unseen == pytest.approx({"p0": 1.0, "p1": -0.5}, rel=1e-3)
+    assert small < 0.01
+    assert wide > 100
 
 
 def test_what_has_no_effect_is_named() -> None:
