@@ -39,7 +39,7 @@ MEASURED = ("u", "v", "r")
 LEAST_SAMPLES, LENGTHS = 8, 1.0  # a bump lasts so many samples, and so many ship lengths of way, at least
 SMOOTHNESS = 3  # p of the bump (1 - s^2)^p
 STRIDE = 4  # bumps begin a quarter of their length apart
-ROUNDS, SETTLED, HALVINGS = 20, 1e-4, 6
+ROUNDS, SETTLED, HALVINGS = 20, 1e-5, 6  # SETTLED: of the levels; factors that are not seen may wander on
 RANK = 1e-8  # of the largest singular value, with columns of unit length: below it a step is left out
 PROBE, CURVED = 0.05, 1e-6  # change of factors at which columns are compared, and what of a column may change
 
@@ -146,7 +146,7 @@ def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tu
         after = problem.levels(residual)
         moved = max(abs(after[name] / levels[name] - 1) for name in levels)
         levels = after
-        if round_ and max(moved, float(np.abs(step).max())) < SETTLED:
+        if round_ and moved < SETTLED:
             return factors, levels, True
     return factors, levels, False
 

@@ -157,20 +157,26 @@ class Statistics:
     collinearity: Collinearity
     whiteness: Mapping[str, Whiteness]
 
+    @property
+    def information(self) -> Array:
+        """Fisher information (n, n) of the factors with the levels that the residuals show, priors not counted."""
+        levels = np.array([self.whiteness[name].level for name in self.fit.signals])
+        scaled = self.fit.jacobian / levels[:, None]
+        return np.asarray(scaled.T @ scaled)
+
     def directions(self) -> list[tuple[dict[str, float], float]]:
         """Combinations of factors at right angles in what is seen, best known first: (path -> weight, standard error).
 
         The weight of the greatest is 1 and those under 0.1 are left out; the error is how far factors may move along
         it until the data object, priors not counted.
         """
-        levels = np.array([self.whiteness[name].level for name in self.fit.signals])
-        found = []
+        information, found = self.information, []
         for direction in self.collinearity.directions:
             weights = direction / direction[np.argmax(np.abs(direction))]
             own = {self.collinearity.paths[j]: float(weights[j]) for j in np.flatnonzero(np.abs(weights) >= LEAST)}
             full = np.zeros(len(self.fit.paths))
             full[[self.fit.paths.index(path) for path in self.collinearity.paths]] = weights
-            seen = float(np.linalg.norm(self.fit.jacobian @ full / levels))
+            seen = float(np.sqrt(full @ information @ full))
             found.append((own, 1 / seen if seen > 0 else float("inf")))
         return sorted(found, key=lambda one: one[1])
 
@@ -179,7 +185,9 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
     """Judge a fit: covariances, 95 % intervals, identifiability.
 
     A factor is identified if the data alone, without its prior, put its 95 % interval within +-`widest` base values: by
-    default, if they can tell the estimate from 0 and from twice the base.
+    default, if they can tell the estimate from one that differs by the base value. Collinearity explains an interval
+    that is wider, it does not judge: what is collinear may still be found. All is linear at the estimate; where an
+    interval is wide the profile (`shipid.identification.profile`) says whether it ends at all.
     """
     free = np.flatnonzero(~_at_bound(fit))
     inner = _free(fit, free)

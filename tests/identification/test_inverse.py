@@ -12,6 +12,7 @@ from shipid.errors import DataError
 from shipid.identification.inverse import inverse_dynamics
 from shipid.simulation.truth import Truth, simulate
 from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import variety
 
 SHIP = load_vessel("gunnerus-28.9")
 MAIN = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "X_rv", "Y_ur", "Y_rrr", "N_ur", "N_rrr", "N_r|r|"))
@@ -69,10 +70,10 @@ def test_a_derivative_that_the_base_lacks_needs_a_scale() -> None:
     assert found.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "mariner"])
+@pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "actuators", "six"])
 def test_every_structure_is_found(name: str) -> None:
     """Its greatest forces: the first three hull parameters that data see best."""
-    vessel = load_vessel(name)
+    vessel = variety()[name]
     small = name == "kvlcc2-l7"
     speeds = {"n_rpm": (300.0, 700.0), "start_speed": (0.6, 1.2)} if small else {"start_speed": (3.0, 7.0)}
     log = sailed(vessel, alpha_deg=(-30, 30), **speeds)  # type: ignore[arg-type]

@@ -54,6 +54,7 @@ def test_fisher_is_the_textbook_formula() -> None:
     expected = fit.residuals @ fit.residuals / freedom * np.linalg.inv(jacobian.T @ jacobian)
     np.testing.assert_allclose(found.matrix, expected, rtol=1e-9)
     np.testing.assert_allclose(found.freedom, freedom)
+    np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
 
 
 def test_sandwich_of_single_samples_is_hc2() -> None:
