@@ -12,6 +12,10 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
     blocks    the same on stretches of a run, each much longer than residuals remember. For few runs; a current or a
               bias that lasts a run stays unseen.
 
+None of them sees a bias. Where every prediction has a start of its own to be found, coloured residuals pull the factors
+(incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is against what the
+residuals remember; `shipid.identification.agreement` tests for that with a second fit.
+
 Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169; Pustejovsky, Tipton,
 Journal of Business & Economic Statistics 36 (2018) 672 (also that nuisances may be projected out first); Tipton,
 Psychological Methods 20 (2015) 375 (4 degrees of freedom); Carlstein, Annals of Statistics 14 (1986) 1171 (blocks);
@@ -116,13 +120,17 @@ class Whiteness:
 
 @dataclass(frozen=True)
 class Covariance:
-    """One form of covariance: (n, n) of the factors, degrees of freedom (n,), whether to trust it and why."""
+    """One form of covariance: (n, n) of the factors, degrees of freedom (n,), whether to trust it and why.
+
+    influences : (clusters, n) what each cluster does to the estimate, where the form is made of them.
+    """
 
     kind: Kind
     matrix: Array
     freedom: Array
     trusted: bool
     reason: str
+    influences: Array | None = None
 
     @property
     def errors(self) -> Array:
@@ -368,7 +376,7 @@ def sandwich(fit: Fit, basis: _Basis, clusters: Index, kind: Kind, what: str) ->
     """Cluster-robust covariance (CR2) with Satterthwaite's degrees of freedom under independent errors."""
     n = len(fit.paths)
     root = _root(basis.inverse)
-    meat, own, shared = np.zeros((n, n)), [], []
+    scores, own, shared = [], [], []
     for number in np.unique(clusters):
         rows = clusters == number
         jacobian = fit.jacobian[rows]
@@ -377,21 +385,21 @@ def sandwich(fit: Fit, basis: _Basis, clusters: Index, kind: Kind, what: str) ->
         rest = 1 - values**2
         grown = np.where(rest > KEPT, 1 / np.sqrt(np.maximum(rest, KEPT)), 0.0) - 1
         adjusted = jacobian + left @ (grown[:, None] * (left.T @ jacobian))  # A_g J_g
-        score = adjusted.T @ fit.residuals[rows]
-        meat += np.outer(score, score)
+        scores.append(adjusted.T @ fit.residuals[rows])
         influence = adjusted @ basis.inverse  # (m_g, n)
         own.append((influence**2).sum(axis=0))
         shared.append(spread.T @ influence)  # (n, n): of (I - H)_gh = delta_gh - spread_g spread_h^T
-    matrix = basis.inverse @ (meat + np.diag(basis.prior)) @ basis.inverse
+    influences = -np.array(scores) @ basis.inverse
+    spread_of_data = influences.T @ influences
+    matrix = spread_of_data + (basis.inverse * basis.prior) @ basis.inverse
     free = np.array([_satterthwaite(np.array(own)[:, j], np.array(shared)[:, :, j]) for j in range(n)])
-    data = np.diag(basis.inverse @ meat @ basis.inverse)
-    freedom = np.maximum(_freedom(np.diag(matrix), data**2 / free), 1.0)
+    freedom = np.maximum(_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
     typical = float(np.median(freedom))
     trusted = bool(typical >= LEAST_FREEDOM)
     reason = f"{len(own)} {what}, worth {typical:.1f} degrees of freedom"
     if not trusted:
         reason += f"; under {LEAST_FREEDOM:g} the intervals mislead"
-    return Covariance(kind, matrix, freedom, trusted, reason)
+    return Covariance(kind, matrix, freedom, trusted, reason, influences)
 
 
 def _root(matrix: Array) -> Array:
