@@ -41,6 +41,7 @@ SMOOTHNESS = 3  # p of the bump (1 - s^2)^p
 STRIDE = 4  # bumps begin a quarter of their length apart
 ROUNDS, SETTLED, HALVINGS = 20, 1e-5, 6  # SETTLED: of the levels; factors that are not seen may wander on
 RANK = 1e-8  # of the largest singular value, with columns of unit length: below it a step is left out
+LOOSE = 1.0  # base values: widest prior
 PROBE, CURVED = 0.05, 1e-6  # change of factors at which columns are compared, and what of a column may change
 
 
@@ -86,7 +87,8 @@ def inverse_dynamics(
     Parameters
     ----------
     groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's own.
-    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); inf: none.
+    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); at most 1, so that
+        what these data hardly see stays near its base and makes a start that can be simulated. Clean data outweigh it.
     environment : run -> channel -> value, for what is not logged; 0 by default.
     noise : smooth the runs first by the kinematic filter (EKF + RTS); default: take them as logged.
     window : length of a bump [s]; default: the time for one ship length, at least 8 samples.
@@ -100,7 +102,8 @@ def inverse_dynamics(
     sizes = [[base[path] for path in group] for group in tied] if scale is None else [list(own) for own in scale]
     paths = tuple(group[0] for group in tied)
     centre = np.array([0.0 if base[path] == 0 else 1.0 for path in paths])
-    widths = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
+    given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
+    widths = np.minimum(given, LOOSE)
     model = dynamics(vessel)
     known = _runs(vessel, model, dataset, runs, environment or {}, noise, window)
     problem = _Problem(vessel, model, tied, sizes, known)

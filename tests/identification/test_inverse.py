@@ -126,6 +126,14 @@ def test_noise_is_averaged_not_differentiated() -> None:
     assert np.abs(smoothed.factors - 1).max() < 0.25
 
 
+def test_a_start_can_be_simulated() -> None:
+    """Y_v|r| and Y_r|v| do the same: with noise they would run away from each other by hundreds of base values."""
+    pair = [["hull.derivatives.Y_v|r|"], ["hull.derivatives.Y_r|v|"]]
+    found = inverse_dynamics(SHIP, noisy(1, 0.1), LOG.runs, pair)
+    assert np.abs(found.factors - 1).max() < 2
+    assert found.collinearity.gamma > 15
+
+
 def test_order_of_groups_and_rows_of_other_runs_are_of_no_account() -> None:
     some = LOG.runs[:5]
     one = inverse_dynamics(wrong(MAIN), LOG, some, [[path] for path in MAIN])
