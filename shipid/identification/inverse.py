@@ -87,8 +87,8 @@ def inverse_dynamics(
     Parameters
     ----------
     groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's own.
-    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); at most 1, so that
-        what these data hardly see stays near its base and makes a start that can be simulated. Clean data outweigh it.
+    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); at most 1, so
+        that what data hardly see stays near its base, a start that can be simulated. Clean data outweigh it.
     environment : run -> channel -> value, for what is not logged; 0 by default.
     noise : smooth the runs first by the kinematic filter (EKF + RTS); default: take them as logged.
     window : length of a bump [s]; default: the time for one ship length, at least 8 samples.
