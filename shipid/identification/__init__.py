@@ -1,1 +1,1 @@
-"""Identification: the numbers of a vessel's physics fitted to recorded runs, with honest uncertainty."""
+"""From runs to better physics: parameters fitted to measured motion, and what the data say about them."""

@@ -185,17 +185,18 @@ def _orders(
     model = dynamics(vessel, helmsman)
     records, samples = path.states.shape[0], path.states.shape[2]
 
-    def side_by_side(values: Array) -> Array:  # (num_records, num_samples, channel) -> (channel, all)
-        return values.reshape(records * samples, values.shape[-1]).T
-
     moments = np.minimum(np.arange(records) * every, len(commands[model.commands[0]]) - 1)
     told = np.stack([commands[name][moments] for name in model.commands], axis=-1)
+    if helmsman is None:
+        return {name: told[..., model.commands.index(name)] + 0.0 for name in model.ordered}
     felt = np.zeros((records, samples, len(model.environment)))
     for channel, name in enumerate(model.environment):
         felt[..., channel] = weather[name]
     memory = [path.names.index(f"actual.{name}") for name in model.memory]
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
-    values = np.tile(np.array(list(vessel.parameters.values()))[:, None], (1, records * samples))
-    inputs = [side_by_side(part) for part in (states, path.states[:, 0][..., memory], told, felt)]
-    found = np.array(model.orders.map(records * samples)(*inputs, values))
-    return {name: row.reshape(records, samples) + 0.0 for name, row in zip(model.ordered, found, strict=True)}
+    values = np.array(list(vessel.parameters.values()))
+    # record by record: a map of all is slow to build
+    rows = model.orders.map("rows", "serial", samples, [model.orders.n_in() - 1], [])
+    inputs = (states, path.states[:, 0][..., memory], told, felt)  # (num_records, num_samples, channel)
+    found = np.array([np.array(rows(*(part[k].T for part in inputs), values)) for k in range(records)])
+    return {name: found[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

@@ -19,7 +19,7 @@ from tests.study.tiny import tiny_plan
     ("name", "models", "batches"),
     [
         ("quick", 3 + 2 + 1, 3),
-        ("full-scale", 3 + 1, 3 * 3),
+        ("full-scale", 4 + 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 10),
         ("simulation-small", 4 + 3 + 1 + 1, 3 * 2),
     ],

@@ -1,0 +1,364 @@
+"""Which manoeuvre to run next: the one that tells most about the factors that matter (Bayesian D-optimality).
+
+Each candidate is simulated with the present values and cut into predictions of one horizon, as the fit will do. All are
+replayed with their orders, as logged, by one family rollout that holds every perturbed copy of the parameters; central
+differences are the sensitivities J of the measured signals, and the unknown start of every prediction is projected out.
+The candidate adds J^T J to the information M that there is, and brings
+
+    gain = 1/2 log2 det(M + J^T J)_f / det(M)_f     bits,  ( )_f the Schur complement of the factors that matter,
+
+the expected information of a linear model with normal errors. It is local, right where the present values nearly are,
+and as good as the model: far from what it was fitted to (astern, in a stop) it promises what it cannot know. Bits per
+hour favour short runs, because the first bits cost least; `plan` weighs what is known by then.
+
+Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Verdinelli, Statistical Science 10 (1995)
+273; Goodwin, Payne, Dynamic System Identification (1977), ch. 6; greedy choice is within 1 - 1/e of the best set:
+Nemhauser, Wolsey, Fisher, Mathematical Programming 14 (1978) 265.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.errors import ShipidError, choices
+from shipid.simulation.approach import Controls
+from shipid.simulation.manoeuvre import Excitation, HelmOver, Manoeuvre, Spiral
+from shipid.simulation.perform import perform
+from shipid.simulation.rollout import rollout
+from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
+from shipid.simulation.truth import RPM
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+
+PERTURBED, START = 0.01, {"u": 0.01, "v": 0.01, "r": 0.001, "psi": 0.001, "north": 0.1, "east": 0.1}
+SEEN = {"u": "u", "v": "v", "r": "r", "psi": "psi", "position": "north"}
+POSITION = ("north", "east")
+UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known
+SWING = 0.3  # of the shaft speed: how far it moves in speed runs
+RUN = 20.0  # ship lengths at the speed of the approach that a run of excitation takes
+ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
+    "zigzag": ((10.0, 10.0), (20.0, 20.0), (35.0, 20.0)),
+    "turning": ((10.0,), (20.0,), (35.0,)),
+    "pull-out": ((20.0,),),
+    "stop": ((),),
+}
+"""Standard manoeuvres and angles [deg] that are tried; spirals take hours and are left to who asks for them."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the actuators may be asked for: helm [deg], shaft [rpm], and their rates [deg/s, rpm/s]; None: no limit."""
+
+    angle_deg: float = 35.0
+    n_rpm: float = float("inf")
+    angle_rate_deg: float | None = None
+    shaft_rate_rpm: float | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A manoeuvre that could be run."""
+
+    title: str
+    manoeuvre: Manoeuvre
+
+    @property
+    def hours(self) -> float:
+        """Time that it takes, the approach not counted."""
+        return self.manoeuvre.length / 3600
+
+
+@dataclass(frozen=True)
+class Informed:
+    """What a candidate would add: information (n, n) of the factors, declared standard deviations taken as true."""
+
+    candidate: Candidate
+    information: Array
+
+
+def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
+    """The library at each approach speed [m/s] (default: Froude numbers 0.1 and 0.2), without what breaks a limit.
+
+    Zigzags, turns, a pull-out and a stop; a multisine of helm and shaft; and a speed run, the shaft alone by levels.
+    """
+    length = length_of(vessel)
+    if length is None:
+        raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
+    own = limits or Limits()
+    asked = [share * FROUDE * float(np.sqrt(GRAVITY * length)) for share in (0.5, 1.0)]
+    found = []
+    for speed in speeds or asked:
+        for kind, angles in ANGLES.items():
+            for angle in angles:
+                one = standard(vessel, kind, angle, speed=speed)
+                found.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
+        found += _excitations(vessel, speed, length, own)
+    return [candidate for candidate in found if allowed(candidate.manoeuvre, own)]
+
+
+def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
+    """A speed run and a multisine about one speed, as strong as the limits let them."""
+    n_rpm, passing = shaft_speed(Controls.of(vessel), speed) / RPM, length / speed
+    swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
+    if swing <= 0:
+        return
+    rates = {"angle_rate_deg": limits.angle_rate_deg, "shaft_rate_rpm": limits.shaft_rate_rpm}
+    how: dict[str, Any] = {"n_rpm": n_rpm, "amplitude_rpm": swing, "duration": RUN * passing, **rates}
+    steps = Excitation(signal="aprbs", hold=(2 * passing, 5 * passing), **how)
+    yield Candidate(f"speed run, {n_rpm:.3g} +- {swing:.2g} rpm, {speed:.2g} m/s", steps)
+    angle = min(20.0, limits.angle_deg)
+    waves = Excitation(signal="multisine", angle_deg=angle, period=RUN * passing, harmonics=(1, 12), **how)
+    yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} rpm, {speed:.2g} m/s", waves)
+
+
+def allowed(manoeuvre: Manoeuvre, limits: Limits) -> bool:
+    """Whether no order is beyond the limits; rates bind excitations alone, the actuators have their own."""
+    angle = max((abs(own) for own in manoeuvre.angles_deg), default=0.0) if isinstance(manoeuvre, Spiral) else 0.0
+    if isinstance(manoeuvre, (HelmOver, Excitation)):
+        angle = manoeuvre.angle_deg
+    time = np.linspace(0, manoeuvre.length, 1000)
+    return bool(angle <= limits.angle_deg and np.abs(manoeuvre.shaft(time)).max() <= limits.n_rpm / 60 + 1e-12)
+
+
+def informed(
+    vessel: Vessel,
+    choice: Sequence[Candidate],
+    groups: Sequence[Sequence[str]],
+    *,
+    scale: Sequence[Sequence[float]] | None = None,
+    weights: Mapping[str, float],
+    horizon: float = 30.0,
+    interval: float = 1.0,
+    step: float | None = None,
+    environment: Mapping[str, float] | None = None,
+) -> list[Informed]:
+    """Simulate candidates and say what each adds to the information of the factors.
+
+    Parameters
+    ----------
+    vessel : with the present values. groups, scale : as `inverse_dynamics` takes them.
+    weights : measured signal (u, v, r, psi, position) -> standard deviation [m/s, rad/s, rad, m].
+    horizon : of a prediction [s], 0 for whole runs. interval : between measured rows [s].
+    step : of the integration (RK4) [s]; default: the interval over as much as makes it about 0.2 s by Froude's scale.
+    environment : channel -> value in all runs, such as a wind; calm by default.
+
+    Raises
+    ------
+    ShipidError : a signal that is not known, no candidate, or a candidate that cannot be simulated.
+    """
+    unknown = next((name for name in weights if name not in SEEN), None)
+    if unknown is not None:
+        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, SEEN)}", path="weights")
+    if not choice:
+        raise ShipidError("no manoeuvre is within the limits of the actuators")
+    every = _every(vessel, interval) if step is None else max(round(interval / step), 1)
+    fine = interval / every
+    named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
+    log = perform(vessel, named, step=fine, environment=environment or {})
+    cut = _cut(vessel, log, environment or {}, round(horizon / interval) * every, every)
+    signals = {
+        name: width for own, width in weights.items() for name in (POSITION if own == "position" else (SEEN[own],))
+    }
+    by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
+    each = _projected(by_factor, by_start)
+    return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
+
+
+def _every(vessel: Vessel, interval: float) -> int:
+    """Steps between measured rows: 40 or more while the ship takes for her length at Froude number 0.2."""
+    length = length_of(vessel) or 30.0
+    passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))
+    return max(int(np.ceil(40 * interval / passing)), 1)
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """Predictions side by side: name -> (S,) starts and memories, (T, S) commands and environment.
+
+    runs : (S,) candidate of each. seen : (R, S) whether a record is within its run.
+    """
+
+    start: dict[str, Array]
+    memory: dict[str, Array]
+    commands: dict[str, Array]
+    environment: dict[str, Array]
+    runs: NDArray[np.int64]
+    seen: NDArray[np.bool_]
+
+
+def _cut(vessel: Vessel, log: pd.DataFrame, environment: Mapping[str, float], steps: int, every: int) -> _Cut:
+    """Cut logs into predictions of so many steps, 0 for whole runs; the last, shorter one of each is kept."""
+    model, names = dynamics(vessel), log["run"].to_numpy()
+    bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
+    whole = max(count - 1 for _, count in bounds)
+    most = steps or -(-whole // every) * every
+    firsts, lasts, runs = [], [], []
+    for run, (first, count) in enumerate(bounds):
+        for begin in range(0, max(count - 1 - every, 1), most):
+            firsts.append(first + begin)
+            lasts.append(first + min(begin + most, count - 1))
+            runs.append(run)
+    rows = np.minimum(np.array(firsts) + np.arange(most)[:, None], np.array(lasts))  # (T, S)
+    records = np.array(firsts) + np.arange(0, most + 1, every)[:, None]
+    columns = {str(name): log[name].to_numpy() for name in log.columns if name != "run"}
+    columns["down"] = columns.get("z", np.zeros(len(log)))
+    still = np.zeros(len(log))
+    given = {name: np.full(len(log), float(environment.get(name, 0.0))) for name in model.environment}
+    return _Cut(
+        {name: columns.get(name, still)[rows[0]] for name in (*model.state, *model.hidden)},
+        {name: columns[f"actual.{name}"][rows[0]] for name in model.memory},
+        {name: columns[name][rows] for name in model.commands},
+        {name: columns.get(name, given[name])[rows] for name in model.environment},
+        np.array(runs),
+        records <= np.array(lasts),
+    )
+
+
+def _sensitivities(
+    vessel: Vessel,
+    cut: _Cut,
+    groups: Sequence[Sequence[str]],
+    scale: Sequence[Sequence[float]] | None,
+    signals: Mapping[str, float],
+    step: float,
+    every: int,
+) -> tuple[Array, Array]:
+    """Central differences of the whitened signals: (S, R * signals, n) to factors, (S, R * signals, q) to starts."""
+    names, base = list(vessel.parameters), np.array(list(vessel.parameters.values()))
+    moves = np.zeros((len(groups), len(base)))
+    for j, group in enumerate(groups):
+        for path, size in zip(group, [vessel.parameters[p] for p in group] if scale is None else scale[j], strict=True):
+            moves[j, names.index(path)] = PERTURBED * size
+    copies = np.concatenate([base + moves, base - moves])
+    how: dict[str, Any] = {
+        "step": step,
+        "num_steps": len(next(iter(cut.commands.values()))),
+        "every": every,
+        "method": "rk4",
+    }
+
+    def records(start: dict[str, Array], times: int, parameters: Array) -> Array:  # (R, V, S, signals), whitened
+        def tiled(given: dict[str, Array]) -> dict[str, Array]:
+            return {name: np.concatenate([values] * times, axis=-1) for name, values in given.items()}
+
+        path = rollout(
+            vessel, start, tiled(cut.commands), tiled(cut.environment), parameters=parameters,
+            memory=tiled(cut.memory) if cut.memory else None, keep=tuple(signals), **how,
+        )  # fmt: skip
+        if path.diverged.any():
+            raise ShipidError(f"{vessel.name} diverges with a factor changed by {PERTURBED:.0%}: take a shorter step")
+        return np.asarray(path.states / np.array(list(signals.values())))
+
+    def rows(values: Array) -> Array:  # (R, k, S, signals) -> (S, R * signals, k)
+        inside = np.where(cut.seen[:, None, :, None], values, 0.0)
+        return inside.transpose(2, 0, 3, 1).reshape(len(cut.runs), -1, values.shape[1])
+
+    family = records(cut.start, 1, copies)
+    by_factor = rows((family[:, : len(groups)] - family[:, len(groups) :]) / (2 * PERTURBED))
+    free = [name for name in START if name in ("u", "v", "r") or name in signals]
+    starts = [{**cut.start, name: cut.start[name] + sign * START[name]} for sign in (1, -1) for name in free]
+    begun = {name: np.concatenate([own[name] for own in starts]) for name in cut.start}
+    moved = records(begun, len(starts), base[None])[:, 0]
+    apart = moved.reshape(len(moved), 2, len(free), len(cut.runs), len(signals))
+    sizes = np.array([START[name] for name in free])[:, None, None]
+    return by_factor, rows((apart[:, 0] - apart[:, 1]) / (2 * sizes))
+
+
+def _projected(by_factor: Array, by_start: Array) -> Array:
+    """Information (S, n, n) of each prediction about the factors, its start unknown."""
+    crossed = by_start.swapaxes(1, 2) @ by_factor
+    known = by_start.swapaxes(1, 2) @ by_start
+    return np.asarray(by_factor.swapaxes(1, 2) @ by_factor - crossed.swapaxes(1, 2) @ np.linalg.pinv(known) @ crossed)
+
+
+def rank(
+    found: Sequence[Informed],
+    paths: Sequence[str],
+    present: Array | None = None,
+    focus: Sequence[str] | None = None,
+    by: str = "per_hour",
+) -> pd.DataFrame:
+    """Candidates, best first: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
+
+    Parameters
+    ----------
+    present : (n, n) information that there is; default: each factor known to +-100 %.
+    focus : factors that matter, all by default. by : `per_hour` or `gain`.
+
+    `narrows` is the factor that matters whose standard error the manoeuvre divides most, from `before` to `after`.
+    """
+    table = _table(found, paths, present, focus)
+    return table.sort_values(_criterion(by), ascending=False, ignore_index=True)
+
+
+def plan(
+    found: Sequence[Informed],
+    paths: Sequence[str],
+    count: int,
+    present: Array | None = None,
+    focus: Sequence[str] | None = None,
+    by: str = "per_hour",
+) -> pd.DataFrame:
+    """A programme of trials: the best manoeuvre, then the best after it, and so on; one row each, as `rank`."""
+    there = np.zeros((len(paths), len(paths))) if present is None else present
+    rows = []
+    for _ in range(count):
+        table = _table(found, paths, there, focus)
+        best = int(np.argmax(table[_criterion(by)]))
+        rows.append(table.iloc[[best]])
+        there = there + found[best].information
+    return pd.concat(rows, ignore_index=True)
+
+
+def _criterion(by: str) -> str:
+    if by not in ("gain", "per_hour"):
+        raise ShipidError(f"manoeuvres are ranked by gain or per_hour, not {by!r}")
+    return by
+
+
+def _table(
+    found: Sequence[Informed], paths: Sequence[str], present: Array | None, focus: Sequence[str] | None
+) -> pd.DataFrame:
+    """As `rank`, in the order of the candidates."""
+    own = _focused(paths, focus)
+    there = _present(present, len(paths))
+    before, rows = _errors(there), []
+    for one in found:
+        total = there + one.information
+        gain, after = _bits(total, own) - _bits(there, own), _errors(total)
+        most = own[int(np.argmax(before[own] / after[own]))]
+        rate = gain / one.candidate.hours
+        rows.append((one.candidate.title, one.candidate.hours, gain, rate, paths[most], before[most], after[most]))
+    return pd.DataFrame(rows, columns=["manoeuvre", "hours", "gain", "per_hour", "narrows", "before", "after"])
+
+
+def _focused(paths: Sequence[str], focus: Sequence[str] | None) -> list[int]:
+    unknown = next((path for path in focus or () if path not in paths), None)
+    if unknown is not None:
+        raise ShipidError(f"{unknown!r} is not among the factors: {choices(unknown, paths)}", path="focus")
+    return [j for j, path in enumerate(paths) if focus is None or path in focus]
+
+
+def _present(present: Array | None, count: int) -> Array:
+    """Information there is, never less than that a factor is known to +-100 %."""
+    return np.eye(count) / UNKNOWN**2 + (0.0 if present is None else present)
+
+
+def _bits(information: Array, own: list[int]) -> float:
+    """1/2 log2 det of the Schur complement of the factors that matter."""
+    rest = [j for j in range(len(information)) if j not in own]
+    whole = np.linalg.slogdet(information)[1]
+    others = np.linalg.slogdet(information[np.ix_(rest, rest)])[1] if rest else 0.0
+    return float((whole - others) / (2 * np.log(2)))
+
+
+def _errors(information: Array) -> Array:
+    return np.sqrt(np.diag(np.linalg.inv(information)))

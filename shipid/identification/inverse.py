@@ -1,0 +1,372 @@
+"""A first estimate without simulating: the forces that the measured motion needs, fitted by least squares.
+
+The equations M nu_dot = F are multiplied by a bump phi(t) that moves along the run, and integrated by parts:
+
+    0 = integral of (phi F + phi' M nu) dt
+
+so that nothing measured is differentiated: the weak form. Forces are linear in derivatives and in added mass, since
+M multiplies out, and one linear least-squares problem remains. What enters otherwise (a diameter, a drag coefficient
+inside a root) is found by asking the equations, is linearised about the present value, and the fit repeated.
+
+Measured velocities stand on the right-hand side too, so noise biases this estimate (errors in variables): smooth first
+(`noise`), and take the result as a start, not as an answer.
+
+Source of the weak form: Messenger, Bortz, Journal of Computational Physics 443 (2021) 110525, whose bumps are used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import ANGLES, Dataset, pieces
+from shipid.data.kinematics import STATES, Noise, smooth
+from shipid.errors import DataError
+from shipid.identification.collinearity import Collinearity, collinearity
+from shipid.simulation.scan import memory_along
+from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+
+MEASURED = ("u", "v", "r")
+LEAST_SAMPLES, LENGTHS = 8, 1.0  # a bump lasts so many samples, and so many ship lengths of way, at least
+SMOOTHNESS = 3  # p of the bump (1 - s^2)^p
+STRIDE = 4  # bumps begin a quarter of their length apart
+ROUNDS, SETTLED, HALVINGS = 20, 1e-5, 6  # SETTLED: of the levels; factors that are not seen may wander on
+RANK = 1e-8  # of the largest singular value, with columns of unit length: below it a step is left out
+LOOSE = 1.0  # base values: widest prior
+PROBE, CURVED = 0.05, 1e-6  # change of factors at which columns are compared, and what of a column may change
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """What inverse dynamics found.
+
+    paths, factors : one of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
+    residuals : (m,) force residuals over their standard deviation; jacobian : (m, n) d residual / d factor.
+    clusters, signals : run number, and velocity whose equation it is, of each residual.
+    levels : velocity -> standard deviation of its equation, averaged over a bump [m/s^2, rad/s^2].
+    explained : velocity -> share of the variance of what the base leaves over that the fit explains.
+    collinearity : what these motions can tell apart. settled : whether the iteration ended by itself.
+    """
+
+    paths: tuple[str, ...]
+    factors: Array
+    linear: NDArray[np.bool_]
+    residuals: Array
+    jacobian: Array
+    clusters: NDArray[np.int64]
+    signals: tuple[str, ...]
+    levels: Mapping[str, float]
+    explained: Mapping[str, float]
+    collinearity: Collinearity
+    settled: bool
+
+
+def inverse_dynamics(
+    vessel: Vessel,
+    dataset: Dataset,
+    runs: Sequence[str],
+    groups: Sequence[Sequence[str]],
+    *,
+    scale: Sequence[Sequence[float]] | None = None,
+    prior: Array | None = None,
+    environment: Mapping[str, Mapping[str, float]] | None = None,
+    noise: Noise | None = None,
+    window: float | None = None,
+) -> Inverse:
+    """Fit factors so that the forces explain the motion of the runs.
+
+    Parameters
+    ----------
+    groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's own.
+    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); at most 1, so
+        that what data hardly see stays near its base, a start that can be simulated. Clean data outweigh it.
+    environment : run -> channel -> value, for what is not logged; 0 by default.
+    noise : smooth the runs first by the kinematic filter (EKF + RTS); default: take them as logged.
+    window : length of a bump [s]; default: the time for one ship length, at least 8 samples.
+
+    Raises
+    ------
+    DataError : a run that does not exist, a command that is not logged, runs too short for one bump.
+    """
+    base = vessel.parameters
+    tied = [list(group) for group in groups]
+    sizes = [[base[path] for path in group] for group in tied] if scale is None else [list(own) for own in scale]
+    paths = tuple(group[0] for group in tied)
+    centre = np.array([0.0 if base[path] == 0 else 1.0 for path in paths])
+    given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
+    widths = np.minimum(given, LOOSE)
+    model = dynamics(vessel)
+    known = _runs(vessel, model, dataset, runs, environment or {}, noise, window)
+    problem = _Problem(vessel, model, tied, sizes, known)
+    linear = problem.linear(centre)
+    factors, levels, settled = _solved(problem, centre, widths, bool(linear.all()))
+    residual, jacobian = problem.evaluate(factors)
+    weight = np.array([1 / levels[name] for name in problem.signals])
+    start = problem.evaluate(centre)[0]
+    labels = np.array(problem.signals)
+    explained = {
+        name: float(1 - (residual[labels == name] ** 2).sum() / max((start[labels == name] ** 2).sum(), 1e-300))
+        for name in levels
+    }
+    weighted = jacobian * weight[:, None]
+    return Inverse(
+        paths, factors, linear, residual * weight, weighted, problem.clusters, problem.signals, levels, explained,
+        collinearity(weighted, paths), settled,
+    )  # fmt: skip
+
+
+def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float], bool]:
+    """Gauss-Newton steps on weighted residuals and priors, halved where they do not help; weights from the residuals.
+
+    What no data and no prior see stays at its base: steps are of least norm.
+    """
+    factors, (residual, jacobian) = centre.copy(), problem.evaluate(centre)
+    levels = problem.levels(residual)
+    for round_ in range(ROUNDS):
+        weight = np.array([1 / levels[name] for name in problem.signals])
+        rows = np.vstack([jacobian * weight[:, None], np.diag(1 / widths)])
+        left = np.append(residual * weight, (factors - centre) / widths)
+        lengths = np.sqrt((rows**2).sum(axis=0))
+        lengths = np.where(lengths > 0, lengths, 1.0)
+        step = -np.linalg.lstsq(rows / lengths, left, rcond=RANK)[0] / lengths
+        for _ in range(HALVINGS):
+            trial = factors + step
+            found = (residual + jacobian @ step, jacobian) if linear else problem.evaluate(trial)
+            cost = float(((found[0] * weight) ** 2).sum() + (((trial - centre) / widths) ** 2).sum())
+            if linear or cost <= float(left @ left):
+                break
+            step = step / 2
+        factors, (residual, jacobian) = trial, found
+        after = problem.levels(residual)
+        moved = max(abs(after[name] / levels[name] - 1) for name in levels)
+        levels = after
+        if round_ and moved < SETTLED:
+            return factors, levels, True
+    return factors, levels, False
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """One unbroken stretch: inputs of the equations side by side, and how bumps weigh them.
+
+    inputs : state, memory, commands, environment at each point, channels first.
+    nu : (num_rows, n_dof) velocities. weigh : (num_bumps, num_points) of forces, pull : (num_bumps, num_rows) of nu.
+    """
+
+    run: int
+    inputs: tuple[Array, Array, Array, Array]
+    nu: Array
+    weigh: Array
+    pull: Array
+
+
+class _Problem:
+    """Residuals of all equations and bumps, and their derivatives to the factors."""
+
+    def __init__(
+        self,
+        vessel: Vessel,
+        model: Dynamics,
+        groups: list[list[str]],
+        scales: list[list[float]],
+        stretches: Sequence[_Stretch],
+    ) -> None:
+        self.stretches = stretches
+        self.base = np.array(list(vessel.parameters.values()))
+        names = list(vessel.parameters)
+        self.free = [names.index(path) for group in groups for path in group]
+        self.spread = np.zeros((len(self.free), len(groups)))
+        row = 0
+        for j, own in enumerate(scales):
+            for size in own:
+                self.spread[row, j] = size
+                row += 1
+        velocities = model.state[model.num_dof :]
+        self.rows = [velocities.index(name) for name in MEASURED]
+        equations = _equations(model, tuple(self.free))
+        shared = [equations.n_in() - 1]  # the parameters
+        sizes = {own.inputs[0].shape[1] for own in stretches}
+        by_size = {size: equations.map("equations", "serial", size, shared, []) for size in sizes}
+        self.mapped = [by_size[own.inputs[0].shape[1]] for own in stretches]
+        still = equations(*(np.zeros(equations.size1_in(i)) for i in range(shared[0])), self.base)
+        self.inertia = np.diag(np.array(still[2]))[self.rows]
+        counts = [len(own.weigh) for own in stretches]
+        self.signals = tuple(name for count in counts for name in MEASURED for _ in range(count))
+        self.clusters = np.repeat([own.run for own in stretches], [count * len(MEASURED) for count in counts])
+
+    def evaluate(self, factors: Array) -> tuple[Array, Array]:
+        """Residuals (m,) [m/s^2, rad/s^2] and d residual / d factor (m, n): each equation over the base's inertia."""
+        values = self.base.copy()
+        values[self.free] = self.spread @ factors
+        residuals, jacobians = [], []
+        for own, mapped in zip(self.stretches, self.mapped, strict=True):
+            force, by_force, mass, by_mass = (np.array(out) for out in mapped(*own.inputs, values))
+            dof, points = force.shape
+            free = len(self.free)
+            by_force = by_force.reshape(dof, points, free)
+            mass, by_mass = mass[:, :dof], by_mass[:, :free].reshape(dof, dof, free, order="F")
+            pulled = own.pull @ own.nu  # (bumps, dof): integral of phi' nu
+            residual = own.weigh @ force.T + pulled @ mass.T
+            slope = np.einsum("bp,dpf->bdf", own.weigh, by_force, optimize=True)
+            slope += np.einsum("be,def->bdf", pulled, by_mass)
+            residuals.append((residual[:, self.rows] / self.inertia).T.ravel())
+            kept = slope[:, self.rows] / self.inertia[:, None] @ self.spread
+            jacobians.append(kept.transpose(1, 0, 2).reshape(-1, self.spread.shape[1]))
+        return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def levels(self, residuals: Array) -> dict[str, float]:
+        """Root mean square of each equation's residuals, never 0."""
+        labels = np.array(self.signals)
+        rms = {name: float(np.sqrt((residuals[labels == name] ** 2).mean())) for name in MEASURED}
+        least = 1e-12 * max(max(rms.values()), 1e-12)
+        return {name: max(value, least) for name, value in rms.items()}
+
+    def linear(self, factors: Array) -> NDArray[np.bool_]:
+        """Whether each column stays what it is when all factors change."""
+        rng = np.random.default_rng(0)
+        before = self.evaluate(factors)[1]
+        after = self.evaluate(factors + PROBE * rng.uniform(0.5, 1.0, len(factors)))[1]
+        size = np.linalg.norm(before, axis=0)
+        return np.asarray(np.linalg.norm(after - before, axis=0) <= CURVED * np.maximum(size, 1e-300))
+
+
+@lru_cache(maxsize=16)
+def _equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
+    """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free; derivatives side by side.
+
+    Both come from the accelerations, which are M^-1 (F + tau): M is the inverse of their derivative to tau.
+    """
+    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
+    parameters, dof = ca.SX.sym("parameters", len(model.parameters)), model.num_dof
+    tau = ca.SX.sym("tau", dof)
+    total = tau
+    for term in model.sums:
+        for entry in () if term.arrays is None else term.arrays:
+            total = total + term.function(*inputs, parameters, entry)
+    acceleration = model.rates(*inputs, parameters, total)[dof : 2 * dof]
+    mass = ca.inv(ca.densify(ca.jacobian(acceleration, tau)))
+    force = mass @ ca.substitute(acceleration, tau, ca.SX.zeros(dof))
+    theta = ca.vertcat(*(parameters[i] for i in free))
+    result = [
+        force,
+        ca.densify(ca.jacobian(force, theta)),
+        ca.densify(mass),
+        ca.densify(ca.jacobian(ca.vec(mass), theta)),
+    ]
+    return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
+
+
+def _runs(
+    vessel: Vessel,
+    model: Dynamics,
+    dataset: Dataset,
+    runs: Sequence[str],
+    environment: Mapping[str, Mapping[str, float]],
+    noise: Noise | None,
+    window: float | None,
+) -> list[_Stretch]:
+    """Stretches of the runs that hold a bump."""
+    missing = next((name for name in runs if name not in dataset.runs), None)
+    if missing is not None:
+        raise DataError(f"no run {missing!r}", path="runs")
+    order = {name: number for number, name in enumerate(runs)}
+    found = []
+    for run, rows in pieces(dataset):
+        if run not in order or len(rows) <= LEAST_SAMPLES:
+            continue
+        length = _window(vessel, rows) if window is None else window
+        own = _stretch(vessel, model, order[run], rows, environment.get(run, {}), noise, length)
+        if own is not None:
+            found.append(own)
+    if not found:
+        raise DataError(f"no stretch of these runs is longer than {LEAST_SAMPLES} rows and the window", path="runs")
+    return found
+
+
+def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
+    """Time [s] for one ship length at the run's speed, at least 8 samples, at most a quarter of the run."""
+    t = rows["t"].to_numpy()
+    speed = float(np.sqrt((rows["u"].to_numpy() ** 2 + rows["v"].to_numpy() ** 2).mean()))
+    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    samples = LEAST_SAMPLES * float(np.median(np.diff(t)))
+    return float(max(samples, min(LENGTHS * length / max(speed, 1e-3), (t[-1] - t[0]) / 4)))
+
+
+def _stretch(
+    vessel: Vessel,
+    model: Dynamics,
+    run: int,
+    rows: pd.DataFrame,
+    environment: Mapping[str, float],
+    noise: Noise | None,
+    window: float,
+) -> _Stretch | None:
+    """One stretch; None if it holds no bump."""
+    t = rows["t"].to_numpy(dtype=float)
+    columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
+    columns |= {name: np.unwrap(columns[name]) for name in ANGLES if name in columns}
+    if noise is not None:
+        smoothed = smooth(t, {name: columns[name] for name in STATES}, noise)
+        columns |= {name: smoothed.state(name) for name in STATES}
+    absent = next((name for name in model.commands if name not in columns), None)
+    if absent is not None:
+        raise DataError(f"command {absent!r} is needed by {vessel.name} and not logged", path=str(rows["run"].iloc[0]))
+    zero = np.zeros(len(t))
+    columns |= _aboard(columns, zero)
+    state = np.array([columns.get(name, zero) for name in (*model.state, *model.hidden)])
+    commands = np.array([columns[name] for name in model.commands]).reshape(-1, len(t))
+    reached = memory_along(vessel, {name: columns[name] for name in model.commands}, t) or {}
+    memory = np.array([reached[name] for name in model.memory]).reshape(-1, len(t))
+    given = {name: np.full(len(t), environment[name]) for name in model.environment if name in environment}
+    weather = np.array([given.get(name, columns.get(name, zero)) for name in model.environment]).reshape(-1, len(t))
+    before, after, pull = _bumps(t, window)
+    if not len(pull):
+        return None
+    # an order holds until the next row, so where it changes the end of an interval is a point of its own
+    changed = 1 + np.flatnonzero((np.diff(commands, axis=1) != 0).any(axis=0))
+    rows_at = np.append(np.arange(len(t)), changed)
+    weigh = np.concatenate([before + after, before[:, changed]], axis=1)
+    weigh[:, changed] -= before[:, changed]
+    orders = np.concatenate([commands, commands[:, changed - 1]], axis=1)
+    nu = state[model.num_dof : 2 * model.num_dof].T
+    return _Stretch(run, (state[:, rows_at], memory[:, rows_at], orders, weather[:, rows_at]), nu, weigh, pull)
+
+
+def _aboard(columns: Mapping[str, Array], zero: Array) -> dict[str, Array]:
+    """Velocities along the ship's own axes from those of a log, which are horizontal (`simulation.truth.logged`)."""
+    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
+    v = (columns["v"] + w * np.sin(phi)) / np.cos(phi)
+    u = (columns["u"] - (v * np.sin(phi) + w * np.cos(phi)) * np.sin(theta)) / np.cos(theta)
+    r = (columns["r"] * np.cos(theta) - q * np.sin(phi)) / np.cos(phi)
+    return {"u": u, "v": v, "r": r, "down": columns.get("z", zero)}
+
+
+def _bumps(t: Array, window: float) -> tuple[Array, Array, Array]:
+    """Weights (num_bumps, N) of forces at the end and at the start of intervals, and of velocities; bumps of mean 1.
+
+    phi = c (1 - s^2)^p, s in -1..1 over the window, by the trapezoid rule. The weights of velocities, phi' by the same
+    rule, are corrected so that velocities that are constant, or linear in time, have exactly their accelerations.
+    """
+    first = np.arange(t[0], t[-1] - window + 1e-9 * window, window / STRIDE)
+    s = 2 * (t - first[:, None]) / window - 1
+    rest = 1 - np.minimum(s**2, 1)
+    dt = np.diff(t)
+    part = np.append(dt, 0.0) / 2 + np.append(0.0, dt) / 2  # of each row in the trapezoid rule
+    phi, pull = rest**SMOOTHNESS, -s * rest ** (SMOOTHNESS - 1) * part
+    area = phi @ part
+    kept = (phi > 0).sum(axis=1) >= LEAST_SAMPLES // 2
+    phi, pull = phi[kept] / area[kept, None], pull[kept]
+    pull = pull - pull.sum(axis=1, keepdims=True) * phi * part
+    middle = (phi * part * t).sum(axis=1, keepdims=True)
+    pull = -pull / (pull * (t - middle)).sum(axis=1, keepdims=True)
+    return phi * np.append(0.0, dt) / 2, phi * np.append(dt, 0.0) / 2, pull

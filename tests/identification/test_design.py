@@ -1,0 +1,131 @@
+"""Design: information adds, what excites a parameter ranks first for it, units and limits are respected."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.identification.design import Candidate, Informed, Limits, candidates, informed, plan, rank
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.standard import standard
+from shipid.vessel.load import load_vessel
+
+SHIP = load_vessel("gunnerus-28.9")
+WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
+PATHS = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "Y_ur", "N_ur", "N_r|r|"))
+GROUPS = [[path] for path in PATHS]
+CHOICE = candidates(SHIP, [3.0])
+FOUND = informed(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
+
+
+def kind(title: str) -> str:
+    return title.split(",")[0].split(" ")[0]
+
+
+def alone(path: str, by: str) -> list[str]:
+    """Manoeuvres in order, for one factor that is the only one unknown."""
+    j = PATHS.index(path)
+    own = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in FOUND]
+    return list(rank(own, (path,), by=by)["manoeuvre"])
+
+
+def test_what_excites_a_parameter_ranks_first_for_it() -> None:
+    """Drag: the speed run, which turns nothing. Yaw damping: a zigzag or a hard turn, a speed run last of all."""
+    assert kind(alone("hull.derivatives.X_u|u|", "per_hour")[0]) == "speed"
+    yaw = alone("hull.derivatives.N_r|r|", "per_hour")
+    assert kind(yaw[0]) == "zigzag"
+    for by in ("gain", "per_hour"):
+        assert kind(alone("hull.derivatives.N_r|r|", by)[-1]) == "speed"
+
+
+def test_a_speed_run_says_nothing_of_yaw() -> None:
+    run = next(one for one in FOUND if one.candidate.title.startswith("speed"))
+    np.testing.assert_allclose(run.information[1:, 1:], 0, atol=1e-9 * run.information[0, 0])
+
+
+def test_information_adds() -> None:
+    """Two runs bring what the first and then the second bring; more never harms; the second of a kind brings less."""
+    table = rank(FOUND, PATHS).set_index("manoeuvre")
+    first = FOUND[0]
+    then = rank(FOUND, PATHS, first.information).set_index("manoeuvre")
+    other = FOUND[1]
+    both = Informed(other.candidate, first.information + other.information)
+    assert rank([both], PATHS)["gain"][0] == pytest.approx(
+        table["gain"][first.candidate.title] + then["gain"][other.candidate.title]
+    )
+    assert (table["gain"] > 0).all()
+    assert (then["gain"] < table["gain"].reindex(then.index)).all()
+
+
+def test_ranks_do_not_depend_on_scales_of_factors() -> None:
+    """Gains are ratios of determinants: with the present information scaled alike, they are the same."""
+    scale, there = np.diag([1e3, 1.0, 1e-2, 5.0]), np.diag([4.0, 25.0, 9.0, 1e4])
+    scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in FOUND]
+    one = rank(FOUND, PATHS, there - np.eye(4))
+    other = rank(scaled, PATHS, scale @ there @ scale - np.eye(4))
+    assert list(one["manoeuvre"]) == list(other["manoeuvre"])
+    np.testing.assert_allclose(one["gain"], other["gain"], rtol=1e-6)
+
+
+def test_twice_the_value_is_twice_the_sensitivity() -> None:
+    """The unknown is a factor on `scale`: information goes with its square."""
+    double = informed(
+        SHIP, CHOICE[:1], GROUPS, scale=[[2 * SHIP.parameters[path]] for path in PATHS], weights=WEIGHTS
+    )  # fmt: skip
+    np.testing.assert_allclose(double[0].information, 4 * FOUND[0].information, rtol=1e-2)
+
+
+def test_only_what_matters_counts() -> None:
+    """Of one factor alone that matters, the gain is what its standard error shrinks by, in bits."""
+    table = rank(FOUND, PATHS, focus=["hull.derivatives.N_ur"])
+    np.testing.assert_allclose(table["gain"], np.log2(table["before"] / table["after"]), rtol=1e-6)
+    assert (table["narrows"] == "hull.derivatives.N_ur").all()
+
+
+def test_sensitivities_are_those_of_the_trajectory() -> None:
+    """Free starts cost information; half the standard deviation brings four times as much; longer predictions more."""
+    short = informed(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
+    sharp = informed(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[0].information
+    assert (np.diag(short) < np.diag(FOUND[0].information)).all()
+    np.testing.assert_allclose(sharp, 4 * FOUND[0].information, rtol=1e-9)
+
+
+def test_a_programme_goes_on_from_what_is_known_by_then() -> None:
+    found = plan(FOUND, PATHS, 3, by="gain")
+    assert found["manoeuvre"][0] == rank(FOUND, PATHS, by="gain")["manoeuvre"][0]
+    assert (np.diff(found["gain"]) < 0).all()
+
+
+def test_limits_of_the_actuators_hold() -> None:
+    weak = candidates(SHIP, [3.0], Limits(angle_deg=15.0, n_rpm=120.0))
+    angles = [getattr(one.manoeuvre, "angle_deg", 0.0) for one in weak]
+    time = np.linspace(0, 100, 200)
+    assert max(angles) <= 15.0
+    assert max(np.abs(one.manoeuvre.shaft(time)).max() for one in weak) <= 2.0 + 1e-9
+    assert len(weak) < len(CHOICE)
+
+
+def test_position_and_heading_and_whole_runs_count() -> None:
+    more = {**WEIGHTS, "psi": 0.01, "position": 1.0}
+    own = Candidate("zigzag", standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
+    one = informed(SHIP, [own], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
+    all_ = informed(SHIP, [own], GROUPS, weights=more, horizon=0.0)[0].information
+    assert np.linalg.eigvalsh(all_ - one).min() > -1e-6 * np.trace(one)
+    assert all_[2, 2] > 1.1 * one[2, 2]
+
+
+def test_mistakes_are_told() -> None:
+    with pytest.raises(ShipidError, match="position"):
+        informed(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
+    with pytest.raises(ShipidError, match="within the limits"):
+        informed(SHIP, candidates(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
+    with pytest.raises(ShipidError, match="N_ur"):
+        rank(FOUND, PATHS, focus=["hull.derivatives.N_urr"])
+
+
+def test_a_zigzag_is_replayed_as_logged() -> None:
+    """Copies get the orders of the log: the helmsman would answer each copy in his own way, at whole steps."""
+    own = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
+    fine, coarse = (informed(SHIP, [own], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
+    np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)

@@ -1,0 +1,153 @@
+"""Inverse dynamics: simulated forces are found again, whatever they are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.data.kinematics import Noise
+from shipid.errors import DataError
+from shipid.identification.inverse import inverse_dynamics
+from shipid.simulation.truth import Truth, simulate
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import variety
+
+SHIP = load_vessel("gunnerus-28.9")
+MAIN = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "X_rv", "Y_ur", "Y_rrr", "N_ur", "N_rrr", "N_r|r|"))
+MASS = ("inertia.m", "added_mass.Y_vdot", "added_mass.N_rdot")
+D_P = [("thruster.port.D_p", "thruster.starboard.D_p")]
+
+
+def sailed(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
+    given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "start_speed": (1, 4), **more}
+    return Dataset(simulate(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
+
+
+LOG = sailed()
+
+
+def wrong(paths: tuple[str, ...], low: float = 0.7, high: float = 1.3, vessel: Vessel = SHIP) -> Vessel:
+    """The ship with other values at these paths."""
+    factors = np.random.default_rng(0).uniform(low, high, len(paths))
+    return vessel.with_values({path: vessel.parameters[path] / k for path, k in zip(paths, factors, strict=True)})
+
+
+def truth(base: Vessel, paths: tuple[str, ...], vessel: Vessel = SHIP) -> np.ndarray:
+    return np.array([vessel.parameters[path] / base.parameters[path] for path in paths])
+
+
+def test_derivatives_are_found() -> None:
+    base = wrong(MAIN)
+    found = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN])
+    assert found.linear.all()
+    assert found.settled
+    assert min(found.explained.values()) > 0.99999
+    np.testing.assert_allclose(found.factors, truth(base, MAIN), rtol=2e-3)
+
+
+def test_inertia_is_linear_too() -> None:
+    """M multiplies out: mass and added mass next to derivatives."""
+    base = wrong(MAIN + MASS, 0.9, 1.1)
+    found = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN + MASS])
+    assert found.linear.all()
+    np.testing.assert_allclose(found.factors, truth(base, MAIN + MASS), rtol=1e-2)
+
+
+def test_a_diameter_is_not_linear_and_found_by_iterating() -> None:
+    """Both propellers share one factor; thrust goes with its fourth power and more."""
+    base = wrong((*MAIN, *D_P[0])).with_values(dict.fromkeys(D_P[0], 1.9 / 1.15))
+    found = inverse_dynamics(base, LOG, LOG.runs, [*([path] for path in MAIN), *D_P])
+    assert found.linear.tolist() == [True] * len(MAIN) + [False]
+    assert found.paths[-1] == D_P[0][0]
+    np.testing.assert_allclose(found.factors, [*truth(base, MAIN), 1.15], rtol=5e-3)
+
+
+def test_a_derivative_that_the_base_lacks_needs_a_scale() -> None:
+    base = SHIP.with_values({"hull.derivatives.N_ur": 0.0})
+    found = inverse_dynamics(base, LOG, LOG.runs, [["hull.derivatives.N_ur"]], scale=[[-1e6]])
+    assert found.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "actuators", "six"])
+def test_every_structure_is_found(name: str) -> None:
+    """Its greatest forces: the first three hull parameters that data see best."""
+    vessel = variety()[name]
+    small = name == "kvlcc2-l7"
+    speeds = {"n_rpm": (300.0, 700.0), "start_speed": (0.6, 1.2)} if small else {"start_speed": (3.0, 7.0)}
+    log = sailed(vessel, alpha_deg=(-30, 30), **speeds)  # type: ignore[arg-type]
+    paths = tuple(path for path in vessel.parameters if path.startswith("hull."))
+    seen = inverse_dynamics(vessel, log, log.runs, [[path] for path in paths]).collinearity.sensitivity
+    main = tuple(paths[j] for j in np.argsort(-seen)[:3])
+    base = wrong(main, 0.8, 1.2, vessel)
+    found = inverse_dynamics(base, log, log.runs, [[path] for path in main])
+    np.testing.assert_allclose(found.factors, truth(base, main, vessel), rtol=2e-2)
+
+
+def test_orders_that_jump_within_a_bump_do_no_harm() -> None:
+    """The helm goes over in the middle of a run: forces jump, and the integral has the jump where it is."""
+    from shipid.simulation.manoeuvre import TurningCircle
+    from shipid.simulation.perform import perform
+
+    circle = TurningCircle(n_rpm=150, duration=80, execute_at=30)
+    log = Dataset(perform(SHIP, [circle], step=0.05, interval=0.2), {})
+    base = wrong(MAIN)
+    found = inverse_dynamics(base, log, log.runs, [["hull.derivatives.N_ur"]])
+    exact = inverse_dynamics(SHIP, log, log.runs, [["hull.derivatives.N_ur"]])
+    assert exact.factors[0] == pytest.approx(1, abs=1e-3)
+    assert abs(found.factors[0] - 1) > 0.01  # what the others lack goes somewhere
+
+
+def test_what_data_do_not_see_stays_at_the_base_and_priors_hold() -> None:
+    still = ["wind.A_FW"]  # no wind in these runs, but the ship's own
+    low = Dataset(LOG.frame.assign(V_w=0.0), LOG.metadata)
+    free = inverse_dynamics(SHIP, low, low.runs, [["hull.derivatives.N_ur"], ["thruster.port.k_over2"]])
+    assert free.factors[1] == pytest.approx(1)
+    base = SHIP.with_values({"hull.derivatives.N_ur": -2e6})
+    tight = inverse_dynamics(base, low, low.runs, [["hull.derivatives.N_ur"], still], prior=np.array([1e-9, 1e-9]))
+    np.testing.assert_allclose(tight.factors, 1, atol=1e-6)
+
+
+def noisy(seed: int, level: float = 0.02) -> Dataset:
+    rng, frame = np.random.default_rng(seed), LOG.frame.copy()
+    for name, size in {"u": level, "v": level, "r": 0.1 * level, "psi": 0.002, "north": 0.3, "east": 0.3}.items():
+        frame[name] = frame[name] + rng.normal(0, size, len(frame))
+    return Dataset(frame, LOG.metadata)
+
+
+def test_noise_is_averaged_not_differentiated() -> None:
+    """0.02 m/s at 5 Hz would be an acceleration noise of 0.14 m/s^2; each equation errs by a twentieth of that."""
+    log = noisy(0)
+    found = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN])
+    assert found.levels["u"] < 0.007
+    sea = Noise({"north": 0.3, "east": 0.3, "psi": 0.002, "u": 0.02, "v": 0.02, "r": 0.002}, 0.1, 0.02)
+    smoothed = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN], noise=sea)
+    assert np.abs(smoothed.factors - 1).max() < 0.25
+
+
+def test_a_start_can_be_simulated() -> None:
+    """Y_v|r| and Y_r|v| do the same: with noise they would run away from each other by hundreds of base values."""
+    pair = [["hull.derivatives.Y_v|r|"], ["hull.derivatives.Y_r|v|"]]
+    found = inverse_dynamics(SHIP, noisy(1, 0.1), LOG.runs, pair)
+    assert np.abs(found.factors - 1).max() < 2
+    assert found.collinearity.gamma > 15
+
+
+def test_order_of_groups_and_rows_of_other_runs_are_of_no_account() -> None:
+    some = LOG.runs[:5]
+    one = inverse_dynamics(wrong(MAIN), LOG, some, [[path] for path in MAIN])
+    only = Dataset(LOG.frame[LOG.frame["run"].isin(some)].reset_index(drop=True), LOG.metadata)
+    other = inverse_dynamics(wrong(MAIN), only, some[::-1], [[path] for path in MAIN[::-1]])
+    np.testing.assert_allclose(one.factors, other.factors[::-1], rtol=1e-6)
+
+
+def test_mistakes_are_told() -> None:
+    with pytest.raises(DataError, match="no run 'M999'"):
+        inverse_dynamics(SHIP, LOG, ["M999"], [[MAIN[0]]])
+    without = Dataset(LOG.frame.drop(columns="port.n"), LOG.metadata)
+    with pytest.raises(DataError, match=r"port\.n"):
+        inverse_dynamics(SHIP, without, LOG.runs, [[MAIN[0]]])
+    short = Dataset(pd.DataFrame(LOG.frame.groupby("run").head(4)), LOG.metadata)
+    with pytest.raises(DataError, match="longer"):
+        inverse_dynamics(SHIP, short, LOG.runs, [[MAIN[0]]])

@@ -1,0 +1,213 @@
+"""Statistics of a fit: intervals cover, what is not identified is named, nothing depends on units or order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.identification.statistics import Fit, blocks, identifiable_subset, statistics
+from tests.identification.linear import SIGNALS, design, fitted, labels, noise
+
+RUNS, SAMPLES, COUNT = 20, 80, 6
+JACOBIAN = design(RUNS, SAMPLES, COUNT)
+CLUSTERS, NAMES = labels(RUNS, SAMPLES)
+
+
+def one(phi: float = 0.0, seed: int = 3, **more: object) -> Fit:
+    return fitted(JACOBIAN, noise(np.random.default_rng(seed), RUNS, SAMPLES, phi), CLUSTERS, NAMES, **more)
+
+
+@pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (8, 60, 0.8), (4, 200, 0.8)])
+def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, phi: float) -> None:
+    """200 replicates: 95 % on average within 92..98, no parameter below 90."""
+    jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
+    rng, covered = np.random.default_rng(1), np.zeros(COUNT)
+    for _ in range(200):
+        found = statistics(fitted(jacobian, noise(rng, runs, samples, phi), clusters, signals))
+        covered += (found.low <= 1) & (found.high >= 1)
+    assert 0.92 <= covered.mean() / 200 <= 0.98
+    assert covered.min() / 200 >= 0.90
+
+
+def test_which_form_is_chosen() -> None:
+    assert statistics(one(0.0)).chosen == "fisher"
+    coloured = statistics(one(0.8))
+    assert coloured.chosen == "sandwich"
+    assert not coloured.covariances["fisher"].trusted
+    few = fitted(
+        design(3, 400, 3), noise(np.random.default_rng(0), 3, 400, 0.8), *labels(3, 400)
+    )  # 3 runs are under 4 degrees of freedom
+    assert statistics(few).chosen == "blocks"
+    assert "mislead" in statistics(few).covariances["sandwich"].reason
+
+
+def test_fisher_is_the_textbook_formula() -> None:
+    """One signal, no prior: s^2 (J^T J)^-1, n - p degrees of freedom."""
+    rows = np.array(NAMES) == "u"
+    jacobian = JACOBIAN[rows]
+    fit = fitted(jacobian, np.random.default_rng(0).normal(size=len(jacobian)), CLUSTERS[rows], ("u",) * rows.sum())
+    found = statistics(fit).covariances["fisher"]
+    freedom = len(jacobian) - COUNT
+    expected = fit.residuals @ fit.residuals / freedom * np.linalg.inv(jacobian.T @ jacobian)
+    np.testing.assert_allclose(found.matrix, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.freedom, freedom)
+    np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
+
+
+def test_sandwich_of_single_samples_is_hc2() -> None:
+    """Clusters of one residual each: CR2 is HC2 of MacKinnon and White (1985)."""
+    rows = np.array(NAMES) == "u"
+    jacobian = JACOBIAN[rows][:200]
+    error = np.random.default_rng(0).normal(size=200)
+    found = statistics(fitted(jacobian, error, np.arange(200), ("u",) * 200))
+    fit, inverse = found.fit, np.linalg.inv(jacobian.T @ jacobian)
+    leverage = np.einsum("mi,ij,mj->m", jacobian, inverse, jacobian)
+    weights = fit.residuals**2 / (1 - leverage)
+    expected = inverse @ (jacobian.T * weights) @ jacobian @ inverse
+    np.testing.assert_allclose(found.covariances["sandwich"].matrix, expected, rtol=1e-9)
+
+
+def test_freedom_of_a_mean_over_equal_clusters() -> None:
+    """G equal clusters, one mean: Satterthwaite gives G - 1."""
+    clusters = np.repeat(np.arange(7), 12)
+    fit = fitted(np.ones((84, 1)), np.random.default_rng(0).normal(size=84), clusters, ("u",) * 84)
+    assert statistics(fit).covariances["sandwich"].freedom[0] == pytest.approx(6)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_scaling_a_parameter_scales_its_interval(phi: float) -> None:
+    fit, scale = one(phi), np.array([1e-6, 1.0, 1e3, 1e6, 0.1, 7.0])
+    scaled = replace(fit, jacobian=fit.jacobian / scale, factors=fit.factors * scale)
+    np.testing.assert_allclose(statistics(scaled).errors, statistics(fit).errors * scale, rtol=1e-6)
+    np.testing.assert_allclose(statistics(scaled).correlations, statistics(fit).correlations, atol=1e-9)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
+    fit, rng = one(phi), np.random.default_rng(5)
+    found = statistics(fit)
+    rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
+    columns = rng.permutation(COUNT)
+    moved = Fit(
+        tuple(fit.paths[j] for j in columns),
+        fit.factors[columns],
+        fit.residuals[rows],
+        fit.jacobian[np.ix_(rows, columns)],
+        fit.clusters[rows],
+        tuple(fit.signals[k] for k in rows),
+    )
+    np.testing.assert_allclose(statistics(moved).errors, found.errors[columns], rtol=1e-8)
+    assert [statistics(moved).sentences[k] for k in range(COUNT)] == [found.sentences[j] for j in columns]
+
+
+def test_declared_levels_that_are_wrong_do_no_harm() -> None:
+    """All residuals and sensitivities over ten times the standard deviation: the same intervals."""
+    fit = one(0.0)
+    other = replace(fit, residuals=fit.residuals / 10, jacobian=fit.jacobian / 10)
+    np.testing.assert_allclose(statistics(other).errors, statistics(fit).errors, rtol=1e-9)
+
+
+def test_levels_and_memory_are_measured() -> None:
+    """An AR(1) of 0.8 has an integrated correlation time of (1 + 0.8) / (1 - 0.8) = 9 samples."""
+    colours = statistics(one(0.0)).whiteness
+    assert {name: round(colours[name].level, 1) for name in SIGNALS} == {"u": 1.3, "v": 0.6, "r": 1.0}
+    assert all(colour.white for colour in colours.values())
+    coloured = statistics(one(0.8)).whiteness
+    assert np.mean([colour.memory for colour in coloured.values()]) == pytest.approx(9, rel=0.25)
+    assert not any(colour.white for colour in coloured.values())
+
+
+def test_a_pair_that_acts_as_one_is_named() -> None:
+    """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is told, others are."""
+    jacobian = JACOBIAN.copy()
+    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
+    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    assert found.identifiable.tolist() == [False, False, True, True, True, True]
+    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 is not seen" in found.sentences[0]
+
+
+def test_directions_say_how_well_combinations_are_known() -> None:
+    """Of p0 + p1 / 2 and p0 - p1 / 2, one is known and one is not; errors are those of a fit along each alone."""
+    jacobian = JACOBIAN[:, :2].copy()
+    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-4 * jacobian[:, 1]
+    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    (seen, small), (unseen, wide) = found.directions()
+    assert seen == pytest.approx({"p0": 1.0, "p1": 0.5}, rel=1e-3)
+    assert unseen == pytest.approx({"p0": 1.0, "p1": -0.5}, rel=1e-3)
+    assert small < 0.01
+    assert wide > 100
+
+
+def test_what_has_no_effect_is_named() -> None:
+    jacobian = JACOBIAN.copy()
+    jacobian[:, 2] = 0
+    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    assert np.isinf(found.high[2])
+    assert not found.identifiable[2]
+    assert found.identifiable.sum() == COUNT - 1
+    assert "p2 has no effect" in found.sentences[2]
+
+
+def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
+    jacobian = JACOBIAN.copy()
+    jacobian[:, 2] *= 1e-4
+    error, widths = noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), np.full(COUNT, 0.2)
+    found = statistics(fitted(jacobian, error, CLUSTERS, NAMES, prior_widths=widths))
+    assert found.errors[2] == pytest.approx(0.2, rel=1e-3)
+    assert not found.identifiable[2]
+    assert found.alone[2] > 10
+
+
+def test_what_stands_at_a_bound_has_no_interval_and_harms_no_other() -> None:
+    bound = np.array([False, True, False, False, False, False])
+    found = statistics(one(at_bound=bound))
+    assert np.isinf(found.high[1])
+    assert "bound" in found.sentences[1]
+    without = replace(
+        one(), **{"paths": tuple("abcde"), "factors": np.ones(5), "jacobian": np.delete(one().jacobian, 1, axis=1)}
+    )
+    np.testing.assert_allclose(found.errors[~bound], statistics(without).errors, rtol=1e-9)
+
+
+def test_nuisances_cost_degrees_of_freedom() -> None:
+    """A free level for each run and signal, projected out: the level of the noise stays right."""
+    error = noise(np.random.default_rng(0), RUNS, 8, 0.0)
+    shape = (RUNS * 3, 8)
+
+    def centred(values: np.ndarray) -> np.ndarray:
+        parts = values.reshape(*shape, -1)
+        return (parts - parts.mean(axis=1, keepdims=True)).reshape(len(values), -1)
+
+    jacobian = centred(design(RUNS, 8, 3))
+    fit = fitted(jacobian, centred(error[:, None])[:, 0], *labels(RUNS, 8), spent=np.full(len(error), 1 / 8))
+    levels = {name: colour.level for name, colour in statistics(fit).whiteness.items()}
+    plain = {name: colour.level for name, colour in statistics(replace(fit, spent=None)).whiteness.items()}
+    assert levels["u"] == pytest.approx(1.3, abs=0.15)
+    assert levels["u"] / plain["u"] == pytest.approx(np.sqrt(8 / 7), rel=0.01)
+
+
+def test_blocks_cut_all_signals_at_the_same_times() -> None:
+    own = blocks(one(), 20)
+    assert len(np.unique(own)) == RUNS * 4
+    for run in range(RUNS):
+        u, v, r = (own[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
+        assert (u == v).all()
+        assert (v == r).all()
+
+
+def test_the_subset_that_data_carry() -> None:
+    jacobian = JACOBIAN.copy()
+    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
+    fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES)
+    assert identifiable_subset(fit) == ("p1", "p2", "p3", "p4", "p5")
+
+
+def test_fits_without_a_meaning_are_refused() -> None:
+    fit = one()
+    with pytest.raises(ShipidError, match="take more data"):
+        replace(fit, residuals=fit.residuals[:5], jacobian=fit.jacobian[:5], clusters=CLUSTERS[:5], signals=NAMES[:5])
+    with pytest.raises(ShipidError, match="finite"):
+        replace(fit, residuals=fit.residuals * np.nan)
