@@ -204,11 +204,9 @@ class Intervals:
         return len(self.run)
 
     def _log(self, number: int, first: int) -> list[float]:
-        segment, entries = self.fit.segments[number], self.fit.model.begin.size1_in(0)
-        names = list(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *self.fit.model.states)))
-        assert len(names) == entries
-        columns = {**segment.columns, **{f: segment.columns[c] for f, c in COLUMNS.items() if c in segment.columns}}
-        own = [float(columns[name][first]) if name in columns else 0.0 for name in names]
+        segment = self.fit.segments[number]
+        found = (segment.columns.get(COLUMNS.get(name, name)) for name in self.fit.model.entries)
+        own = [0.0 if column is None else float(column[first]) for column in found]
         if self.fit.layout.carried:
             own += [float(segment.memory[name][first]) for name in self.fit.layout.model.memory]
         return own
@@ -273,9 +271,9 @@ class Intervals:
         both = np.concatenate(parts, axis=1)
         slope = np.zeros((count, num_nodes, width + nuisances.shape[1] - self.fit.layout.num_moving))
         slope[:, :, :width] = both[:, :, 1:]
-        r = record[:, :, :num_signals].reshape(count, -1)
-        R = record[:, :, num_signals:].reshape(count, self.length, -1, num_signals).transpose(0, 2, 1, 3)
-        return Evaluation(both[:, :, 0], slope, r, R.reshape(count, R.shape[1], -1))
+        r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
+        R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).transpose(0, 1, 3, 2, 4)
+        return Evaluation(both[:, :, 0], slope, r, R.reshape(-1, R.shape[2], r.shape[1])[:count])
 
 
 @dataclass(frozen=True, eq=False)

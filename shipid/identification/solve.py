@@ -160,10 +160,10 @@ def _solved(
         if word in ("ok", "stopped"):
             break
     assert objective_start is not None
-    lost = problem.lost(begin)
-    if word == "not converged" and lost.any():
-        word = "diverged"
-    where = fit.runs[problem.intervals.run[np.argmax(lost)]] if lost.any() else None
+    where = None
+    if word in ("not converged", "diverged"):
+        lost = problem.lost(begin)
+        word, where = ("diverged", fit.runs[problem.intervals.run[np.argmax(lost)]]) if lost.any() else (word, None)
     return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
 
 

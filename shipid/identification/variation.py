@@ -49,7 +49,7 @@ class Layout:
         """Nuisances that change how the ship moves."""
         return sum(name in MOVING for name in self.nuisances)
 
-    @property
+    @cached_property
     def carried(self) -> bool:
         """Whether the memory of actuators depends on what is unknown."""
         free = any(".actuator." in path for group in self.groups for path in group)
@@ -81,6 +81,11 @@ class Variation:
     begin_slope: ca.Function
     states: tuple[str, ...]
     node: tuple[str, ...]
+
+    @cached_property
+    def entries(self) -> tuple[str, ...]:
+        """Names of what `begin` takes as measured."""
+        return _entries(self.states)
 
     @property
     def num_columns(self) -> int:
@@ -243,7 +248,7 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
 
 def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     """Columns of a log at an instant, and the states that `_signals` turns into them."""
-    entry = {name: SX.sym(name) for name in dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states))}
+    entry = {name: SX.sym(name) for name in _entries(states)}
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
     u, v = (entry[name] - value_of.get(f"velocity_bias_{name}", zero) for name in ("u", "v"))
@@ -252,6 +257,11 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * entry["r"], "psi": psi}
     true |= {"north": entry["north"] - x * ca.cos(psi), "east": entry["east"] - x * ca.sin(psi)}
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
+
+
+def _entries(states: Sequence[str]) -> tuple[str, ...]:
+    """What a start is read from: the states, and what the faults of a log mix with them."""
+    return tuple(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states)))
 
 
 def _needed(layout: Layout, names: Sequence[str], rates_of: Any) -> list[int]:
@@ -279,10 +289,10 @@ def scan(layout: Layout, num_steps: int) -> ca.Function:
 
 
 def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """Ends (K, size) and outputs (K, N, entries) of K intervals; x (K, size), fixed (K, .), known, seen (K, N, .)."""
+    """Ends (K, size) and outputs (1, K, N, .) of K intervals; x (K, size), fixed (K, .), known and seen (K, N, .)."""
     count, num_steps = known.shape[:2]
     with uninterrupted():
         end, record = scan(layout, num_steps).map(count)(
             x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
         )
-    return np.array(end).T, np.array(record).T.reshape(count, num_steps, -1)
+    return np.array(end).T, np.array(record).T.reshape(1, count, num_steps, -1)
