@@ -39,7 +39,7 @@ SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "
     **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
 }
 """Ordinary error of a state that is not fitted [SI]: the scale on which the solver sees it."""
-COMPILE_FROM = 1e5  # steps times entries of the sensitivities: below it the virtual machine is done sooner
+COMPILE_FROM = 4e4  # steps times entries of the sensitivities: below it the virtual machine is done sooner
 MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
