@@ -6,7 +6,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,12 +95,18 @@ def flag_bit(metadata: dict[str, Any], name: str) -> int:
 
 def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
     """Unbroken stretches of every run, as (run, rows): a new one starts at each row flagged `break`."""
-    bit = flag_bit(dataset.metadata, BREAK)
-    for name, rows in dataset.frame.groupby("run", sort=False):
-        broken = (rows["flags"].to_numpy() & bit) != 0
-        starts = np.flatnonzero(broken[1:]) + 1
-        for first, last in zip([0, *starts], [*starts, len(rows)], strict=True):
-            yield str(name), rows.iloc[first:last]
+    for name, places in stretches(dataset):
+        yield name, dataset.frame.iloc[places]
+
+
+def stretches(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Where the rows of every `piece` stand in the table."""
+    broken = (dataset.frame["flags"].to_numpy() & flag_bit(dataset.metadata, BREAK)) != 0
+    for name, places in dataset.frame.groupby("run", sort=False).indices.items():
+        own = np.asarray(places)
+        starts = np.flatnonzero(broken[own[1:]]) + 1
+        for first, last in zip([0, *starts], [*starts, len(own)], strict=True):
+            yield str(name), own[first:last]
 
 
 def clock_slack(t: Array) -> float:
@@ -117,20 +123,20 @@ def cumulative_integral(t: Array, rate: Array) -> Array:
     return np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
 
 
-def sample(rows: pd.DataFrame, instants: Array) -> dict[str, NDArray[Any]]:
+def sample(rows: pd.DataFrame | Mapping[str, NDArray[Any]], instants: Array) -> dict[str, NDArray[Any]]:
     """Every column of one unbroken stretch at given instants [s] (any shape): name -> array of that shape.
 
     States and wind are linear between rows (angles unwrapped first); commands and flags keep the value of the last
     row at or before the instant, because an order holds until the next one.
     """
-    t = rows["t"].to_numpy()
+    t = np.asarray(rows["t"])
     # t0 + 3 * 0.1 must find the row written as 0.3, but no row of the future
     last = np.clip(np.searchsorted(t, instants + clock_slack(t), side="right") - 1, 0, len(t) - 1)
     result: dict[str, NDArray[Any]] = {}
-    for name in map(str, rows.columns):
+    for name in map(str, rows):
         if name in ("run", "t"):
             continue
-        values = rows[name].to_numpy()
+        values = np.asarray(rows[name])
         if name == "flags" or is_command(name):
             result[name] = values[last]
         else:

@@ -153,7 +153,7 @@ def unpack(array: Array, count: int) -> Array:
 
 
 def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """As `variation.run_machine`, but known and seen are packed."""
+    """As `variation.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
     run, count, model = _library(layout), len(x), variation(layout)
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]
@@ -170,4 +170,4 @@ def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arr
         edges = np.linspace(0, groups, threads + 1).astype(int).tolist()
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(part, edges[:-1], edges[1:]))
-    return unpack(state, count), unpack(records, count)
+    return unpack(state, count), np.moveaxis(records, -1, 1)

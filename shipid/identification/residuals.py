@@ -39,7 +39,7 @@ SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "
     **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
 }
 """Ordinary error of a state that is not fitted [SI]: the scale on which the solver sees it."""
-COMPILE_FROM = 1e5  # steps times entries of the sensitivities: below it the virtual machine is done sooner
+COMPILE_FROM = 4e4  # steps times entries of the sensitivities: below it the virtual machine is done sooner
 MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
@@ -204,11 +204,9 @@ class Intervals:
         return len(self.run)
 
     def _log(self, number: int, first: int) -> list[float]:
-        segment, entries = self.fit.segments[number], self.fit.model.begin.size1_in(0)
-        names = list(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *self.fit.model.states)))
-        assert len(names) == entries
-        columns = {**segment.columns, **{f: segment.columns[c] for f, c in COLUMNS.items() if c in segment.columns}}
-        own = [float(columns[name][first]) if name in columns else 0.0 for name in names]
+        segment = self.fit.segments[number]
+        found = (segment.columns.get(COLUMNS.get(name, name)) for name in self.fit.model.entries)
+        own = [0.0 if column is None else float(column[first]) for column in found]
         if self.fit.layout.carried:
             own += [float(segment.memory[name][first]) for name in self.fit.layout.model.memory]
         return own
@@ -273,9 +271,9 @@ class Intervals:
         both = np.concatenate(parts, axis=1)
         slope = np.zeros((count, num_nodes, width + nuisances.shape[1] - self.fit.layout.num_moving))
         slope[:, :, :width] = both[:, :, 1:]
-        r = record[:, :, :num_signals].reshape(count, -1)
-        R = record[:, :, num_signals:].reshape(count, self.length, -1, num_signals).transpose(0, 2, 1, 3)
-        return Evaluation(both[:, :, 0], slope, r, R.reshape(count, R.shape[1], -1))
+        r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
+        R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).transpose(0, 1, 3, 2, 4)
+        return Evaluation(both[:, :, 0], slope, r, R.reshape(-1, R.shape[2], r.shape[1])[:count])
 
 
 @dataclass(frozen=True, eq=False)

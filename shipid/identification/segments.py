@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, clock_slack, pieces, sample
+from shipid.data.dataset import Dataset, clock_slack, sample, stretches
 from shipid.errors import DataError, choices
 from shipid.simulation.scan import memory_along
 from shipid.vessel.dynamics import dynamics
@@ -61,8 +61,10 @@ def cut_segments(
         found = ", ".join(dataset.commands) or "none"
         raise DataError(f"{vessel.name} takes this command; the data have {found}", path=missing)
     result = []
-    for run, rows in pieces(dataset):
+    table = {name: dataset.frame[name].to_numpy() for name in map(str, dataset.frame.columns) if name != "run"}
+    for run, places in stretches(dataset):
         if run in runs:
+            rows = {name: values[places] for name, values in table.items()}
             result += _cut(vessel, rows, list(runs).index(run), step, horizon, lags)
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
@@ -72,8 +74,10 @@ def cut_segments(
     return result
 
 
-def _cut(vessel: Vessel, rows: pd.DataFrame, run: int, step: float, horizon: float, lags: int) -> list[Segment]:
-    t = rows["t"].to_numpy(dtype=float)
+def _cut(
+    vessel: Vessel, rows: Mapping[str, NDArray[Any]], run: int, step: float, horizon: float, lags: int
+) -> list[Segment]:
+    t = rows["t"]
     count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
     each = round(horizon / step) if horizon else max(count, 1)
     least = max(LEAST_STEPS, each / 2 if horizon else 0)

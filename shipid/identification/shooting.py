@@ -21,7 +21,7 @@ from shipid.simulation.scan import uninterrupted
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Progress = Callable[[int, float], object]
-INTERVALS = (20, 5, 1)  # steps between nodes: the first at whose ends the start is not lost
+INTERVALS = (40, 10, 1)  # steps between nodes: the first at whose ends the start is not lost
 LOST = 300.0  # scales of a node: far beyond what a step of the solver mends
 MOST_ITERATIONS = 60  # then single shooting from there, whose objective cannot cycle
 MOST_POLISHING = 200
@@ -36,7 +36,7 @@ OPTIONS: dict[str, Any] = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.tol": TOLERANCE,
-    "ipopt.acceptable_iter": 3,  # kinks of |v| and of limited advance ratios keep the last digits from settling
+    "ipopt.acceptable_iter": 2,  # kinks of |v| and of limited advance ratios keep the last digits from settling
     "ipopt.acceptable_tol": 1e-4,
     "ipopt.acceptable_constr_viol_tol": 1e-5,
     "ipopt.acceptable_obj_change_tol": 1e-8,
@@ -88,6 +88,7 @@ class Problem:
         self.ties, self.starts = inner, first
         self.free_start = fit.start_width is not None
         self.column_scale = np.concatenate([fit.node_scale, np.ones(n), fit.widths])
+        self._last: tuple[Array, _Numbers] | None = None
         self._lay_out()
 
     @property
@@ -150,7 +151,7 @@ class Problem:
     def lost(self, point: Point) -> NDArray[np.bool_]:
         """(K,) intervals that leave what was measured so far that no step of the solver brings them back."""
         with np.errstate(all="ignore"):
-            found = self.evaluate(self.join(point)).found
+            found = self.at(self.join(point)).found
             away = np.zeros(len(self.intervals))
             away[self.ties] = np.abs((found.end[self.ties] - point.nodes[self.ties + 1]) / self.fit.node_scale).max(
                 axis=1
@@ -169,8 +170,13 @@ class Problem:
                 low[own], high[own] = 0.0, fit.layout.lags * fit.layout.step / fit.widths[i]
         return low, high
 
-    def evaluate(self, x: Array) -> _Numbers:
-        """Objective, constraints and their derivatives at one place."""
+    def at(self, x: Array) -> _Numbers:
+        """Objective, constraints and their derivatives at one place; the last is remembered, as IPOPT asks in turn."""
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            self._last = x.copy(), self._evaluate(x)
+        return self._last[1]
+
+    def _evaluate(self, x: Array) -> _Numbers:
         fit, point = self.fit, self.split(x)
         found = self.intervals.evaluate(point.nodes, point.factors, fit.centres + fit.widths * point.nuisances)
         begin, begin_slope = self.intervals.begin(fit.centres + fit.widths * point.nuisances)
@@ -254,20 +260,13 @@ def _placed(place: Index, values: Array, count: int) -> Array:
     return np.bincount(place, values, count).astype(float) if count else np.zeros(0)
 
 
-class _Memo:
-    """Remembers the last place: IPOPT asks for objective, constraints and derivatives of one place in turn."""
+class _Watch:
+    """Counts the iterations and says when to stop."""
 
     def __init__(self, problem: Problem, progress: Progress | None, held: list[int]) -> None:
         self.problem, self.progress, self.held = problem, progress, held
-        self.at: Array | None = None
-        self.numbers: _Numbers | None = None
         self.iterations = -1
         self.failure: Exception | None = None
-
-    def __call__(self, x: Array) -> _Numbers:
-        if self.numbers is None or self.at is None or not np.array_equal(x, self.at):
-            self.at, self.numbers = x.copy(), self.problem.evaluate(x)
-        return self.numbers
 
     def iterated(self, objective: float) -> bool:
         """Note one more iteration; whether to stop."""
@@ -345,24 +344,24 @@ def solve(problem: Problem, start: Point, progress: Progress | None = None, befo
 def _minimise(problem: Problem, start: Point, progress: Progress | None, most: int, before: int) -> Result:
     """One run of IPOPT of at most so many iterations, after those `before`."""
     with uninterrupted() as held, np.errstate(all="ignore"):
-        memo = _Memo(problem, progress, held)
-        memo.iterations += before
+        watch = _Watch(problem, progress, held)
+        watch.iterations += before
         low, high = problem.bounds()
-        found, word = _ipopt(problem, memo, np.clip(problem.join(start), low, high), most)
-        if memo.failure is not None:
-            raise memo.failure
-        numbers = memo(found)
-    return Result(numbers.point, numbers.objective, max(memo.iterations, before), word)
+        found, word = _ipopt(problem, watch, np.clip(problem.join(start), low, high), most)
+        if watch.failure is not None:
+            raise watch.failure
+        numbers = problem.at(found)
+    return Result(numbers.point, numbers.objective, max(watch.iterations, before), word)
 
 
-def _ipopt(problem: Problem, memo: _Memo, x0: Array, most: int) -> tuple[Array, str]:
+def _ipopt(problem: Problem, watch: _Watch, x0: Array, most: int) -> tuple[Array, str]:
     """Variables at the end, and IPOPT's word for it."""
     low, high = problem.bounds()
     dense, m = ca.Sparsity.dense, problem.num_constraints
     x, p, one = dense(problem.size), dense(0, 0), dense(1)
 
     def at(given: Any) -> _Numbers:
-        return memo(np.asarray(given).ravel())
+        return problem.at(np.asarray(given).ravel())
 
     def f(given: Any) -> Any:
         return at(given).objective / (2 * problem.sum)
@@ -400,7 +399,7 @@ def _ipopt(problem: Problem, memo: _Memo, x0: Array, most: int) -> tuple[Array, 
             for name in ca.nlpsol_out()
         },
         {"stop": one},
-        lambda *given: [memo.iterated(float(given[ca.nlpsol_out().index("f")]))],
+        lambda *given: [watch.iterated(float(given[ca.nlpsol_out().index("f")]))],
     )
     symbol: Any = ca.MX.sym("x", problem.size)
     value, rows = functions["both"](symbol)

@@ -101,11 +101,12 @@ def identify(
     fit = build(vessel, dataset, runs, settings)
     factors = _start(fit, dataset, start)
     solution = _solved(fit, factors, start.point if isinstance(start, Solution) else None, progress, begun)
+    targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
     while settings.drop is not None and solution.status == "ok":
-        weakest = _weakest(solution, settings.drop, 0.0 if settings.drop_to == "zero" else 1.0)
+        weakest = _weakest(solution, settings.drop, targets)
         if weakest is None:
             break
-        fit = _without(fit, weakest, 0.0 if settings.drop_to == "zero" else 1.0)
+        fit = _without(fit, weakest, targets[weakest])
         dropped = (*solution.dropped, fit.unknown.paths[weakest])
         solution = _solved(fit, solution.factors, solution.point, progress, begun, solution.objective_start)
         solution = replace(solution, dropped=dropped)
@@ -160,10 +161,10 @@ def _solved(
         if word in ("ok", "stopped"):
             break
     assert objective_start is not None
-    lost = problem.lost(begin)
-    if word == "not converged" and lost.any():
-        word = "diverged"
-    where = fit.runs[problem.intervals.run[np.argmax(lost)]] if lost.any() else None
+    where = None
+    if word in ("not converged", "diverged"):
+        lost = problem.lost(begin)
+        word, where = ("diverged", fit.runs[problem.intervals.run[np.argmax(lost)]]) if lost.any() else (word, None)
     return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
 
 
@@ -238,7 +239,7 @@ def _sentence(fit: Fit, result: Result, word: str, lost: str | None, at_bound: N
     )
 
 
-def _weakest(solution: Solution, threshold: float, target: float) -> int | None:
+def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None:
     """The free factor nearest to its target in standard errors, if nearer than the threshold."""
     information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
     free = np.array([path not in solution.dropped for path in solution.paths])
@@ -246,7 +247,7 @@ def _weakest(solution: Solution, threshold: float, target: float) -> int | None:
         return None
     level = (solution.residuals**2).sum() / max(1, len(solution.residuals) - free.sum())
     errors = np.sqrt(np.diag(np.linalg.pinv(information[np.ix_(free, free)], rcond=1e-14, hermitian=True)) * level)
-    away = np.abs(solution.factors[free] - target) / np.maximum(errors, 1e-300)
+    away = np.abs(solution.factors - targets)[free] / np.maximum(errors, 1e-300)
     weakest = int(np.argmin(away))
     return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
 
@@ -254,5 +255,5 @@ def _weakest(solution: Solution, threshold: float, target: float) -> int | None:
 def _without(fit: Fit, number: int, target: float) -> Fit:
     """The same fit with one factor held."""
     low, high = fit.unknown.low.copy(), fit.unknown.high.copy()
-    low[number] = high[number] = target if fit.unknown.centre[number] else 0.0
+    low[number] = high[number] = target
     return replace(fit, unknown=replace(fit.unknown, low=low, high=high))

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -49,7 +48,7 @@ class Layout:
         """Nuisances that change how the ship moves."""
         return sum(name in MOVING for name in self.nuisances)
 
-    @property
+    @cached_property
     def carried(self) -> bool:
         """Whether the memory of actuators depends on what is unknown."""
         free = any(".actuator." in path for group in self.groups for path in group)
@@ -81,6 +80,11 @@ class Variation:
     begin_slope: ca.Function
     states: tuple[str, ...]
     node: tuple[str, ...]
+
+    @cached_property
+    def entries(self) -> tuple[str, ...]:
+        """Names of what `begin` takes as measured."""
+        return _entries(self.states)
 
     @property
     def num_columns(self) -> int:
@@ -114,78 +118,95 @@ class Variation:
         return ca.Function("step", [x, fixed, known, seen], [following, record], {"cse": True})
 
 
+class _Ship:
+    """Symbols of everything that a layout takes in, and the ship's equations on them."""
+
+    def __init__(self, layout: Layout) -> None:
+        model = layout.model
+        self.layout, self.model = layout, model
+        self.theta, self.q = SX.sym("theta", len(layout.groups)), SX.sym("q", len(layout.nuisances))
+        self.base = SX.sym("base", len(model.parameters))
+        self.scale = SX.sym("scale", sum(map(len, layout.groups)))
+        self.commands = SX.sym("commands", len(model.commands) * (1 + layout.lags))
+        self.weather = SX.sym("weather", len(layout.weather))
+        self.memory = SX.sym("memory", len(model.memory))
+        self.names = (*model.state, *model.hidden)
+        self.value_of = dict(zip(layout.nuisances, ca.vertsplit(self.q) if layout.nuisances else [], strict=True))
+        told = _told(layout, self.commands, self.value_of)
+        environment = _environment(layout, self.weather, self.value_of)
+        parameters = _parameters(layout, self.base, self.scale, self.theta, self.value_of)
+        self.inputs = [self.memory, told, environment, parameters]
+
+    @property
+    def moving(self) -> SX:
+        """What is unknown and changes how the ship moves."""
+        return ca.vertcat(self.theta, self.q[: self.layout.num_moving])
+
+    @property
+    def fixed(self) -> SX:
+        """What stays the same along a run."""
+        return ca.vertcat(self.theta, self.q, self.base, self.scale)
+
+    @property
+    def known(self) -> SX:
+        """What is known of every step."""
+        return ca.vertcat(self.commands, self.weather, *([] if self.layout.carried else [self.memory]))
+
+    def rates(self, state: SX) -> SX:
+        """d(state)/dt of the whole state, in calm water."""
+        drawn = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in self.model.drawn}
+        return SX(summed_rates(self.model, [state, *self.inputs], SX(self.model.num_dof, 1), drawn))
+
+    def advance(self, dt: SX) -> SX:
+        """Memory after dt."""
+        return SX(self.model.advance(SX(len(self.names), 1), *self.inputs, dt))
+
+
 @lru_cache(maxsize=32)
 def variation(layout: Layout) -> Variation:
     """Variational equations of a layout, made once."""
-    model = layout.model
-    num_memory, names = len(model.memory), (*model.state, *model.hidden)
-    theta, q = SX.sym("theta", len(layout.groups)), SX.sym("q", len(layout.nuisances))
-    base = SX.sym("base", len(model.parameters))
-    scale = SX.sym("scale", sum(map(len, layout.groups)))
-    commands = SX.sym("commands", len(model.commands) * (1 + layout.lags))
-    weather = SX.sym("weather", len(layout.weather))
-    value_of = dict(zip(layout.nuisances, ca.vertsplit(q) if layout.nuisances else [], strict=True))
-    parameters = _parameters(layout, base, scale, theta, value_of)
-    told = _told(layout, commands, value_of)
-    environment = _environment(layout, weather, value_of)
-    memory = SX.sym("memory", num_memory)
-    drawn = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in model.drawn}
-
-    def rates_of(state: SX) -> SX:
-        inputs = [state, memory, told, environment, parameters]
-        return SX(summed_rates(model, inputs, SX(model.num_dof, 1), drawn))
-
-    needed = _needed(layout, names, rates_of)
-    states = tuple(names[i] for i in needed)
-    z = SX.sym("states", len(needed))
-    whole = SX(len(names), 1)
+    ship = _Ship(layout)
+    needed = _needed(ship)
+    states = tuple(ship.names[i] for i in needed)
+    node = (*states, *layout.model.memory) if layout.carried else states
+    z, whole = SX.sym("states", len(needed)), SX(len(ship.names), 1)
     whole[needed] = z
-    f = rates_of(whole)[needed]
-    node = (*states, *model.memory) if layout.carried else states
-    moving = ca.vertcat(theta, q[: layout.num_moving])
-    width = len(node) + moving.shape[0]
-    S, D = SX.sym("S", len(states), width), SX.sym("D", num_memory if layout.carried else 0, width)
-
-    def turned(result: SX, over: SX, of: SX, own: SX) -> SX:
-        """Sensitivities of a result that feels states or memories `of` with sensitivities `over`, and the unknown."""
-        direct = ca.horzcat(SX(result.shape[0], len(node)), ca.jacobian(result, moving))
-        return ca.jacobian(result, of) @ over + own + direct
-
-    from_memory = ca.jacobian(f, memory) @ D if layout.carried else SX(len(states), width)
-    slope = turned(f, S, z, from_memory)
-    dt = SX.sym("dt")
-    later = model.advance(SX(len(names), 1), memory, told, environment, parameters, dt)
-    more = turned(later, D, memory, SX(num_memory, width)) if layout.carried else SX(0, width)
-    seen, h = (
-        SX.sym("seen", 2 * len(layout.signals)),
-        _signals(layout.signals, dict(zip(states, ca.vertsplit(z), strict=True)), value_of),
+    f, dt = ship.rates(whole)[needed], SX.sym("dt")
+    later, h = (
+        ship.advance(dt),
+        _signals(layout.signals, dict(zip(states, ca.vertsplit(z), strict=True)), ship.value_of),
     )
-    y, w = seen[: len(layout.signals)], seen[len(layout.signals) :]
-    others = ca.jacobian(h, q[layout.num_moving :])
-    R = ca.horzcat(ca.jacobian(h, z) @ S, others)
-    fixed = ca.vertcat(theta, q, base, scale)
-    known = ca.vertcat(commands, weather, *([] if layout.carried else [memory]))
-    zs, ms = ca.vertcat(z, ca.vec(S)), ca.vertcat(memory, ca.vec(D))
-    begin_in, begin = _begin(states, value_of)
+    width = len(node) + ship.moving.shape[0]
+    S, D = SX.sym("S", len(states), width), SX.sym("D", ship.memory.shape[0] if layout.carried else 0, width)
 
-    def function(name: str, inputs: Mapping[str, SX], result: SX) -> ca.Function:
-        return ca.Function(name, list(inputs.values()), [ca.densify(result)], list(inputs), ["result"], {"cse": True})
+    def direct(result: SX) -> SX:
+        """Slopes in what is unknown, none in the node."""
+        return ca.horzcat(SX(result.shape[0], len(node)), ca.jacobian(result, ship.moving))
 
-    both = {"z": zs, "m": ms, "fixed": fixed}
+    slope, more = ca.jacobian(f, z) @ S + direct(f), SX(0, width)
+    if layout.carried:
+        slope += ca.jacobian(f, ship.memory) @ D
+        more = ca.jacobian(later, ship.memory) @ D + direct(later)
+    seen, count = SX.sym("seen", 2 * len(layout.signals)), len(layout.signals)
+    R = ca.horzcat(ca.jacobian(h, z) @ S, ca.jacobian(h, ship.q[layout.num_moving :]))
+    weighted = [seen[count:] * (h - seen[:count]), ca.vec(ca.repmat(seen[count:], 1, R.shape[1]) * R)]
+    entries, begin = _begin(states, ship.value_of)
+    both = {"z": ca.vertcat(z, ca.vec(S)), "m": ca.vertcat(ship.memory, ca.vec(D)), "fixed": ship.fixed}
+    timed = {"m": both["m"], "fixed": ship.fixed, "known": ship.known, "dt": dt}
     return Variation(
         layout=layout,
-        rates=function("rates", {**both, "known": known}, ca.vertcat(f, ca.vec(slope))),
-        advance=function(
-            "advance", {"m": ms, "fixed": fixed, "known": known, "dt": dt}, ca.vertcat(later, ca.vec(more))
-        ),
-        outputs=function(
-            "outputs", {**both, "seen": seen}, ca.vertcat(w * (h - y), ca.vec(ca.repmat(w, 1, R.shape[1]) * R))
-        ),
-        begin=ca.Function("begin", [begin_in, q], [ca.densify(begin)]),
-        begin_slope=ca.Function("begin_slope", [begin_in, q], [ca.densify(ca.jacobian(begin, q))]),
+        rates=_function("rates", {**both, "known": ship.known}, ca.vertcat(f, ca.vec(slope))),
+        advance=_function("advance", timed, ca.vertcat(later, ca.vec(more))),
+        outputs=_function("outputs", {**both, "seen": seen}, ca.vertcat(*weighted)),
+        begin=_function("begin", {"measured": entries, "nuisances": ship.q}, begin),
+        begin_slope=_function("slope", {"measured": entries, "nuisances": ship.q}, ca.jacobian(begin, ship.q)),
         states=states,
         node=node,
     )
+
+
+def _function(name: str, inputs: Mapping[str, SX], result: SX) -> ca.Function:
+    return ca.Function(name, list(inputs.values()), [ca.densify(result)], list(inputs), ["result"], {"cse": True})
 
 
 def _parameters(layout: Layout, base: SX, scale: SX, theta: SX, value_of: Mapping[str, SX]) -> SX:
@@ -243,7 +264,7 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
 
 def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     """Columns of a log at an instant, and the states that `_signals` turns into them."""
-    entry = {name: SX.sym(name) for name in dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states))}
+    entry = {name: SX.sym(name) for name in _entries(states)}
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
     u, v = (entry[name] - value_of.get(f"velocity_bias_{name}", zero) for name in ("u", "v"))
@@ -254,14 +275,17 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
 
 
-def _needed(layout: Layout, names: Sequence[str], rates_of: Any) -> list[int]:
+def _entries(states: Sequence[str]) -> tuple[str, ...]:
+    """What a start is read from: the states, and what the faults of a log mix with them."""
+    return tuple(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states)))
+
+
+def _needed(ship: _Ship) -> list[int]:
     """States that the fitted signals feel, sooner or later."""
-    x = SX.sym("x", len(names))
-    state = dict(zip(names, ca.vertsplit(x), strict=True))
-    free = {name: SX.sym(name) for name in layout.nuisances}
-    felt = np.array(ca.DM(ca.jacobian_sparsity(rates_of(x), x), 1)) != 0
-    wanted = (np.array(ca.DM(ca.jacobian_sparsity(_signals(layout.signals, state, free), x), 1)) != 0).any(axis=0)
-    wanted |= np.isin(names, ("u", "v", "r"))  # the motion itself
+    x = SX.sym("x", len(ship.names))
+    h = _signals(ship.layout.signals, dict(zip(ship.names, ca.vertsplit(x), strict=True)), ship.value_of)
+    felt, seen = (np.array(ca.DM(ca.jacobian_sparsity(result, x), 1)) != 0 for result in (ship.rates(x), h))
+    wanted = seen.any(axis=0) | np.isin(ship.names, ("u", "v", "r"))  # the motion itself
     while (more := wanted | felt[wanted].any(axis=0)).sum() > wanted.sum():
         wanted = more
     return [int(i) for i in np.flatnonzero(wanted)]
@@ -279,10 +303,10 @@ def scan(layout: Layout, num_steps: int) -> ca.Function:
 
 
 def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """Ends (K, size) and outputs (K, N, entries) of K intervals; x (K, size), fixed (K, .), known, seen (K, N, .)."""
+    """Ends (K, size) and outputs (1, K, N, .) of K intervals; x (K, size), fixed (K, .), known and seen (K, N, .)."""
     count, num_steps = known.shape[:2]
     with uninterrupted():
         end, record = scan(layout, num_steps).map(count)(
             x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
         )
-    return np.array(end).T, np.array(record).T.reshape(count, num_steps, -1)
+    return np.array(end).T, np.array(record).T.reshape(1, count, num_steps, -1)

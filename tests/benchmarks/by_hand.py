@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 from shipid.vessel.load import Vessel
 
+MOTIONS = ("1", "u", "v", "r", "|u|", "|v|", "|r|")
 DERIVATIVES = "hull.derivatives."
 FINENESS = 1e-6  # rtol of RK45
 
@@ -24,7 +25,7 @@ class Model:
         value = vessel.parameters
         self.base = np.array([x for path, x in value.items() if path.startswith(DERIVATIVES)])
         names = [path.removeprefix(DERIVATIVES) for path in value if path.startswith(DERIVATIVES)]
-        self.factors = [_factors(name) for name in names]
+        self.factors = np.array([[MOTIONS.index(each) for each in _factors(name)] for name in names]).T
         self.axis = np.array([["XYN".index(name[0]) == row for name in names] for row in range(3)], dtype=float)
         m, I_z = value["inertia.m"], value["inertia.I_z"]
         self.m, self.value = m, value
@@ -45,15 +46,15 @@ class Model:
             for side in ("port", "starboard")
         ]
         wind = vessel.document["wind"]
-        self.gamma, self.air = wind["gamma_deg"], [wind[name] for name in ("C_X", "C_Y", "C_N")]
+        self.gamma, self.air = np.array(wind["gamma_deg"]), [np.array(wind[name]) for name in ("C_X", "C_Y", "C_N")]
         self.area = value["wind.A_FW"], value["wind.A_LW"], value["wind.L_oa"], value["constants.rho_a"]
 
     def rates(self, nu: np.ndarray, orders: Sequence[float], theta: np.ndarray) -> np.ndarray:
         """Accelerations (3,) at nu = (u, v, r) with orders (n, alpha) of both units."""
         u, v, r = (float(x) for x in nu)
-        of = {"u": u, "v": v, "r": r, "|u|": abs(u), "|v|": abs(v), "|r|": abs(r)}
-        monomials = np.array([np.prod([of[factor] for factor in factors]) for factors in self.factors])
-        force = self.axis @ (theta * self.base * monomials)
+        of = np.array([1.0, u, v, r, abs(u), abs(v), abs(r)])
+        one, two, three = (of[places] for places in self.factors)
+        force = self.axis @ (theta * self.base * one * two * three)
         a, m = self.added, self.m
         c = (a[1, 2] + a[2, 1]) / 2
         side = (m + a[1, 1]) * v + c * r
@@ -100,10 +101,10 @@ class Model:
 
 
 def _factors(name: str) -> list[str]:
-    """`Y_v|r|` -> v, |r|."""
+    """`Y_v|r|` -> v, |r|, 1: three factors."""
     rest, found = name.split("_", 1)[1], []
     while rest:
         size = 3 if rest[0] == "|" else 1
         found.append(rest[:size])
         rest = rest[size:]
-    return found
+    return [*found, "1", "1"][:3]

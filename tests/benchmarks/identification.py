@@ -129,9 +129,7 @@ def _convergence(
 
 def _growth(vessel: Vessel, settings: Identify) -> dict[str, Any]:
     """Time per unit of four times the runs, and of four times the parameters, over time per unit."""
-    few = settings.model_copy(
-        update={"fixed": [f"{DERIVATIVES}{axis}_*" for axis in "XY"] + ["hull.*r|", "hull.*v|", "hull.*rrr"]}
-    )
+    few = settings.model_copy(update={"fixed": [f"{DERIVATIVES}{axis}_*" for axis in "XY"] + ["hull.*r|", "hull.*v|"]})
     cases = {
         "runs": {RUNS: (RUNS, settings), MORE_RUNS: (MORE_RUNS, settings)},
         "parameters": {FEWER: (RUNS, few), 4 * FEWER: (RUNS, settings)},

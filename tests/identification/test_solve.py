@@ -201,7 +201,7 @@ def test_the_nuisances_are_projected_out() -> None:
     assert np.abs(found.jacobian.T @ found.residuals).max() < 1e-3 * np.abs(found.jacobian).sum(axis=0).max()
     fit = build(SHIP, noisy, noisy.runs, wanted)
     assert found.point is not None
-    firsts = found.point.nodes[[0, 2, 4]]
+    firsts = found.point.nodes[Problem(fit).starts]
     whole = predict(fit, found.factors, found.point.nuisances, firsts)
     columns = [whole.by_factor]
     for run in range(3):

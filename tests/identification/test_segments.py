@@ -1,0 +1,69 @@
+"""Runs become predictions: gaps part them, ends that are too short are left, rows between the steps count for none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import Intervals, build, predict
+from shipid.identification.segments import cut_segments
+from shipid.vessel.load import load_vessel
+from tests.identification.trials import changed, trials
+
+SHIP = load_vessel("gunnerus-28.9")
+DATA = trials(SHIP, runs=2, steps=50)
+
+
+def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one() -> None:
+    for horizon, lengths in ((0.0, [50]), (20.0, [20, 20, 10]), (30.0, [30, 20]), (22.0, [22, 22]), (80.0, [50])):
+        segments = cut_segments(SHIP, DATA, DATA.runs, 1.0, horizon)
+        assert [one.num_steps for one in segments if one.run == 0] == lengths
+        assert all(np.allclose(np.diff(one.t), 1.0) for one in segments)
+
+
+def test_a_break_parts_a_run() -> None:
+    frame = DATA.frame.copy()
+    frame.loc[(frame["run"] == "M01") & (frame["t"] == 20), "flags"] = 1
+    broken = Dataset(frame, {"clock": "run", "flags": ["break"]})
+    segments = cut_segments(SHIP, broken, ["M01"], 1.0, 0.0)
+    assert [(one.t[0], one.num_steps) for one in segments] == [(0.0, 19), (20.0, 30)]
+
+
+def test_what_was_not_measured_does_not_count() -> None:
+    frame = DATA.frame[DATA.frame["t"] % 5 == 0].reset_index(drop=True)
+    sparse = Dataset(frame, DATA.metadata)
+    fit = build(SHIP, sparse, sparse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
+    at = predict(fit, np.ones(1), np.zeros((2, 0)))
+    assert sorted(set(at.time)) == [5.0 * i for i in range(1, 11)]
+    assert np.abs(at.r).max() < 1e-9  # orders are held over ten steps: nothing is lost with the rows
+
+
+def test_the_end_of_a_segment_is_padded_without_weight() -> None:
+    fit = build(SHIP, DATA, DATA.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=30))
+    intervals = Intervals(fit, 20)
+    assert len(intervals) == 6  # 20 + 10 and 20, twice
+    assert int((intervals.weight > 0).sum()) == 2 * 50 * 3
+    assert intervals.first.tolist() == [True, False, True] * 2
+
+
+def test_wind_that_was_logged_is_felt() -> None:
+    V_w, beta_w = np.array([8.0, 4.0]), np.array([0.5, 2.5])
+    windy = trials(SHIP, runs=2, steps=30, weather={"V_w": V_w, "beta_w": beta_w})
+    each = np.repeat([0, 1], 31)
+    logged = changed(windy, V_w=V_w[each], beta_w=beta_w[each])
+    wanted = Identify(parameters=["hull.derivatives.N_ur"], horizon=0)
+    worst = []
+    for data in (logged, windy):
+        fit = build(SHIP, data, data.runs, wanted)
+        worst.append(np.abs(predict(fit, np.ones(1), np.zeros((2, 0))).r).max())
+    assert worst[0] < 1e-9
+    assert worst[1] > 0.1
+
+
+def test_a_command_that_was_not_logged_is_told() -> None:
+    without = Dataset(DATA.frame.drop(columns="port.n"), DATA.metadata)
+    with pytest.raises(DataError, match=r"port\.n: .* takes this command; the data have port\.alpha"):
+        cut_segments(SHIP, without, without.runs, 1.0, 0.0)
