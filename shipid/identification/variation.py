@@ -150,7 +150,8 @@ class _Ship:
     @property
     def known(self) -> SX:
         """What is known of every step."""
-        return ca.vertcat(self.commands, self.weather, *([] if self.layout.carried else [self.memory]))
+        given = [] if self.layout.carried else [SX.sym("given", self.memory.shape[0])]  # goes in as the memory
+        return ca.vertcat(self.commands, self.weather, *given)
 
     def rates(self, state: SX) -> SX:
         """d(state)/dt of the whole state, in calm water."""
