@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ RUNS, STEPS, MORE_RUNS, FEWER = 20, 80, 80, 8
 NOISE = {"u": 0.05, "v": 0.05, "r": np.radians(0.1)}
 SPREADS, STARTS = (1.0, 3.0), 8  # factors off by up to so much, so many draws
 ROUNDS = 5
+PATIENCE = 240.0  # s after which the way by hand is stopped: finite differences of an adaptive solver crawl
 NEAR = 1e-3  # relative difference of two objectives that are the same optimum
 
 
@@ -55,7 +57,7 @@ def run() -> dict[str, Any]:
     }
     result: dict[str, Any] = {
         "by hand [s]": round(slow, 1),
-        "by hand: evaluations, Jacobians": f"{theirs.nfev}, {theirs.njev}",
+        "by hand: evaluations, Jacobians (0: stopped before its end)": f"{theirs.nfev}, {theirs.njev}",
         "single shooting, exact Jacobians [s]": round(seconds["single"], 4),
         "single shooting: evaluations, Jacobians": f"{exact.nfev}, {exact.njev}",
         "identify [s]": round(seconds["identify"], 4),
@@ -110,7 +112,21 @@ def by_hand(vessel: Vessel, data: Dataset, fit: Fit, begin: np.ndarray) -> Any:
     state = [0, 0, 0, *nu]
     rates = own.rates(state, [], told, np.zeros(len(own.environment)), list(vessel.parameters.values()), np.zeros(3))
     assert np.allclose(model.rates(nu, orders, np.ones(fit.num_factors)), np.array(rates).ravel()[3:], rtol=1e-9)
-    return least_squares(lambda theta: _differences(vessel, data, fit, theta), begin)
+    begun, best = time.perf_counter(), SimpleNamespace(x=begin, cost=np.inf, nfev=0, njev=0)
+
+    def residuals(theta: np.ndarray) -> np.ndarray:
+        found = _differences(vessel, data, fit, theta)
+        best.nfev += 1
+        if (found**2).sum() / 2 < best.cost:
+            best.x, best.cost = theta.copy(), float((found**2).sum() / 2)
+        if time.perf_counter() - begun > PATIENCE:
+            raise TimeoutError
+        return found
+
+    try:
+        return least_squares(residuals, begin)
+    except TimeoutError:
+        return best
 
 
 def _convergence(
