@@ -304,7 +304,9 @@ class Prediction:
         With A the slopes in the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi): its squares sum to those of
         r and xi where xi is best, and its slopes give the information on the factors. Robust weights are within.
         """
-        root = np.where(np.abs(self.r) <= threshold, 1.0, np.sqrt(threshold / np.maximum(np.abs(self.r), 1e-300)))
+        root = np.ones(len(self.r))
+        if np.isfinite(threshold):
+            root = np.sqrt(threshold / np.maximum(np.abs(self.r), threshold))
         e, J, spent = root * self.r, root[:, None] * self.by_factor, np.zeros(len(self.r))
         if not (self.nuisances.size or self.away.size) or not np.isfinite(e).all():
             return e, J, spent

@@ -24,7 +24,7 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
-ALONE = "-alone"  # added to the name of a family that is identified: the same without a compensator
+ALONE, BOTH = "-identified", "-both"  # added to names: identified from the runs alone; then compensated as well
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 PUBLISHED = {  # key of a published envelope -> signal, factor to SI
     **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
@@ -393,10 +393,10 @@ def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, 
         words = family.description or ""
         drawn = members(family, vessel, file)
         settings = _identify(study, family, index, vessel, file)
-        found += [Model(v.name, v.family, v.member, v, vessel, words, settings) for v in drawn]
-        if settings is not None:
+        found += [Model(v.name, v.family, v.member, v, vessel, words) for v in drawn]
+        for suffix in (ALONE, BOTH) if settings is not None else ():
             found += [
-                Model(f"{v.name}{ALONE}", f"{v.family}{ALONE}", v.member, v, vessel, words, settings, compensated=False)
+                Model(f"{v.name}{suffix}", f"{v.family}{suffix}", v.member, v, vessel, words, settings, suffix == BOTH)
                 for v in drawn
             ]
     names = [model.name for model in found]

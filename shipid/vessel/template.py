@@ -227,6 +227,12 @@ def wind(given: Particulars) -> Values:
     }
 
 
+def waves() -> Values:
+    """Wave resistance: no formula here, but a place for what trials at speed tell."""
+    note = "wave resistance grows with about the sixth power of speed: 0 until it is measured or identified"
+    return {"R_4": Value(0.0, "kg m^-5 s^4", note)}
+
+
 def _wake(given: Particulars) -> float:
     return 0.5 * given.block - 0.05
 
@@ -321,6 +327,7 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
     yield from _block("inertia", inertia(given))
     yield from _block("added_mass", added_mass(given), coriolis="mmg")
     yield from _block("hull.mmg", hull(given))
+    yield from _block("hull.resistance", waves())
     yield from _block("wind", wind(given), kind="blendermann")
     if given.propulsor == "azimuth":
         for side, unit in ((-1, "port"), (1, "starboard")):

@@ -19,9 +19,9 @@ from tests.study.tiny import tiny_plan
     ("name", "models", "batches"),
     [
         ("quick", 3 + 2 + 1, 3),
-        ("full-scale", 4 + 1, 8 * 3),
+        ("full-scale", 4 + 2 + 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 10),
-        ("simulation-small", 4 + 3 + 1 + 1, 3 * 2),
+        ("simulation-small", 4 + 3 * 3 + 1 + 1, 3 * 2),
     ],
 )
 def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
@@ -67,7 +67,7 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     assert small.study.prediction == full.study.prediction
     assert small.study.published == full.study.published
     wide = {model.name: model.variant for model in full.models}
-    assert all(model.variant is None or model.variant.values == wide[model.name].values for model in small.models)
+    assert all(model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.models)
     nominal = wide["nominal"]
     assert nominal is not None
     assert not nominal.values

@@ -23,9 +23,9 @@ from tests.study.test_commands import weaving
 from tests.study.tiny import run_here
 
 PATHS = ["hull.derivatives.X_u|u|", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
-WRONG = {"name": "wrong", "base": "gunnerus-28.9", "perturb": [{"parameters": PATHS, "factor": 1.3}]}
 WEIGHTS = {"u": 0.01, "v": 0.01, "r": 0.001}
-FITTED = {**WRONG, "name": "fitted", "identify": {"parameters": PATHS, "weights": WEIGHTS, "method": "euler"}}
+FITTED: dict[str, Any] = {"name": "wrong", "base": "gunnerus-28.9", "perturb": [{"parameters": PATHS, "factor": 1.3}]}
+FITTED["identify"] = {"parameters": PATHS, "weights": WEIGHTS, "method": "euler"}
 
 Recorded = Callable[..., tuple[Plan, Dataset]]
 
@@ -37,18 +37,18 @@ def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) ->
 
 
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
-    plan, dataset = study(recorded, [WRONG, FITTED])
+    plan, dataset = study(recorded, [FITTED])
     prepared = prepare(plan, dataset)
     found = foundations(plan, prepared, plan.batches[0], "cpu")
-    assert list(found) == ["wrong", "fitted", "fitted-alone", "none"]
+    assert list(found) == ["wrong", "wrong-identified", "wrong-both", "none"]
     assert found["wrong"].accuracy(prepared.test)["mean"] > 0.01
-    assert found["fitted"].accuracy(prepared.test)["mean"] < 1e-4
-    variant = found["fitted"].model.variant
+    assert found["wrong-both"].accuracy(prepared.test)["mean"] < 1e-4
+    variant = found["wrong-both"].model.variant
     assert variant is not None
     right = plan.vessels["gunnerus-28.9"].parameters
     assert [variant.values[path] for path in PATHS] == pytest.approx([right[path] for path in PATHS], rel=1e-3)
-    np.testing.assert_array_equal(found["fitted-alone"].test_paths, found["fitted"].test_paths)
-    assert "converged" in found["fitted"].sentence
+    np.testing.assert_array_equal(found["wrong-identified"].test_paths, found["wrong-both"].test_paths)
+    assert "converged" in found["wrong-both"].sentence
 
 
 def test_other_runs_teach_nothing(recorded: Recorded) -> None:
@@ -60,7 +60,7 @@ def test_other_runs_teach_nothing(recorded: Recorded) -> None:
     frame = dataset.frame.copy()
     frame.loc[~frame["run"].isin(seen), "u"] += 0.3
     other = prepare(plan, Dataset(frame, dataset.metadata))
-    pair = [foundations(plan, each, batch, "cpu")["fitted"].model.variant for each in (prepared, other)]
+    pair = [foundations(plan, each, batch, "cpu")["wrong-both"].model.variant for each in (prepared, other)]
     assert pair[0] == pair[1]
 
 
@@ -79,12 +79,12 @@ def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Reco
 
 def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     """Compensated, identified alone, identified then compensated: rows, stored predictors and the report's paths."""
-    plan, _ = study(recorded, [WRONG, FITTED])
+    plan, _ = study(recorded, [FITTED])
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
     rows = results.cells.set_index("model")
-    assert rows.loc["fitted-alone", "H"] == rows.loc["fitted-alone", "A"] == rows.loc["fitted", "A"]
-    assert rows.loc["fitted", "A"] < 0.1 * rows.loc["wrong", "A"]
+    assert rows.loc["wrong-identified", "H"] == rows.loc["wrong-identified", "A"] == rows.loc["wrong-both", "A"]
+    assert rows.loc["wrong-both", "A"] < 0.1 * rows.loc["wrong", "A"]
     assert (rows["status"] == "ok").all()
     dataset, test = results.dataset, results.test
     for row in rows.itertuples():
@@ -92,18 +92,18 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
         memory = window_memory(predictor.vessel, dataset, test) if predictor.vessel else None
         paths = predictor.predict(test.columns, memory, test.planned)
         np.testing.assert_allclose(results.paths[str(row.cell)], paths, atol=1e-9)
-    assert "fitted" not in results.physics  # its numbers depend on the cell
-    assert not any("fitted-alone" in text for text, _ in answer(results))
+    assert "wrong-both" not in results.physics  # its numbers depend on the cell
+    assert not any("wrong-identified" in text for text, _ in answer(results))
 
 
 def test_what_cannot_be_identified_fails_in_its_own_cells(tmp_path: Path, recorded: Recorded) -> None:
     """Whole runs that diverge under explicit Euler: one sentence, and all other cells are there."""
     bad = {**FITTED, "name": "bad", "identify": {**FITTED["identify"], "step": 20.0, "horizon": 40.0}}
-    plan, _ = study(recorded, [WRONG, bad])
+    plan, _ = study(recorded, [bad])
     run_here(plan, tmp_path / "run")
     rows = store.read_rows(tmp_path / "run").set_index("model")
-    assert rows.loc["wrong", "status"] == rows.loc["none", "status"] == "ok"
-    for name in ("bad", "bad-alone"):
+    assert rows.loc["bad", "status"] == rows.loc["none", "status"] == "ok"
+    for name in ("bad-identified", "bad-both"):
         assert rows.loc[name, "status"] in ("failed", "diverged")
         assert str(rows.loc[name, "sentence"]).startswith("identification: ")
 
@@ -125,9 +125,9 @@ def test_a_wrong_block_is_one_line(recorded: Recorded, block: dict[str, Any], pa
 
 def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
     plan, _ = study(recorded, [{**FITTED, "identify": {"parameters": PATHS}}])
-    settings = plan.models[0].identify
+    settings = plan.models[1].identify
     assert settings is not None
     assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
-    assert plan.identified == {"fitted", "fitted-alone"}
-    assert plan.aside == {"fitted-alone"}
+    assert plan.identified == {"wrong-both", "wrong-identified"}
+    assert plan.aside == {"wrong-identified"}
     assert Batch(3, 0) in plan.batches
