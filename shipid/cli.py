@@ -417,13 +417,16 @@ def study_screen(
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
     from shipid.study import screen
     from shipid.study.plan import read_plan
+    from shipid.study.prepare import obtain
     from shipid.study.store import check_table, write_table
 
     plan = read_plan(study, _parsed(changes))
     file = out or Path(f"{plan.name}-screen.csv")
     check_table(file)
-    wanted = screen.families(plan, family)
-    blocks = _counted(screen.screen(plan, wanted, members, device), members * len(wanted))
+    wanted, dataset = screen.families(plan, family), obtain(plan)
+    for note in screen.notes(plan, dataset, wanted):
+        typer.echo(note, err=True)
+    blocks = _counted(screen.screen(plan, dataset, wanted, members, device), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     table = screen.spread(frame)

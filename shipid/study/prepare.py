@@ -166,9 +166,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     for model in plan.models:
         if model.vessel is not None:
             check_columns(model.vessel, test.columns, plan.file)
-            missing = assumed(model.vessel, test.columns)
-            if missing:
-                notes.append(f"{model.vessel.name}: {', '.join(missing)} not measured, assumed 0")
+            notes += not_measured(model.vessel, test)
     models, paths = _roll_out(plan, dataset, both, notes, device)
     return Prepared(
         data=dataset,
@@ -299,6 +297,12 @@ def own_vessel(model: Model) -> Vessel:
     assert model.vessel is not None
     assert model.variant is not None
     return model.vessel.with_values(model.variant.values) if model.variant.values else model.vessel
+
+
+def not_measured(vessel: Vessel, windows: Windows) -> list[str]:
+    """A sentence on what a vessel feels and the windows do not hold; none where they hold all."""
+    missing = assumed(vessel, windows.columns)
+    return [f"{vessel.name}: {', '.join(missing)} not measured, assumed 0"] if missing else []
 
 
 def planned(plan: Plan, windows: Windows) -> Mapping[str, Array] | None:

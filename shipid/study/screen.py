@@ -18,7 +18,7 @@ from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.predictor import check_columns, physics_distances
 from shipid.simulation.native import compiler
 from shipid.study.plan import Plan
-from shipid.study.prepare import obtain, partition, planned, window_memory
+from shipid.study.prepare import not_measured, partition, planned, window_memory
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -47,14 +47,21 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     return found
 
 
-def screen(plan: Plan, wanted: Sequence[Family], count: int, device: str = "cpu") -> Iterator[pd.DataFrame]:
+def notes(plan: Plan, dataset: Dataset, wanted: Sequence[Family]) -> list[str]:
+    """What is left out of the windows of a study, and what the bases of the families feel and the runs do not hold."""
+    pool, _, found = partition(plan, dataset)
+    return [*found, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
+
+
+def screen(
+    plan: Plan, dataset: Dataset, wanted: Sequence[Family], count: int, device: str = "cpu"
+) -> Iterator[pd.DataFrame]:
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
     A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows, the share of windows on which
     the member diverged (A is NaN then), and a column per drawn parameter: its factor on the base. Members are those
     that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
     """
-    dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:

@@ -67,7 +67,9 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     assert small.study.prediction == full.study.prediction
     assert small.study.published == full.study.published
     wide = {model.name: model.variant for model in full.models}
-    assert all(model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.models)
+    assert all(
+        model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.models
+    )
     nominal = wide["nominal"]
     assert nominal is not None
     assert not nominal.values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
 from shipid.metrics import position_error, summary
 from shipid.predictor import physics_paths
@@ -16,9 +18,10 @@ from shipid.simulation import native, rollout
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, prepare, window_memory
-from shipid.study.screen import drivers, families, joined, screen, spread
+from shipid.study.screen import drivers, families, joined, notes, screen, spread
 from shipid.study.store import write_table
 from shipid.vessel.perturb import members
+from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
 
@@ -28,7 +31,7 @@ def plan(tmp_path: Path) -> Plan:
 
 
 def screened(plan: Plan, count: int, name: str = "wrong") -> pd.DataFrame:
-    return joined(list(screen(plan, families(plan, name), count)))
+    return joined(list(screen(plan, obtain(plan), families(plan, name), count)))
 
 
 def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
@@ -76,7 +79,7 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
     monkeypatch.setattr(module, "MEMBERS", 3)
     pd.testing.assert_frame_equal(screened(plan, 7), whole, check_exact=True)
     monkeypatch.setattr(module, "NUMBERS", 1)
-    assert [len(block) for block in screen(plan, families(plan, "wrong"), 3)] == [1, 1, 1]
+    assert [len(block) for block in screen(plan, obtain(plan), families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
 def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Path) -> None:
@@ -126,7 +129,7 @@ def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
         {"name": "other", "base": "gunnerus-28.9", "members": 2, "perturb": more},
     ]
     plan = tiny_plan(tmp_path, {"family": family})
-    frame = joined(list(screen(plan, families(plan), 2)))
+    frame = joined(list(screen(plan, obtain(plan), families(plan), 2)))
     assert list(frame["family"]) == ["wrong", "wrong", "other", "other"]
     assert list(frame["inertia.I_z"][:2]) == [1, 1]
     assert list(frame["inertia.m"][2:]) == [1, 1]
@@ -165,3 +168,12 @@ def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
         pd.testing.assert_frame_equal(read(tmp_path / f"rows{ending}"), frame)
     with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
         write_table(tmp_path / "rows.txt", frame)
+
+
+def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    """Logs without wind, and windows that touch the test in time."""
+    families_ = [
+        {"name": "wide", "base": "gunnerus-28.9", "perturb": [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]}
+    ]
+    plan, dataset = recorded(weaving(), split={"test": 2}, family=families_)
+    assert notes(plan, dataset, families(plan)) == ["R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"]
