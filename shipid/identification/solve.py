@@ -136,8 +136,17 @@ def _start(fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | N
         found = inverse_dynamics(
             fit.vessel, dataset, fit.runs, unknown.groups, scale=unknown.scale, prior=unknown.prior, environment=weather
         )
-        factors = found.factors
+        return _better(fit, found.factors, factors)
     return np.clip(factors, unknown.low, unknown.high)
+
+
+def _better(fit: Fit, first: Array, second: Array) -> Array:
+    """Whichever predicts better: what explains accelerations step by step may diverge in a long prediction."""
+    unknown = fit.unknown
+    starts = [np.clip(factors, unknown.low, unknown.high) for factors in (first, second)]
+    begun = [next(iter(poses(fit, factors)))[1] for factors in starts]
+    objectives = [_objective(fit, predict(fit, x, b.nuisances)) for x, b in zip(starts, begun, strict=True)]
+    return starts[int(np.argmin(objectives))]
 
 
 def _solved(
