@@ -388,7 +388,8 @@ def study_variants(
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
         prepared = prepare(plan, obtain(plan))
         models = prepared.models
-        scores = {model.name: prepared.accuracy(model.name)["mean"] for model in models if model.vessel}
+        known = [model.name for model in models if model.vessel and model.identify is None]
+        scores = {name: prepared.accuracy(name)["mean"] for name in known}
     rows = []
     for model in models:
         factors = model.variant.factors if model.variant else {}

@@ -111,19 +111,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 
     Raises DocumentError where the runs do not suffice.
     """
-    prediction = plan.study.prediction
-    try:
-        windows = cut_windows(
-            dataset,
-            horizon=prediction.horizon,
-            step=prediction.step,
-            interval=prediction.interval,
-            path=plan.study.data.path if plan.study.data else "position",
-        )
-    except DataError as error:
-        raise DocumentError(error.message, file=plan.file, path="prediction.horizon") from None
-    if prediction.samples is not None:
-        windows = windows.select(_place_in_run(windows) < prediction.samples)
+    windows = all_windows(plan, dataset)
     test_runs = _test_runs(plan, windows)
     test = windows.select(np.isin(windows.run, test_runs))
     rest = windows.select(~np.isin(windows.run, test_runs))
@@ -141,6 +129,24 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     if min(plan.study.grid.N_D) == 1:
         _check_single_runs(plan, rest)
     return rest, test, notes
+
+
+def all_windows(plan: Plan, dataset: Dataset) -> Windows:
+    """Every window of a study, test and training; DocumentError where no run is as long as the horizon."""
+    prediction = plan.study.prediction
+    try:
+        windows = cut_windows(
+            dataset,
+            horizon=prediction.horizon,
+            step=prediction.step,
+            interval=prediction.interval,
+            path=plan.study.data.path if plan.study.data else "position",
+        )
+    except DataError as error:
+        raise DocumentError(error.message, file=plan.file, path="prediction.horizon") from None
+    if prediction.samples is not None:
+        windows = windows.select(_place_in_run(windows) < prediction.samples)
+    return windows
 
 
 def _check_single_runs(plan: Plan, pool: Windows) -> None:
@@ -216,7 +222,7 @@ def _roll_out(
     """Paths of every model on (pool, test), members that diverge on the pool redrawn."""
     families = {family.name: family for family in resolve(plan.study.family, plan.file)}
     finished: dict[str, tuple[Model, Pair]] = {}
-    waiting = [model for model in plan.models if model.vessel is not None]
+    waiting = [model for model in plan.models if model.vessel is not None and model.identify is None]
     while waiting:
         again = []
         for model, paths, share in _one_round(plan, dataset, parts, waiting, device):
@@ -232,6 +238,9 @@ def _roll_out(
         waiting = again
     zeros = (np.zeros_like(parts[0].future), np.zeros_like(parts[1].future))
     for model in plan.models:
+        if model.identify is not None and model.variant is not None:  # the same member, before anything is identified
+            same, paths = finished[model.variant.name]
+            finished[model.name] = (replace(model, variant=same.variant), paths)
         finished.setdefault(model.name, (model, zeros))
     models = tuple(finished[model.name][0] for model in plan.models)
     return models, {model.name: finished[model.name][1] for model in models}

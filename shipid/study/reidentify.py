@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import BREAK, Dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification.solve import identify
@@ -25,13 +25,14 @@ class Foundation:
 
     model : with the numbers that were identified, if they were.
     paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
-    sentence : what identification said; empty where nothing was identified.
+    sentence : what identification said; empty where nothing was identified. seconds : that it took.
     """
 
     model: Model
     paths: Array
     test_paths: Array
     sentence: str = ""
+    seconds: float = 0.0
 
     def accuracy(self, test: Windows) -> Mapping[str, Any]:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
@@ -63,14 +64,18 @@ def foundations(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> di
 
 
 def apart(dataset: Dataset, test: Windows) -> Dataset:
-    """The dataset without the moments that the test windows see: on a shared clock runs may overlap."""
+    """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
     if not test.shared_clock:
         return dataset
     t = dataset.frame["t"].to_numpy()
     seen = np.zeros(len(t), dtype=bool)
     for start, end in test.spans.values():
         seen |= (t >= start) & (t <= end)
-    return replace(dataset, frame=dataset.frame[~seen].reset_index(drop=True))
+    names = list(dict.fromkeys([*dataset.metadata["flags"], BREAK]))
+    after = np.concatenate([[False], seen[:-1]])
+    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
+    frame = dataset.frame.assign(flags=flags)[~seen].reset_index(drop=True)
+    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
 
 
 def _identified(
@@ -86,16 +91,16 @@ def _identified(
     assert model.variant is not None
     try:
         solution = identify(own_vessel(model), data, runs, model.identify)
+        if solution.status != "ok":
+            return _nothing(model, windows, prepared.test, solution.sentence)
+        values: Mapping[str, float] = {**model.variant.values, **solution.values}
+        now = replace(model, variant=replace(model.variant, values=values))
+        pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device)
     except (DataError, DocumentError) as error:
         return _nothing(model, windows, prepared.test, error.message)
-    if solution.status != "ok":
-        return _nothing(model, windows, prepared.test, solution.sentence)
-    values: Mapping[str, float] = {**model.variant.values, **solution.values}
-    now = replace(model, variant=replace(model.variant, values=values))
-    pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device)
     if not np.isfinite(pair[0]).all():
         return _nothing(model, windows, prepared.test, "the identified model diverges on training windows")
-    return Foundation(now, *pair, sentence=solution.sentence)
+    return Foundation(now, *pair, sentence=solution.sentence, seconds=solution.seconds)
 
 
 def _nothing(model: Model, windows: Windows, test: Windows, sentence: str) -> Foundation:

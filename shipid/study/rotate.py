@@ -13,7 +13,7 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.study.plan import NO_MODEL, Batch, Plan
-from shipid.study.prepare import partition, prepare
+from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_batch
 
 CONFIDENCE = 0.95
@@ -21,8 +21,9 @@ KEYS = ["test", "model", "kind", "N_D", "seed", "A", "H", "H_90", "naive", "stat
 
 
 def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
-    """Runs that match any pattern, in the order of the dataset; DocumentError for a pattern that matches none."""
-    runs = list(dict.fromkeys(map(str, dataset.frame["run"])))
+    """Runs with windows that match any pattern, in the order of the dataset; DocumentError where one matches none."""
+    cut = all_windows(plan, dataset).spans
+    runs = [run for run in dataset.runs if run in cut]
     chosen: set[str] = set()
     for pattern in patterns:
         found = documents.match(pattern, runs)
@@ -61,7 +62,8 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
     for model, part in per_turn.groupby("model", sort=False):
         row = {"model": model, "turns": len(part), "A": part["A"].mean(), "H": part["H"].mean()}
         row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
-        rows.append(row | {"better": (part["H"] < part["A"]).sum() if model != NO_MODEL else np.nan})
+        compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
+        rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
     return pd.DataFrame(rows)
 
 
@@ -75,8 +77,14 @@ def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return pd.DataFrame(columns=["id", "difference", "mean", "low", "high", "above", "turns"])
     per_turn = _per_turn(frame)
-    A, H = (per_turn.pivot(index="test", columns="kind", values=name) for name in ("A", "H"))
     good, bad = claims.accurate, claims.inaccurate
+    kinds = [good, bad, NO_MODEL, *dict.fromkeys(per_turn["kind"])]
+    A, H = (
+        per_turn.pivot_table(index="test", columns="kind", values=name, dropna=False).reindex(
+            columns=list(dict.fromkeys(kinds))
+        )
+        for name in ("A", "H")
+    )
     others = [kind for kind in H.columns if kind != NO_MODEL and kind not in plan.aside]
     found = {
         ("R1", f"{good}: A less H"): A[good] - H[good],

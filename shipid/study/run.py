@@ -135,7 +135,12 @@ def run_batch(
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for name, foundation in standing.items():
         found = tuned.get(name, Tuned(None, [], 0.0))
-        row = {"cell": batch.cell(name), **shared, "seconds": found.seconds, "trials": found.trials}
+        row = {
+            "cell": batch.cell(name),
+            **shared,
+            "seconds": found.seconds + foundation.seconds,
+            "trials": found.trials,
+        }
         if foundation.model.compensated and found.compensator is None:
             told, predictor = _failed(foundation.sentence or "no training converged"), None
         else:

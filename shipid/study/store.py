@@ -135,7 +135,7 @@ def write_patches(folder: Path, models: Iterable[Model]) -> int:
     """Write a patch document for every variant and return how many; it loads from anywhere and rebuilds it exactly."""
     count = 0
     for model in models:
-        if model.vessel is not None and model.variant is not None:
+        if model.vessel is not None and model.variant is not None and model.identify is None:
             named = documents.bundled("models").get(model.variant.base) == Path(model.vessel.file)
             base = model.variant.base if named else str(Path(model.vessel.file).absolute())
             write_text(folder / f"{model.name}.toml", replace(model.variant, base=base).document())

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DocumentError
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import reidentify, store
 from shipid.study.advise import answer
 from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import prepare, window_memory
@@ -106,6 +107,39 @@ def test_what_cannot_be_identified_fails_in_its_own_cells(tmp_path: Path, record
     for name in ("bad-identified", "bad-both"):
         assert rows.loc[name, "status"] in ("failed", "diverged")
         assert str(rows.loc[name, "sentence"]).startswith("identification: ")
+
+
+def test_a_hole_breaks_a_run(recorded: Recorded) -> None:
+    plan, dataset = study(recorded, [FITTED])
+    test = prepare(plan, dataset).test
+    middle = replace(test, t=np.full(len(test), 15.0), shared_clock=True)  # five seconds ahead
+    parts = [rows["t"] for run, rows in pieces(apart(dataset, middle)) if run == "a"]
+    assert [(part.min(), part.max()) for part in parts] == [(0.0, 14.0), (21.0, 40.0)]
+
+
+def test_a_member_that_diverges_is_redrawn_once_for_all_its_ways(recorded: Recorded) -> None:
+    """Yaw damping of the wrong sign in nearly every draw; the three ways stand on the same member."""
+    family = {"name": "wild", "base": "gunnerus-28.9", "identify": FITTED["identify"], "seed": 2}
+    family["perturb"] = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_ur"], "factor": [-60.0, 3.0]}]
+    plan, dataset = study(recorded, [family])
+    prepared = prepare(plan, dataset)
+    variants = [model.variant for model in prepared.models if model.variant]
+    assert len(variants) == 3
+    assert variants[0] == variants[1] == variants[2]
+    assert variants[0].counter > 0
+    assert sum("redrawn" in note for note in prepared.notes) == variants[0].counter
+
+
+def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
+    recorded: Recorded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, dataset = study(recorded, [FITTED])
+    prepared = prepare(plan, dataset)
+    found = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
+    monkeypatch.setattr(reidentify, "identify", lambda *_: found)
+    both = foundations(plan, prepared, plan.batches[0], "cpu")["wrong-both"]
+    assert np.isnan(both.paths).all()
+    assert both.sentence.startswith("identification: ")
 
 
 @pytest.mark.parametrize(

@@ -91,3 +91,21 @@ def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
     rows = contrasts(frame, claimed).set_index("difference")
     assert rows.loc["good: A less H", "turns"] == 2
     assert spread(frame).set_index("model").loc["good", "turns"] == 2
+
+
+def test_families_of_several_members_and_models_without_any_result(claimed: Plan) -> None:
+    """Members are averaged; where a side of a difference has no result at all there is no number."""
+    frame = by_hand()
+    two = frame.assign(model=frame["model"] + "-2", H=frame["H"] + 1.0)
+    rows = contrasts(pd.concat([frame, two]), claimed).set_index("difference")
+    assert rows.loc["bad: A less H", "mean"] == pytest.approx(3.0)
+    rows = contrasts(frame[frame["model"] != "good"], claimed).set_index("difference")
+    assert np.isnan(rows.loc["good: A less H", "mean"])
+    assert rows.loc["bad: A less H", "turns"] == 3
+
+
+def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    dataset = weaving()
+    short = dataset.frame[(dataset.frame["run"] != "c") | (dataset.frame["t"] < 3.0)].reset_index(drop=True)
+    plan, cut = recorded(Dataset(short, dataset.metadata), split={"test": 1}, prediction={"horizon": 5})
+    assert turns(plan, cut, ["*"]) == ["a", "b", "d", "e", "f"]
