@@ -675,7 +675,7 @@ def _identified_content(found: Identified, dataset: Path) -> IdentificationConte
         profiles=pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(),
         programme=pd.DataFrame() if found.programme is None else found.programme,
         provenance={
-            "Vessel": f"{found.vessel.name}, {found.vessel.file}, digest {found.vessel.digest}",
+            "Vessel": f"{found.vessel.name}, digest {found.vessel.digest}",
             "Dataset": f"{dataset}, digest {found.digest}",
             "Fitted": ", ".join(found.runs),
             "Held out": ", ".join(found.held_out) or "none",

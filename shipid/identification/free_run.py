@@ -48,7 +48,7 @@ def free_runs(
     Step, method and `runs.<run>.<path>` are those of the settings; unknowns of a run stand where nothing is wrong, as
     they would for a run never seen. Raises what `shipid.identification.residuals.build` raises.
     """
-    if length and length < LEAST_STEPS * settings.step:
+    if length and not LEAST_STEPS * settings.step <= length < np.inf:
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
     own = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))

@@ -203,6 +203,8 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
     interval is wide the profile (`shipid.identification.profile`) says whether it ends at all.
     """
     free = np.flatnonzero(~_at_bound(fit))
+    if not len(free):
+        raise ShipidError("every parameter stands at a bound or was dropped: nothing is left to be judged")
     inner = _free(fit, free)
     basis = _Basis.of(inner)
     colours = whiteness(inner, basis.leverage)

@@ -15,7 +15,7 @@ from shipid.report import tables
 from shipid.report.content import Finding, Floats, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, plane
 from shipid.report.page import Section, page, write
-from shipid.report.palette import GRID, INK, MUTED, TRUTH, category
+from shipid.report.palette import GRID, INK, MUTED, category
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number
 
@@ -24,7 +24,7 @@ WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [
 POINTS = 600  # of one line: more than pixels are wide
 FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 LOG, BEFORE, AFTER = "measured", "before", "after"
-INKS = {LOG: TRUTH, BEFORE: category(1), AFTER: category(0)}
+INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
 DASHES = {LOG: "solid", BEFORE: "dot", AFTER: "solid"}
 SIGNALS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
     "r": ("yaw rate, r", "deg/s", float(np.rad2deg(1.0)))
@@ -85,7 +85,11 @@ class IdentificationContent:
 def write_identification(content: IdentificationContent, file: Path) -> Path:
     """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
     parts = [
-        Section("what-is-known", "What is known", (estimates(content), numbers(content), correlations(content))),
+        Section(
+            "what-is-known",
+            "What is known",
+            (estimates(content), numbers(content), unseen(content), correlations(content)),
+        ),
         Section("what-it-buys", "What it buys", (free_runs(content), errors(content), manoeuvres(content))),
         Section("what-is-left", "What is left over", (residuals(content), profiles(content))),
         Section("next", "What to run next", (programme(content),)),
@@ -123,7 +127,12 @@ def estimates(content: IdentificationContent) -> Figure:
         ink = category(0) if known else MUTED
         bar = line("interval", x, y, [_key(known)], line={"color": ink, "width": 2.5 if known else 1.2})
         bar.hoverinfo, bar.hovertemplate = "skip", None
-        marker = {"symbol": "circle" if known else "circle-open", "color": ink, "size": 9, "line": {"width": 2}}
+        marker = {
+            "symbol": "circle" if known else "circle-open",
+            "color": ink,
+            "size": 9,
+            "line": {"color": ink, "width": 2},
+        }
         dots = frame.loc[mine, "factor"].to_numpy(dtype=float)
         dot = line("estimate", dots, rows.astype(float), [_key(known)], mode="markers", marker=marker)
         dot.customdata = [_hover(row) for row in frame[mine].to_dict("records")]
@@ -143,8 +152,7 @@ def estimates(content: IdentificationContent) -> Figure:
         takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
         "an interval wider than ±100 % of the base value, or the estimate stands at a bound or was dropped."
-        + (" Bars that reach an edge go on." if cut else "")
-        + _sentences(content.unseen),
+        + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,
         views={"": [Panel(go.Figure([base, *traces], plot))]},
@@ -157,10 +165,6 @@ def estimates(content: IdentificationContent) -> Figure:
 
 def _key(known: bool) -> str:
     return "identified" if known else "vague"
-
-
-def _sentences(told: Sequence[str]) -> str:
-    return "".join(f" {sentence[0].upper()}{sentence[1:]}." for sentence in told)
 
 
 def _span(frame: pd.DataFrame) -> tuple[float, float]:
@@ -200,12 +204,18 @@ def numbers(content: IdentificationContent) -> Table:
             *(_short(row[name]) for name in ("base", "value", "error", "factor")),
             Cell(f"{row['factor_low']:.3g} … {row['factor_high']:.3g}".replace("-", "−"), float(row["factor_low"])),
             Cell("yes" if row["identified"] else "no", "yes" if row["identified"] else "no", bad=not row["identified"]),
-            text(row["reason"]),
         ]
         for row in content.estimates.to_dict("records")
     ]
-    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "95 % of it", "identified", "why"]
-    return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False, False], rows)
+    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "95 % of it", "identified"]
+    return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False], rows)
+
+
+def unseen(content: IdentificationContent) -> Table | None:
+    """What keeps parameters from being identified; None where nothing does."""
+    rows = [[text(f"{sentence[0].upper()}{sentence[1:]}")] for sentence in content.unseen]
+    takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that tell them apart."
+    return Table("unseen", "What is not seen", takeaway, ["why"], [False], rows) if rows else None
 
 
 def _short(value: float) -> Cell:
@@ -222,7 +232,7 @@ def correlations(content: IdentificationContent) -> Figure | None:
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
     heat = go.Heatmap(
         z=matrix.astype(np.float32), x=names, y=names, zmin=-1, zmax=1, colorscale=scale, xgap=1, ygap=1,
-        colorbar={"thickness": 12, "title": {"text": "correlation [1]", "side": "right"}, "dtick": 0.5},
+        colorbar={"thickness": 12, "title": {"text": "correlation [1]", "side": "right", "font": {"size": 13}}, "dtick": 0.5},
         hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",
     )  # fmt: skip
     apart = np.abs(matrix - np.eye(len(names)))
@@ -305,17 +315,21 @@ def errors(content: IdentificationContent) -> Table:
     """Root mean square errors of the free runs, run by run."""
     words = {"fit": "fitted", "test": "held out"}
     factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
-    wide = content.errors.pivot(index=["set", "run"], columns="model").sort_index(level="set", ascending=False)
-    order = wide.index.get_level_values("run") != "all"
     rows = []
-    for key in [*wide.index[~order], *wide.index[order]]:
-        own = wide.loc[key]
-        cells = [figure(factor * own[name, model], 3) for name, factor in factors.items() for model in (BEFORE, AFTER)]
-        rows.append([text(key[1] if key[1] != "all" else f"all {words[key[0]]}"), text(words[key[0]]), *cells])
-    heads = [f"{name} {model} [{'deg/s' if name == 'r' else 'm' if name == 'position' else 'm/s'}]" for name in factors
-             for model in (BEFORE, AFTER)]  # fmt: skip
+    for kind, run in _all_first(content.errors[["set", "run"]]):
+        mine = content.errors[(content.errors["set"] == kind) & (content.errors["run"] == run)].set_index("model")
+        cells = [figure(factor * mine[name][model], 3) for name, factor in factors.items() for model in (BEFORE, AFTER)]
+        rows.append([text(f"all {words[kind]}" if run == "all" else run), text(kind), *cells])
+    heads = [f"{name} {model}" for name in factors for model in (BEFORE, AFTER)]
     title = f"Root mean square errors of free runs {_length(content)}"
-    return Table("errors", title, "", ["run", "set", *heads], [False, False, *[True] * len(heads)], rows)
+    takeaway = "u, v in m/s, r in deg/s, position in m."
+    return Table("errors", title, takeaway, ["run", "set", *heads], [False, False, *[True] * len(heads)], rows)
+
+
+def _all_first(frame: pd.DataFrame) -> list[tuple[str, str]]:
+    """Sets and runs: runs held out before fitted ones, and all of each before any of them."""
+    pairs = list(dict.fromkeys((str(kind), str(run)) for kind, run in frame.itertuples(index=False)))
+    return sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))
 
 
 def manoeuvres(content: IdentificationContent) -> Table | None:
