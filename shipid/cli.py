@@ -730,8 +730,8 @@ def _iterations() -> Iterator[Any]:
 def _show_identified(found: Identified) -> None:
     """Estimates, what is not seen, free runs, manoeuvres, what to run next, warnings."""
     solution = found.solution
-    fitted = f"{len(found.runs)} runs, {len(solution.residuals)} residuals, {solution.seconds:.1f} s"
-    typer.echo(f"{found.vessel.name}: {solution.sentence}; {fitted}")
+    fitted = f"{len(found.runs)} of {len(found.runs) + len(found.held_out)} runs, {len(solution.residuals)} residuals"
+    typer.echo(f"{found.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
     rows: list[list[str]] = [
         [
             row["path"] + (f" (with {row['with']})" if row["with"] else ""),

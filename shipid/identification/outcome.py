@@ -38,6 +38,7 @@ from shipid.vessel.perturb import patch_text
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 LONG = 10.0  # a horizon of so many memories of the residuals is long
+BETTER = 0.01  # of the limit of a profile: so much better is another place
 SIGNALS = ("u", "v", "r", "position")
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
 """Standard manoeuvres [deg] that both vessels perform in calm water."""
@@ -211,6 +212,7 @@ def run_identification(
     if solution.status != "ok":
         raise ShipidError(solution.sentence)
     found = statistics(Fit.of(solution))
+    curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
     pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
     free = {name: free_runs(pair, dataset, each, settings, ahead) for name, each in sets.items()}
     return Identified(
@@ -226,8 +228,8 @@ def run_identification(
         manoeuvres=_manoeuvres(pair),
         colours=_colours(solution),
         programme=_programme(pair[AFTER], dataset, fitted, solution, found) if programme else None,
-        profiles=tuple(_profile(path, dataset, solution, found) for path in profiles),
-        warnings=tuple(_warnings(solution, found, free)),
+        profiles=curves,
+        warnings=(*_blurred(dataset, fitted, settings), *_warnings(solution, found, free), *_left(solution, curves)),
     )
 
 
@@ -387,6 +389,32 @@ def _profile(path: str, dataset: Dataset, solution: Solution, found: Statistics)
     )
 
 
+def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+    """Whether steps hide what the commands do between them."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    between = float(rows.groupby("run", sort=False)["t"].diff().median())
+    if settings.step <= 1.5 * between:
+        return []
+    return [
+        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: what "
+        f"moves in between is blurred; compare with step {between:.3g}"
+    ]
+
+
+def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
+    """Profiles that found something better than the estimate."""
+    told = []
+    for curve in curves:
+        estimate = solution.factors[solution.paths.index(curve.path)]
+        best = curve.values[np.argmin(curve.rises)]
+        if curve.rises[np.argmin(np.abs(curve.values - estimate))] > BETTER * curve.limit:
+            told.append(
+                f"the estimate is not the best there is: the profile of {curve.path} fits better at {best:.4g}; give "
+                "priors, or another start or horizon"
+            )
+    return told
+
+
 def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
     """What a careful reader would ask first."""
     told, between = [], _spacing(solution)
@@ -406,7 +434,7 @@ def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns
             )
     best = found.covariances[found.chosen]
     if not best.trusted:
-        told.append(f"standard errors are by {best.kind} and not to be trusted: {best.reason}")
+        told.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
         told.append(f"at a bound, so without an interval: {listed(bound)}")

@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In order of preference: the first that is to be trusted is reported, else the last."""
+"""In order of preference: the first that is to be trusted is reported, else the last that says anything."""
 
 LEVEL = 0.95
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
@@ -209,7 +209,7 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
     basis = _Basis.of(inner)
     colours = whiteness(inner, basis.leverage)
     found = _covariances(inner, basis, colours)
-    chosen: Kind = next((kind for kind in KINDS if kind in found and found[kind].trusted), KINDS[-1])
+    chosen: Kind = next((kind for kind in KINDS if kind in found and found[kind].trusted), _last(found))
     best = found[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
@@ -237,6 +237,12 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
         collinearity=seen,
         whiteness=colours,
     )
+
+
+def _last(found: Mapping[Kind, Covariance]) -> Kind:
+    """What is reported where nothing is to be trusted: a single block says nothing, its scores sum to 0."""
+    blocks = found.get("blocks")
+    return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
 
 
 def _at_bound(fit: Fit) -> NDArray[np.bool_]:

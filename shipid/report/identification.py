@@ -230,9 +230,10 @@ def correlations(content: IdentificationContent) -> Figure | None:
     if len(names) < 2:
         return None
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
+    font = {"font": {"size": 13}}
     heat = go.Heatmap(
         z=matrix.astype(np.float32), x=names, y=names, zmin=-1, zmax=1, colorscale=scale, xgap=1, ygap=1,
-        colorbar={"thickness": 12, "title": {"text": "correlation [1]", "side": "right", "font": {"size": 13}}, "dtick": 0.5},
+        colorbar={"thickness": 12, "dtick": 0.5, "title": {"text": "correlation [1]", "side": "right"} | font},
         hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",
     )  # fmt: skip
     apart = np.abs(matrix - np.eye(len(names)))
