@@ -30,6 +30,7 @@ from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.rows import measure_rows
 from shipid.simulation.perform import perform
+from shipid.simulation.scan import uninterrupted
 from shipid.simulation.standard import length_of, standard
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -198,39 +199,57 @@ def run_identification(
     ShipidError : the fit did not converge, in a sentence.
     """
     fitted, tested = pick_runs(dataset, runs, held_out)
-    everything = (*fitted, *tested)
-    overrides(settings, everything, vessel, dynamics(vessel).environment)  # each of a run that is there
-    own = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
+    sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
+    with uninterrupted() as held:  # a library that is interrupted complains of something else
+
+        def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
+            return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
+
+        _check(vessel, settings, (*fitted, *tested), profiles)
+        free({BEFORE: vessel})  # what cannot be run is said before the fit, not after it
+        _go_on(held)
+        own = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
+        solution = identify(vessel, dataset, fitted, own, progress=progress)
+        if solution.status != "ok":
+            raise ShipidError(solution.sentence)
+        _go_on(held)
+        found = statistics(Fit.of(solution))
+        curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
+        pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
+        pairs = free(pair)
+        _go_on(held)
+        warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, found, pairs), *_left(solution, curves))
+        return Identified(
+            vessel=vessel,
+            solution=solution,
+            statistics=found,
+            runs=fitted,
+            held_out=tested,
+            digest=dataset.digest,
+            estimates=_estimates(vessel, solution, found),
+            ahead=ahead,
+            free=pairs,
+            manoeuvres=_manoeuvres(pair),
+            colours=_colours(solution),
+            programme=_programme(pair[AFTER], dataset, fitted, solution, found) if programme else None,
+            profiles=curves,
+            warnings=warnings,
+        )
+
+
+def _go_on(held: Sequence[int]) -> None:
+    """Stop here where Ctrl-C was pressed on the way."""
+    if held:
+        raise KeyboardInterrupt
+
+
+def _check(vessel: Vessel, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
+    """Refuse overrides of what is not there and profiles of what is not free."""
+    overrides(settings, runs, vessel, dynamics(vessel).environment)
     known = unknowns(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:
         raise DataError(f"{wrong!r} is not free in the fit: {choices(wrong, known)}", path="profile")
-    sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
-    for each in sets.values():  # what cannot be run is said before the fit, not after it
-        free_runs({BEFORE: vessel}, dataset, each, settings, ahead)
-    solution = identify(vessel, dataset, fitted, own, progress=progress)
-    if solution.status != "ok":
-        raise ShipidError(solution.sentence)
-    found = statistics(Fit.of(solution))
-    curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
-    pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
-    free = {name: free_runs(pair, dataset, each, settings, ahead) for name, each in sets.items()}
-    return Identified(
-        vessel=vessel,
-        solution=solution,
-        statistics=found,
-        runs=fitted,
-        held_out=tested,
-        digest=dataset.digest,
-        estimates=_estimates(vessel, solution, found),
-        ahead=ahead,
-        free=free,
-        manoeuvres=_manoeuvres(pair),
-        colours=_colours(solution),
-        programme=_programme(pair[AFTER], dataset, fitted, solution, found) if programme else None,
-        profiles=curves,
-        warnings=(*_blurred(dataset, fitted, settings), *_warnings(solution, found, free), *_left(solution, curves)),
-    )
 
 
 def _of_runs(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:

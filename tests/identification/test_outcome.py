@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -232,6 +234,25 @@ def test_a_fit_that_fails_is_its_sentence(log: Dataset, monkeypatch: pytest.Monk
     monkeypatch.setattr(outcome, "identify", stopped)
     with pytest.raises(ShipidError, match="stopped after"):
         run_identification(off(), log, settings())
+
+
+def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Libraries turn an interrupt into complaints of their own; here it comes while they are at work."""
+    real = outcome._measured
+
+    def interrupted(*given: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return real(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(outcome, "_measured", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_identification(off(), log, settings())
+
+    def pressed(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_identification(off(), log, settings(), progress=pressed)
 
 
 def test_patterns_pick_runs_in_the_order_of_the_log(log: Dataset) -> None:
