@@ -631,11 +631,15 @@ def identify(
     options = {key: value for key, value in given.items() if value is not None}
     declared = read_settings(settings, options | _parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
-    with _iterations() as progress:
-        found = run_identification(
-            ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
-            progress=progress,
-        )  # fmt: skip
+    try:
+        with _iterations() as progress:
+            found = run_identification(
+                ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
+                progress=progress,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted: nothing was written\n")
+        sys.exit(130)
     _show_identified(found)
     write_patch(found, file)
     typer.echo(f"{len(found.solution.values)} numbers as a patch on {ship.key} -> {file}")

@@ -123,3 +123,16 @@ def test_the_shell_sees_one_line_and_exit_status_1(tmp_path: Path) -> None:
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert "not a Parquet file" in done.stderr
+
+
+def test_ctrl_c_is_one_line_and_writes_nothing(file: Path) -> None:
+    code = (
+        "import os, signal\nimport shipid.identification.outcome as outcome\nfrom shipid.cli import main\n"
+        "real = outcome.identify\n"
+        "def pressed(*given, **more):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(*given, **more)\n"
+        "outcome.identify = pressed\nmain()"
+    )
+    done = shell("identify", "gunnerus-28.9", file, "--parameters", ONE, "--html", "a.html", code=code)
+    assert done.returncode == 130
+    assert done.stderr == "interrupted: nothing was written\n"
+    assert [one.name for one in Path().iterdir()] == [file.name]
