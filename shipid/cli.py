@@ -740,8 +740,12 @@ def _show_identified(found: Identified) -> None:
         [
             row["path"] + (f" (with {row['with']})" if row["with"] else ""),
             row["unit"],
-            *(f"{row[name]:.4g}" for name in ("base", "value", "factor", "factor_error")),
-            f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}",
+            *(f"{row[name]:.4g}" for name in ("base", "value", "factor")),
+            *(
+                (f"{row['factor_error']:.4g}", f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}")
+                if row["factor_error"] < float("inf")
+                else ("-", "none")
+            ),
             "yes" if row["identified"] else "no",
         ]
         for row in found.estimates.to_dict("records")

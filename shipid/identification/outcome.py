@@ -442,11 +442,11 @@ def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns
     if coloured:
         longest = max(coloured.values())
         told.append(
-            f"residuals of {listed(list(coloured))} remember earlier ones, for {longest:.0f} s: the model, or what is "
-            "known of wind and current, lacks something"
+            f"residuals of {listed(list(coloured))} remember earlier ones, for {_digits(longest)} s: the model, or what "
+            "is known of wind and current, lacks something"
         )
         if 0 < horizon < LONG * longest:
-            longer = f"{LONG * longest:.0f} s, or " if LONG * longest < _longest(solution) else ""
+            longer = f"{_digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
             told.append(
                 f"the horizon of {horizon:g} s is short against that: estimates may be biased beyond their intervals; "
                 f"compare with {longer}whole runs (horizon 0)"
@@ -468,6 +468,11 @@ def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns
         if worse and not diverged:
             told.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
     return told
+
+
+def _digits(value: float) -> str:
+    """Three digits, all of those before the point."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _rounded(value: float) -> float:

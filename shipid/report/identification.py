@@ -202,13 +202,19 @@ def numbers(content: IdentificationContent) -> Table:
             text(row["path"] + (f" (with {row['with']})" if row["with"] else "")),
             text(row["unit"]),
             *(_short(row[name]) for name in ("base", "value", "error", "factor")),
-            Cell(f"{row['factor_low']:.3g} … {row['factor_high']:.3g}".replace("-", "−"), float(row["factor_low"])),
+            _interval(row["factor_low"], row["factor_high"]),
             Cell("yes" if row["identified"] else "no", "yes" if row["identified"] else "no", bad=not row["identified"]),
         ]
         for row in content.estimates.to_dict("records")
     ]
     head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "95 % of it", "identified"]
     return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False], rows)
+
+
+def _interval(low: float, high: float) -> Cell:
+    if not np.isfinite(high - low):
+        return Cell("none", tables.MISSING)
+    return Cell(f"{low:.3g} … {high:.3g}".replace("-", "−"), float(low))
 
 
 def unseen(content: IdentificationContent) -> Table | None:
