@@ -442,8 +442,8 @@ def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns
     if coloured:
         longest = max(coloured.values())
         told.append(
-            f"residuals of {listed(list(coloured))} remember earlier ones, for {_digits(longest)} s: the model, or what "
-            "is known of wind and current, lacks something"
+            f"residuals of {listed(list(coloured))} remember earlier ones, for {_digits(longest)} s: the model, or "
+            "what is known of wind and current, lacks something"
         )
         if 0 < horizon < LONG * longest:
             longer = f"{_digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
