@@ -15,6 +15,8 @@ _PUBLIC = {
     "read_dataset": "shipid.data.dataset",
     "import_log": "shipid.data.importing",
     "cut_windows": "shipid.data.windows",
+    "identify": "shipid.identification.solve",
+    "Identify": "shipid.identification.problem",
     "Predictor": "shipid.predictor",
     "run_study": "shipid.study.run",
     "ShipidError": "shipid.errors",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,8 +17,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from shipid.data.dataset import Dataset
+    from shipid.identification.outcome import Identified
     from shipid.measures.record import Record
     from shipid.report import ReportContent
+    from shipid.report.identification import IdentificationContent
     from shipid.report.manoeuvre import ManoeuvreContent
     from shipid.simulation.standard import Standard
     from shipid.study.results import Results
@@ -576,6 +579,220 @@ def predict(
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
         typer.echo(f"{outside:.0%} of the instants lie outside what the compensator was trained on (column `outside`)")
+
+
+@app.command("identify")
+def identify(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    parameters: Annotated[
+        list[str] | None, typer.Option(help='what is unknown: dotted paths, "hull.derivatives.*", "...[order >= 3]"')
+    ] = None,
+    fixed: Annotated[list[str] | None, typer.Option(help="what of it is not, after all")] = None,
+    together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
+    prior: Annotated[
+        list[str] | None, typer.Option(help="paths=0.3: standard deviation of a factor around the base")
+    ] = None,
+    bounds: Annotated[list[str] | None, typer.Option(help="paths=[0.5, 2]: least and greatest factor")] = None,
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(help="unknown of each run, with =WIDTH if wanted: initial_state, current, heading_bias, ..."),
+    ] = None,
+    horizon: Annotated[float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs")] = None,
+    changes: Annotated[
+        list[str] | None, typer.Option("--set", help="key=value: any other key of [identify], such as weights.u=0.05")
+    ] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with an [identify] table to begin with")] = None,
+    runs: Annotated[list[str] | None, typer.Option(help="runs to fit, * for any part of a name; default: all")] = None,
+    test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
+    ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
+    profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
+    design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml beside you")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
+) -> None:
+    """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
+    from shipid.data.dataset import read_dataset
+    from shipid.data.draft import check_new
+    from shipid.identification.outcome import read_settings, run_identification, write_patch
+    from shipid.vessel.load import load_vessel
+
+    file = out or Path(f"{_stem(vessel)}-identified.toml")
+    check_new(file, "patch")
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    given: dict[str, Any] = {
+        "parameters": parameters,
+        "fixed": fixed,
+        "together": together and [group.split(",") for group in together],
+        "prior": prior and _pairs(prior, "--prior", "paths=0.3"),
+        "bounds": bounds and _pairs(bounds, "--bounds", "paths=[0.5,2]"),
+        "nuisance": nuisance and _widths(nuisance),
+        "horizon": horizon,
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    declared = read_settings(settings, options | _parsed(changes))
+    ship, log = load_vessel(vessel), read_dataset(dataset)
+    try:
+        with _iterations() as progress:
+            found = run_identification(
+                ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
+                progress=progress,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted: nothing was written\n")
+        sys.exit(130)
+    _show_identified(found)
+    write_patch(found, file)
+    typer.echo(f"{len(found.solution.values)} numbers as a patch on {ship.key} -> {file}")
+    if html is not None:
+        from shipid.report.identification import write_identification
+
+        typer.echo(f"page -> {write_identification(_identified_content(found, dataset), html)}")
+
+
+def _identified_content(found: Identified, dataset: Path) -> IdentificationContent:
+    import shlex
+
+    import pandas as pd
+
+    from shipid import __version__
+    from shipid.report.identification import IdentificationContent
+
+    curves = [
+        pd.DataFrame({"factor": own.values, "rise": own.rises}).assign(
+            path=own.path, limit=own.limit, sentence=own.sentence
+        )
+        for own in found.profiles
+    ]
+    return IdentificationContent(
+        title=f"{found.vessel.name}, identified",
+        name=found.vessel.key,
+        estimates=found.estimates,
+        correlations=found.statistics.correlations,
+        unseen=found.unseen,
+        warnings=found.warnings,
+        errors=found.errors,
+        series=found.free["test" if found.held_out else "fit"].series,
+        held_out=found.held_out,
+        ahead=found.ahead,
+        manoeuvres=found.manoeuvres,
+        colours=found.colours,
+        profiles=pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(),
+        programme=pd.DataFrame() if found.programme is None else found.programme,
+        provenance={
+            "Vessel": f"{found.vessel.name}, digest {found.vessel.digest}",
+            "Dataset": f"{dataset}, digest {found.digest}",
+            "Fitted": ", ".join(found.runs),
+            "Held out": ", ".join(found.held_out) or "none",
+            "Fit": f"{found.solution.sentence}; objective {found.solution.objective:.6g}, at first "
+            f"{found.solution.objective_start:.6g}",
+            "shipid": __version__,
+        },
+        command=shlex.join(["shipid", *sys.argv[1:]]),
+        study_document=found.patch(Path()),
+    )
+
+
+def _pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
+    """`paths=value`, the value TOML; paths may hold a comparison."""
+    import tomllib
+
+    result = {}
+    for pair in given:
+        path, equals, text = pair.rpartition("=")
+        try:
+            if not equals or not path:
+                raise ValueError
+            result[path] = tomllib.loads(f"value = {text}")["value"]
+        except ValueError:
+            raise DocumentError(f"{pair!r}: write {example}", path=option) from None
+    return result
+
+
+def _widths(given: list[str]) -> list[str] | dict[str, Any]:
+    """Names, or names with widths; the ordinary width where only others have one."""
+    if not any("=" in name for name in given):
+        return given
+    from shipid.identification.problem import WIDE
+
+    named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
+    return named | _pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
+
+
+@contextmanager
+def _iterations() -> Iterator[Any]:
+    """What `identify` calls after each iteration: a line that is written over, on a terminal only."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status("cutting runs") as status:
+        yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
+
+
+def _show_identified(found: Identified) -> None:
+    """Estimates, what is not seen, free runs, manoeuvres, what to run next, warnings."""
+    solution = found.solution
+    fitted = f"{len(found.runs)} of {len(found.runs) + len(found.held_out)} runs, {len(solution.residuals)} residuals"
+    typer.echo(f"{found.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
+    rows: list[list[str]] = [
+        [
+            row["path"] + (f" (with {row['with']})" if row["with"] else ""),
+            row["unit"],
+            *(f"{row[name]:.4g}" for name in ("base", "value", "factor")),
+            *(
+                (f"{row['factor_error']:.4g}", f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}")
+                if row["factor_error"] < float("inf")
+                else ("-", "none")
+            ),
+            "yes" if row["identified"] else "no",
+        ]
+        for row in found.estimates.to_dict("records")
+    ]
+    columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
+    _print(_table(columns, rows))
+    words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
+    typer.echo(
+        f"Factors are on the base; standard errors and intervals are theirs, by {words[found.statistics.chosen]}."
+    )
+    for sentence in found.unseen:
+        typer.echo(f"  {sentence}")
+    typer.echo(f"Free runs {f'of {found.ahead:g} s' if found.ahead else 'as long as the runs'}, root mean square:")
+    _print(_table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(found)))
+    compared = [
+        [row["manoeuvre"], row["measure"], _digits(row["before"]), _digits(row["after"]), row["unit"], row["note"]]
+        for row in found.manoeuvres.to_dict("records")
+    ]
+    _print(_table(["calm water", "measure", "before", "after", "unit", "note"], compared))
+    for curve in found.profiles:
+        typer.echo(f"profile: {curve.sentence}")
+    if found.programme is not None:
+        typer.echo("To run next, by information per hour:")
+        ranked = [
+            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
+             f"{1 - row['after'] / row['before']:.0%}"]
+            for row in found.programme.head(10).to_dict("records")
+        ]  # fmt: skip
+        _print(_table(["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"], ranked))
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def _free_rows(found: Identified) -> Iterator[list[str]]:
+    from math import degrees
+
+    from shipid.identification.free_run import ALL
+
+    for row in found.errors.to_dict("records"):
+        if row["run"] == ALL:
+            numbers = (row["u"], row["v"], degrees(row["r"]), row["position"])
+            named = {"fit": f"{len(found.runs)} fitted", "test": f"{len(found.held_out)} held out"}[row["set"]]
+            yield [named, row["model"], *(f"{value:.3g}" if value == value else "diverges" for value in numbers)]
 
 
 @app.command("manoeuvre")

@@ -66,7 +66,7 @@ def test_help_and_version_are_light() -> None:
 
 def test_help_names_every_command() -> None:
     for group, commands in (
-        ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre")),
+        ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre", "identify")),
         (["vessel"], ("list", "show", "new")),
         (["data"], ("import", "check", "fetch", "segment", "measures")),
         (["study"], ("list", "variants", "screen", "run", "resume", "report")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -68,6 +69,16 @@ class Dataset:
     def runs(self) -> list[str]:
         """Names of the runs, in the order of the table."""
         return [str(name) for name in self.frame["run"].unique()]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 (first 16 hex digits) of the names and values of the table, whatever its file is called."""
+        found = hashlib.sha256()
+        for name, column in self.frame.items():
+            text = name == "run"
+            found.update(f"{name}\0".encode())
+            found.update("\0".join(column).encode() if text else np.ascontiguousarray(column.to_numpy()).tobytes())
+        return found.hexdigest()[:16]
 
 
 def is_command(name: str) -> bool:

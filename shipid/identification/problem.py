@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
@@ -58,7 +58,9 @@ class Identify(BaseModel):
     prior: dict[str, Positive] = Field(default={}, description="selection -> standard deviation of the factor")
     bounds: dict[str, tuple[float, float]] = Field(default={}, description="selection -> [low, high] of the factor")
     scale: dict[str, Positive] = Field(default={}, description="path -> value at factor 1, where the base value is 0")
-    horizon: NonNegativeFloat = Field(default=30.0, description="s of each prediction; 0: every run as a whole")
+    horizon: Annotated[FiniteFloat, Field(ge=0)] = Field(
+        default=30.0, description="s of each prediction; 0: every run as a whole"
+    )
     step: Positive = Field(default=1.0, description="s")
     method: Literal["euler", "rk4"] = "rk4"
     weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}

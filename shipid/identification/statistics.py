@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,18 +35,21 @@ from scipy import stats
 from shipid.errors import ShipidError
 from shipid.identification.collinearity import UNSEEN, Collinearity, collinearity, listed, short
 
+if TYPE_CHECKING:
+    from shipid.identification.solve import Solution
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In order of preference: the first that is to be trusted is reported, else the last."""
+"""In order of preference: the first that is to be trusted is reported, else the last that says anything."""
 
 LEVEL = 0.95
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
 LEAST_FREEDOM = 4.0  # degrees of freedom under which t misleads (Tipton 2015)
 WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
-MOST_LAGS = 10
+MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; rows of a run that tell any
 BLOCK = 10.0  # length of a block in integrated correlation times
 LEAST = 0.1  # weight under which a factor is left out of a direction
 KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
@@ -78,9 +81,11 @@ class Fit:
     at_bound: NDArray[np.bool_] | None = None
 
     @classmethod
-    def of(cls, solution: Any) -> Fit:
-        """What a `Solution` of `identify` holds of it, name by name."""
-        return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
+    def of(cls, solution: Solution) -> Fit:
+        """What a solution of `identify` holds of it; what was dropped is held, like what stands at a bound."""
+        own = {name: getattr(solution, name) for name in cls.__dataclass_fields__}
+        dropped = np.array([path in solution.dropped for path in solution.paths], dtype=bool)
+        return cls(**{**own, "at_bound": solution.at_bound | dropped})
 
     def __post_init__(self) -> None:
         m, n = self.jacobian.shape
@@ -198,11 +203,13 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
     interval is wide the profile (`shipid.identification.profile`) says whether it ends at all.
     """
     free = np.flatnonzero(~_at_bound(fit))
+    if not len(free):
+        raise ShipidError("every parameter stands at a bound or was dropped: nothing is left to be judged")
     inner = _free(fit, free)
     basis = _Basis.of(inner)
     colours = whiteness(inner, basis.leverage)
     found = _covariances(inner, basis, colours)
-    chosen: Kind = next((kind for kind in KINDS if kind in found and found[kind].trusted), KINDS[-1])
+    chosen: Kind = next((kind for kind in KINDS if kind in found and found[kind].trusted), _last(found))
     best = found[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
@@ -230,6 +237,12 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
         collinearity=seen,
         whiteness=colours,
     )
+
+
+def _last(found: Mapping[Kind, Covariance]) -> Kind:
+    """What is reported where nothing is to be trusted: a single block says nothing, its scores sum to 0."""
+    blocks = found.get("blocks")
+    return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
 
 
 def _at_bound(fit: Fit) -> NDArray[np.bool_]:
@@ -311,26 +324,39 @@ def _colour(runs: Sequence[Array]) -> tuple[float, float]:
     Statistical Science 7 (1992) 473).
     """
     statistic, freedom = 0.0, 0
-    longest = max(len(run) for run in runs)
-    products, pairs = np.zeros(longest), np.zeros(longest)
     for run in runs:
-        size = len(run)
-        power = float(run @ run)
-        if size < 5 or power == 0:
+        size, lagged = len(run), _lagged(run)
+        if size < LEAST_ROWS or lagged[0] == 0:
             continue
-        spectrum = np.fft.rfft(run, 2 * size)
-        lagged = np.fft.irfft(np.abs(spectrum) ** 2)[:size]
-        products[:size] += lagged
-        pairs[:size] += size - np.arange(size)
         lags = np.arange(1, min(MOST_LAGS, size // 5) + 1)
-        statistic += size * (size + 2) * float(((lagged[lags] / power) ** 2 / (size - lags)).sum())
+        statistic += size * (size + 2) * float(((lagged[lags] / float(run @ run)) ** 2 / (size - lags)).sum())
         freedom += len(lags)
     if freedom == 0:
         return 1.0, 1.0
-    rho = products / np.maximum(pairs, 1) / (products[0] / pairs[0])
+    rho = autocorrelation(runs)
     sums = rho[1:-1:2] + rho[2::2]
     until = int(np.argmax(sums <= 0)) if (sums <= 0).any() else len(sums)
     return float(stats.chi2.sf(statistic, freedom)), float(max(1 + 2 * sums[:until].sum(), 1.0))
+
+
+def autocorrelation(runs: Sequence[Array]) -> Array:
+    """Correlation of residuals with those so many samples later, (longest run,), pooled over runs; 1 at lag 0."""
+    longest = max(len(run) for run in runs)
+    products, pairs = np.zeros(longest), np.zeros(longest)
+    for run in runs:
+        size, lagged = len(run), _lagged(run)
+        if size >= LEAST_ROWS and lagged[0] > 0:
+            products[:size] += lagged
+            pairs[:size] += size - np.arange(size)
+    if not pairs[0]:
+        return np.ones(1)
+    return np.asarray(products / np.maximum(pairs, 1) / (products[0] / pairs[0]))
+
+
+def _lagged(run: Array) -> Array:
+    """Sums (N,) of the products of values so many samples apart."""
+    size = len(run)
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(run, 2 * size)) ** 2)[:size]) if run.any() else np.zeros(size)
 
 
 def _covariances(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:

@@ -32,6 +32,7 @@ ANCHORS = (
     "provenance",
 )
 OF_A_MANOEUVRE = ("measures", "criteria", "track", "histories", "spiral")
+OF_AN_IDENTIFICATION = ("estimates", "free-runs")
 # Columns of a trial; whatever else its frame holds is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
@@ -44,14 +45,15 @@ class Sentence:
     Parameters
     ----------
     text : plain text.
-    figure : one of `ANCHORS` or, on the page of a manoeuvre, `OF_A_MANOEUVRE`; empty for no link; ValueError otherwise.
+    figure : one of `ANCHORS` or, on the page of a manoeuvre, `OF_A_MANOEUVRE`, of an identification,
+        `OF_AN_IDENTIFICATION`; empty for no link; ValueError otherwise.
     """
 
     text: str
     figure: str = ""
 
     def __post_init__(self) -> None:
-        known = (*ANCHORS, *OF_A_MANOEUVRE)
+        known = (*ANCHORS, *OF_A_MANOEUVRE, *OF_AN_IDENTIFICATION)
         if self.figure and self.figure not in known:
             raise ValueError(f"no figure is called {self.figure!r}; valid: {', '.join(known)}")
 

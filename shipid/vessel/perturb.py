@@ -97,18 +97,25 @@ class Variant:
 
     def document(self) -> str:
         """The patch as TOML: `load_vessel` on it rebuilds the variant exactly."""
-        patch = tomlkit.document()
-        patch["name"] = self.name
-        patch["base"] = self.base
-        patch["base_digest"] = self.base_digest
-        patch["source"] = (
-            f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
-        )
-        table = tomlkit.table()
-        for path, value in self.values.items():
-            table[path] = value
-        patch["set"] = table
-        return tomlkit.dumps(patch)
+        source = f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
+        return patch_text(self.name, self.base, self.base_digest, source, self.values)
+
+
+def patch_text(
+    name: str,
+    base: str,
+    base_digest: str,
+    source: str,
+    values: Mapping[str, float],
+    provenance: Mapping[str, Any] | None = None,
+) -> str:
+    """A patch document as TOML: a base, by bundled name or by path from the patch, and new values by dotted path."""
+    patch = tomlkit.document()
+    patch.update({"name": name, "base": base, "base_digest": base_digest, "source": source})
+    patch["set"] = dict(values)
+    if provenance:
+        patch["provenance"] = dict(provenance)
+    return tomlkit.dumps(patch)
 
 
 def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:

@@ -1,0 +1,132 @@
+"""Free runs: from one measured state on, by the commands alone, as an identified vessel will be used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid import document as documents
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import build
+from shipid.identification.segments import LEAST_STEPS, Segment
+from shipid.identification.variation import COLUMNS
+from shipid.simulation.rollout import rollout
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+CHANNELS = ("north", "east", "psi", "u", "v", "r")
+MEASURED, ALL = "measured", "all"
+"""The log among the models of a series, and all runs together among the runs of a table of errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRuns:
+    """Free runs of some vessels.
+
+    series : `run`, `piece`, `t` [s], `model` (the log is `measured`), `north`, `east` [m], `psi` [rad],
+        `u`, `v` [m/s], `r` [rad/s]; NaN where a prediction diverges.
+    errors : `run` (`all` at first), `model`, root mean squares `u`, `v` [m/s], `r` [rad/s], `position` [m], and
+        `samples` that were measured, the start of each piece not among them.
+    """
+
+    series: pd.DataFrame
+    errors: pd.DataFrame
+
+
+def free_runs(
+    vessels: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str], settings: Identify, length: float = 0.0
+) -> FreeRuns:
+    """Run vessels of one structure freely along recorded runs, in pieces of `length` [s]; 0: as long as unbroken.
+
+    Step, method and `runs.<run>.<path>` are those of the settings; unknowns of a run stand where nothing is wrong, as
+    they would for a run never seen. Raises what `shipid.identification.residuals.build` raises.
+    """
+    if length and not LEAST_STEPS * settings.step <= length < np.inf:
+        raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
+    own = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
+    first = next(iter(vessels.values()))
+    fit = build(first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": own}))
+    changed = [dict(zip(first.parameters, values.tolist(), strict=True)) for values in fit.base]
+    frames = []
+    for number, run in enumerate(fit.runs):
+        segments = [segment for segment in fit.segments if segment.run == number]
+        away = {path: value for path, value in changed[number].items() if value != first.parameters[path]}
+        values = np.array([list({**vessel.parameters, **away}.values()) for vessel in vessels.values()])
+        predicted = _predicted(first, segments, values, settings)
+        frames += [
+            _series(run, piece, segment, name, predicted[model, piece])
+            for piece, segment in enumerate(segments)
+            for model, name in enumerate((MEASURED, *vessels))
+        ]
+    series = pd.concat(frames, ignore_index=True)
+    return FreeRuns(series.drop(columns="measured"), _errors(series))
+
+
+def _belongs(key: str, runs: Sequence[str]) -> bool:
+    return any(key.startswith(f"{run}.") for run in runs)
+
+
+def _predicted(
+    vessel: Vessel, segments: Sequence[Segment], values: Array, settings: Identify
+) -> dict[tuple[int, int], Array]:
+    """(model, piece) -> (N + 1, channels), the log as model 0; values (V, P) of the others."""
+    model = dynamics(vessel)
+    longest = max(segment.num_steps for segment in segments)
+
+    def column(segment: Segment, name: str) -> Array:
+        return segment.columns.get(COLUMNS.get(name, name), np.zeros(segment.num_steps + 1))
+
+    def held(name: str) -> Array:  # (longest, S): the last one where a piece is shorter
+        rows = [np.minimum(np.arange(longest), segment.num_steps - 1) for segment in segments]
+        return np.array([column(segment, name)[row] for segment, row in zip(segments, rows, strict=True)]).T
+
+    path = rollout(
+        vessel,
+        {name: np.array([column(segment, name)[0] for segment in segments]) for name in (*model.state, *model.hidden)},
+        {name: held(name) for name in model.commands},
+        {name: held(name) for name in model.environment},
+        step=settings.step,
+        num_steps=longest,
+        method=settings.method,
+        parameters=values,
+        memory={name: np.array([segment.memory[name][0] for segment in segments]) for name in model.memory},
+        keep=CHANNELS,
+    )
+    states = np.where(path.diverged[None, :, :, None], np.nan, path.states)
+    found = {}
+    for piece, segment in enumerate(segments):
+        found[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
+        for number in range(len(values)):
+            found[number + 1, piece] = states[: segment.num_steps + 1, number, piece]
+    return found
+
+
+def _series(run: str, piece: int, segment: Segment, model: str, states: Array) -> pd.DataFrame:
+    head = {"run": run, "piece": piece, "t": segment.t, "model": model}
+    seen = segment.measured & (np.arange(len(segment.t)) > 0)
+    return pd.DataFrame({**head, **dict(zip(CHANNELS, states.T, strict=True)), "measured": seen})
+
+
+def _errors(series: pd.DataFrame) -> pd.DataFrame:
+    log = series[series["model"] == MEASURED]
+    rows = []
+    for model in [name for name in series["model"].unique() if name != MEASURED]:
+        own = series[series["model"] == model]
+        away = own[list(CHANNELS)].to_numpy() - log[list(CHANNELS)].to_numpy()
+        squares = {
+            "u": away[:, 3] ** 2, "v": away[:, 4] ** 2, "r": away[:, 5] ** 2,
+            "position": away[:, 0] ** 2 + away[:, 1] ** 2,
+        }  # fmt: skip
+        seen = own["measured"].to_numpy()
+        for run in (ALL, *own["run"].unique()):
+            mine = seen & (np.ones(len(own), dtype=bool) if run == ALL else (own["run"] == run).to_numpy())
+            found = {name: float(np.sqrt(square[mine].mean())) for name, square in squares.items()}
+            rows.append({"run": run, "model": model, **found, "samples": int(mine.sum())})
+    return pd.DataFrame(rows)

@@ -1,0 +1,489 @@
+"""The whole of an identification for who asks: settings, fit, what can be trusted, what it is worth, a patch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from shipid import __version__
+from shipid import document as documents
+from shipid.data.dataset import Dataset
+from shipid.data.draft import write_new
+from shipid.errors import DataError, DocumentError, ShipidError, choices
+from shipid.identification import design
+from shipid.identification.collinearity import listed, short
+from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.problem import BLOCK, Identify, overrides, unknowns
+from shipid.identification.profile import Profile, profile, variance_ratio
+from shipid.identification.shooting import Progress
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import Fit, Statistics, autocorrelation, statistics
+from shipid.measures import MEASURES
+from shipid.measures.recognise import record_of
+from shipid.measures.rows import measure_rows
+from shipid.simulation.perform import perform
+from shipid.simulation.scan import uninterrupted
+from shipid.simulation.standard import length_of, standard
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+from shipid.vessel.perturb import patch_text
+
+Array = NDArray[np.float64]
+BEFORE, AFTER = "before", "after"
+LONG = 10.0  # a horizon of so many memories of the residuals is long
+BETTER = 0.01  # of the limit of a profile: so much better is another place
+SIGNALS = ("u", "v", "r", "position")
+TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
+"""Standard manoeuvres [deg] that both vessels perform in calm water."""
+COMPARED = {
+    "zigzag": ("overshoot_1", "overshoot_2", "initial_turning", "period"),
+    "turning": ("advance", "transfer", "tactical_diameter", "steady_diameter", "steady_speed"),
+}
+
+
+class Settings(BaseModel):
+    """A settings file: one `[identify]` table."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    identify: Identify
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """An identification with all that can be said of it.
+
+    vessel : the base. runs, held_out : fitted, and never seen by the fit. digest : of the dataset.
+    estimates : `path`, `name` (short), `with` (tied paths), `unit`, `base`, `value`, `error`, `low`, `high` [unit],
+        `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
+    ahead : length of a free run [s], 0 for whole runs. free : set (`fit`, `test`) -> free runs `before` and `after`.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
+    colours : `signal`, `lag` [s], `correlation` of the residuals.
+    programme : manoeuvres to run next, as `shipid.identification.design.rank` orders them; None: not asked for.
+    """
+
+    vessel: Vessel
+    solution: Solution
+    statistics: Statistics
+    runs: tuple[str, ...]
+    held_out: tuple[str, ...]
+    digest: str
+    estimates: pd.DataFrame
+    ahead: float
+    free: Mapping[str, FreeRuns]
+    manoeuvres: pd.DataFrame
+    colours: pd.DataFrame
+    programme: pd.DataFrame | None
+    profiles: tuple[Profile, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """`set` beside the columns of `FreeRuns.errors`."""
+        return pd.concat([own.errors.assign(set=name) for name, own in self.free.items()], ignore_index=True)
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """What keeps parameters from being identified: combinations that the data do not see, then other reasons."""
+        vague = self.estimates[~self.estimates["identified"].astype(bool)]
+        found = [
+            own for own in self.statistics.collinearity.combinations if not set(own.paths).isdisjoint(vague["path"])
+        ]
+        explained = {path for own in found for path in own.paths}
+        others = vague.loc[~vague["path"].isin(explained), "reason"]
+        return (*(own.sentence() for own in found), *map(str, others))
+
+    def patch(self, file: Path) -> str:
+        """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly."""
+        vessel, solution = self.vessel, self.solution
+        bundled = documents.bundled("models").get(vessel.key)
+        is_bundled = bundled is not None and bundled.resolve() == Path(vessel.file).resolve()
+        base = vessel.key if is_bundled else os.path.relpath(vessel.file, file.parent)
+        count = f"{len(self.runs)} {'run' if len(self.runs) == 1 else 'runs'}"
+        return patch_text(
+            name=f"{vessel.name}, identified",
+            base=base,
+            base_digest=vessel.digest,
+            source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
+            values=solution.values,
+            provenance=_plain(self._provenance()),
+        )
+
+    def _provenance(self) -> dict[str, Any]:
+        solution, rows = self.solution, self.estimates
+        known = dict(zip(rows["path"], zip(rows["factor"], rows["factor_error"], strict=True), strict=True))
+        free = [row for row in self.errors.to_dict("records") if row["run"] == ALL]
+        return {
+            "shipid": __version__,
+            "dataset": self.digest,
+            "runs": list(self.runs),
+            "held_out": list(self.held_out),
+            "status": solution.status,
+            "sentence": solution.sentence,
+            "residuals": len(solution.residuals),
+            "objective_start": _rounded(solution.objective_start),
+            "objective": _rounded(solution.objective),
+            "standard_errors_by": self.statistics.chosen,
+            "not_identified": rows.loc[~rows["identified"].astype(bool), "path"].tolist(),
+            "warnings": list(self.warnings),
+            "factors": {path: _rounded(factor) for path, (factor, _) in known.items()},
+            "standard_errors": {path: _rounded(error) for path, (_, error) in known.items()},
+            "free_run_rms": {
+                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in SIGNALS} for row in free
+            },
+            "settings": solution.settings.model_dump(),
+        }
+
+
+def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = None) -> Identify:
+    """Settings of a TOML file with an `[identify]` table, or none, with values changed at dotted paths in it."""
+    document = {BLOCK: {}} if file is None else documents.read(file)
+    if not isinstance(document.get(BLOCK, {}), dict):
+        raise DocumentError("must be a table", file=file, path=BLOCK)
+    block = {**document, BLOCK: documents.replace(document.get(BLOCK, {}), changes or {})}
+    return cast(Settings, documents.parse(Settings, block, file)).identify
+
+
+def pick_runs(
+    dataset: Dataset, runs: Sequence[str] = (), held_out: Sequence[str] = ()
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Runs to fit (default: all) and runs held out, by names in which `*` stands for anything; none is in both."""
+
+    def chosen(patterns: Sequence[str], option: str) -> list[str]:
+        found: set[str] = set()
+        for pattern in patterns:
+            names = documents.match(pattern, dataset.runs)
+            if not names:
+                raise DataError(f"{pattern!r} is no run: {choices(pattern, dataset.runs)}", path=option)
+            found.update(names)
+        return [run for run in dataset.runs if run in found]
+
+    tested = chosen(held_out, "held out")
+    fitted = [run for run in (chosen(runs, "runs") if runs else dataset.runs) if run not in tested]
+    if not fitted:
+        raise DataError("every run is held out: leave at least one to the fit", path="runs")
+    return tuple(fitted), tuple(tested)
+
+
+def run_identification(
+    vessel: Vessel,
+    dataset: Dataset,
+    settings: Identify,
+    runs: Sequence[str] = (),
+    held_out: Sequence[str] = (),
+    *,
+    ahead: float = 0.0,
+    profiles: Sequence[str] = (),
+    programme: bool = False,
+    progress: Progress | None = None,
+) -> Identified:
+    """Identify from some runs, and find out what the result is worth, on runs held out above all.
+
+    Parameters
+    ----------
+    runs, held_out : names or patterns, as `pick_runs` takes them.
+    ahead : length of the free runs [s], 0 for whole runs.
+    profiles : factors whose profile likelihood is followed. programme : whether to rank what to run next.
+    progress : as `identify` takes it.
+
+    Raises
+    ------
+    DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
+    ShipidError : the fit did not converge, in a sentence.
+    """
+    fitted, tested = pick_runs(dataset, runs, held_out)
+    sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
+    with uninterrupted() as held:  # a library that is interrupted complains of something else
+
+        def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
+            return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
+
+        _check(vessel, settings, (*fitted, *tested), profiles)
+        free({BEFORE: vessel})  # what cannot be run is said before the fit, not after it
+        _go_on(held)
+        own = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
+        solution = identify(vessel, dataset, fitted, own, progress=progress)
+        if solution.status != "ok":
+            raise ShipidError(solution.sentence)
+        _go_on(held)
+        found = statistics(Fit.of(solution))
+        curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
+        pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
+        pairs = free(pair)
+        _go_on(held)
+        warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, found, pairs), *_left(solution, curves))
+        return Identified(
+            vessel=vessel,
+            solution=solution,
+            statistics=found,
+            runs=fitted,
+            held_out=tested,
+            digest=dataset.digest,
+            estimates=_estimates(vessel, solution, found),
+            ahead=ahead,
+            free=pairs,
+            manoeuvres=_manoeuvres(pair),
+            colours=_colours(solution),
+            programme=_programme(pair[AFTER], dataset, fitted, solution, found) if programme else None,
+            profiles=curves,
+            warnings=warnings,
+        )
+
+
+def _go_on(held: Sequence[int]) -> None:
+    """Stop here where Ctrl-C was pressed on the way."""
+    if held:
+        raise KeyboardInterrupt
+
+
+def _check(vessel: Vessel, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
+    """Refuse overrides of what is not there and profiles of what is not free."""
+    overrides(settings, runs, vessel, dynamics(vessel).environment)
+    known = unknowns(vessel, settings).paths
+    wrong = next((path for path in profiles if path not in known), None)
+    if wrong is not None:
+        raise DataError(f"{wrong!r} is not free in the fit: {choices(wrong, known)}", path="profile")
+
+
+def _of_runs(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
+    """Overrides of some runs alone."""
+    given = documents.leaves(settings.runs)
+    return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
+
+
+def write_patch(found: Identified, file: Path) -> Path:
+    """Write the identified vessel as a patch on its base; one that exists is never written over."""
+    return write_new(found.patch(file), file, "patch")
+
+
+def _estimates(vessel: Vessel, solution: Solution, found: Statistics) -> pd.DataFrame:
+    unknown = unknowns(solution.vessel, solution.settings)
+    rows = []
+    parts = zip(unknown.groups, unknown.scale, short(unknown.paths), strict=True)
+    for j, (group, scales, name) in enumerate(parts):
+        path, scale = group[0], scales[0]
+        low, high = sorted((scale * found.low[j], scale * found.high[j]))
+        dropped = path in solution.dropped
+        rows.append(
+            {
+                "path": path,
+                "name": name,
+                "with": ", ".join(group[1:]),
+                "unit": vessel.units[path],
+                "base": vessel.parameters[path],
+                "value": solution.values[path],
+                "error": abs(scale) * found.errors[j],
+                "low": low,
+                "high": high,
+                "factor": solution.factors[j],
+                "factor_error": found.errors[j],
+                "factor_low": found.low[j],
+                "factor_high": found.high[j],
+                "identified": bool(found.identifiable[j]) and not dropped,
+                "reason": "dropped: the data do not support a change" if dropped else found.sentences[j],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _manoeuvres(pair: Mapping[str, Vessel]) -> pd.DataFrame:
+    """Measures of both vessels; a manoeuvre that one cannot perform leaves numbers out and says why."""
+    rows = []
+    for kind, angles in TRIED:
+        title = f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
+        values: dict[str, dict[str, dict[str, Any]]] = {}
+        notes = []
+        for name, vessel in pair.items():
+            try:
+                values[name] = _measured(vessel, kind, angles)
+            except ShipidError as error:
+                values[name] = {}
+                notes.append(f"{name}: {error.message}")
+        for measure in COMPARED[kind]:
+            label = measure.replace("_", " ")
+            own = {name: values[name].get(label) for name in pair}
+            unit = next((row["unit"] for row in own.values() if row is not None), "")
+            numbers = {name: float("nan") if row is None else row["value"] for name, row in own.items()}
+            why = [f"{name}: {row['note']}" for name, row in own.items() if row is not None and row["note"]]
+            note = "; ".join([*notes, *why])
+            rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
+    return pd.DataFrame(rows)
+
+
+def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, dict[str, Any]]:
+    """Measure -> row of `shipid.measures.rows`."""
+    chosen = standard(vessel, kind, angles)
+    log = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    columns = {str(name): log[name].to_numpy() for name in log if name != "run" and not str(name).startswith("actual.")}
+    rows = measure_rows(MEASURES[kind](record_of(columns)), length_of(vessel))
+    return {row["measure"]: row for row in rows}
+
+
+def _spacing(solution: Solution) -> float:
+    """Time between residuals of one signal [s]."""
+    own = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
+    steps = np.diff(solution.times[own])
+    return float(np.median(steps)) if len(steps) else solution.settings.step
+
+
+def _longest(solution: Solution) -> float:
+    """Length of the longest run [s]."""
+    each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
+    return max(float(np.ptp(times)) for times in each)
+
+
+def _colours(solution: Solution) -> pd.DataFrame:
+    labels, between, frames = np.array(solution.signals), _spacing(solution), []
+    for name in dict.fromkeys(solution.signals):
+        own = labels == name
+        rho = autocorrelation(
+            [solution.residuals[own & (solution.clusters == run)] for run in np.unique(solution.clusters)]
+        )
+        lags = np.arange(min(len(rho), 61))
+        frames.append(pd.DataFrame({"signal": name, "lag": between * lags, "correlation": rho[lags]}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _programme(
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, found: Statistics
+) -> pd.DataFrame:
+    """What to run next, at the median speed of the fitted runs and at half of it, no shaft faster than logged."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    speed = float(np.median(np.hypot(rows["u"], rows["v"])))
+    shafts = [name for name in dynamics(vessel).commands if name.endswith(".n")]
+    most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
+    unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
+    choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
+    spread = {name: width * _level(found, name) for name, width in settings.weights.items()}
+    told = design.informed(
+        vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
+        interval=settings.step,
+    )  # fmt: skip
+    prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
+    return design.rank(told, unknown.paths, found.information + np.diag(prior))
+
+
+def _level(found: Statistics, signal: str) -> float:
+    """How many declared standard deviations the residuals of a signal have."""
+    columns = {"position": "north"}
+    return found.whiteness[columns.get(signal, signal)].level
+
+
+def _profile(path: str, dataset: Dataset, solution: Solution, found: Statistics) -> Profile:
+    index = solution.paths.index(path)
+    unknown = unknowns(solution.vessel, solution.settings)
+    held = {
+        gone: (factor, factor)
+        for gone, factor in zip(solution.paths, solution.factors, strict=True)
+        if gone in solution.dropped
+    }
+
+    def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
+        limits = {**solution.settings.bounds, **held, name: (factor, factor)}
+        own = solution.settings.model_copy(update={"bounds": limits, "drop": None})
+        begin = dict(zip(solution.paths, start.tolist(), strict=True))
+        again = identify(solution.vessel, dataset, solution.runs, own, start=begin)
+        return (again.objective if again.status == "ok" else float("inf")), again.factors
+
+    free = found.collinearity.paths
+    if path not in free:
+        raise DataError(f"{path!r} stands at a bound: it has no profile", path="profile")
+    return profile(
+        path,
+        solution.factors,
+        index,
+        solution.objective,
+        refit,
+        half_width=float(found.high[index] - solution.factors[index]),
+        freedom=float(found.covariances[found.chosen].freedom[free.index(path)]),
+        ratio=variance_ratio(found, path),
+        bounds=(float(unknown.low[index]), float(unknown.high[index])),
+    )
+
+
+def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+    """Whether steps hide what the commands do between them."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    between = float(rows.groupby("run", sort=False)["t"].diff().median())
+    if settings.step <= 1.5 * between:
+        return []
+    return [
+        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: what "
+        f"moves in between is blurred; compare with step {between:.3g}"
+    ]
+
+
+def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
+    """Profiles that found something better than the estimate."""
+    told = []
+    for curve in curves:
+        estimate = solution.factors[solution.paths.index(curve.path)]
+        best = curve.values[np.argmin(curve.rises)]
+        if curve.rises[np.argmin(np.abs(curve.values - estimate))] > BETTER * curve.limit:
+            told.append(
+                f"the estimate is not the best there is: the profile of {curve.path} fits better at {best:.4g}; give "
+                "priors, or another start or horizon"
+            )
+    return told
+
+
+def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
+    """What a careful reader would ask first."""
+    told, between = [], _spacing(solution)
+    coloured = {name: own.memory * between for name, own in found.whiteness.items() if not own.white}
+    horizon = solution.settings.horizon
+    if coloured:
+        longest = max(coloured.values())
+        told.append(
+            f"residuals of {listed(list(coloured))} remember earlier ones, for {_digits(longest)} s: the model, or "
+            "what is known of wind and current, lacks something"
+        )
+        if 0 < horizon < LONG * longest:
+            longer = f"{_digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
+            told.append(
+                f"the horizon of {horizon:g} s is short against that: estimates may be biased beyond their intervals; "
+                f"compare with {longer}whole runs (horizon 0)"
+            )
+    best = found.covariances[found.chosen]
+    if not best.trusted:
+        told.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
+    bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
+    if bound:
+        told.append(f"at a bound, so without an interval: {listed(bound)}")
+    if "test" not in free:
+        told.append("no run was held out: how well others are predicted is not known")
+    for name, own in free.items():
+        every = own.errors[own.errors["run"] == ALL].set_index("model")
+        diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
+        if diverged:
+            told.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
+        worse = [signal for signal in SIGNALS if float(every[signal][AFTER]) > float(every[signal][BEFORE])]
+        if worse and not diverged:
+            told.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
+    return told
+
+
+def _digits(value: float) -> str:
+    """Three digits, all of those before the point."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def _rounded(value: float) -> float:
+    """Six digits: what a reader needs, the same on every machine."""
+    return float(f"{value:.6g}")
+
+
+def _plain(value: Any) -> Any:
+    """What TOML can hold: no null, lists for tuples."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(own) for key, own in value.items() if own is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(own) for own in value]
+    return value

@@ -1,0 +1,440 @@
+"""The page of an identification: what is known of each number, what it is worth on runs held out, what is left over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report import tables
+from shipid.report.content import Finding, Floats, Sentence
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, plane
+from shipid.report.page import Section, page, write
+from shipid.report.palette import GRID, INK, MUTED, category
+from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.wording import counted, listed, number
+
+ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
+WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
+POINTS = 600  # of one line: more than pixels are wide
+FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
+LOG, BEFORE, AFTER = "measured", "before", "after"
+INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
+DASHES = {LOG: "solid", BEFORE: "dot", AFTER: "solid"}
+SIGNALS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
+    "r": ("yaw rate, r", "deg/s", float(np.rad2deg(1.0)))
+}
+"""Column -> what it is, the unit shown, and how many of those an SI unit is."""
+
+
+@dataclass(frozen=True, eq=False)
+class IdentificationContent:
+    """Everything the page shows.
+
+    Parameters
+    ----------
+    title, name : the vessel in words, and a short name.
+    estimates : `name`, `path`, `with`, `unit`, `base`, `value`, `error`, `factor`, `factor_low`, `factor_high`,
+        `identified`, `reason`; infinite where nothing is known.
+    correlations : (n, n) of the estimates, in their order.
+    unseen, warnings : sentences.
+    errors : `set` (`fit`, `test`), `run` (`all` at first), `model` (`before`, `after`), root mean squares `u`, `v`
+        [m/s], `r` [rad/s], `position` [m].
+    series : `run`, `piece`, `t` [s], `model` (`measured`, `before`, `after`), `north`, `east` [m], `psi` [rad],
+        `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
+    held_out, ahead : runs, and length of a free run [s], 0 for whole runs.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
+    colours : `signal`, `lag` [s], `correlation` of the residuals.
+    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point; without rows there is no figure.
+    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`; may be empty.
+    """
+
+    title: str
+    name: str
+    estimates: pd.DataFrame
+    correlations: Floats
+    unseen: Sequence[str]
+    warnings: Sequence[str]
+    errors: pd.DataFrame
+    series: pd.DataFrame
+    held_out: Sequence[str]
+    ahead: float
+    manoeuvres: pd.DataFrame
+    colours: pd.DataFrame
+    profiles: pd.DataFrame = field(default_factory=pd.DataFrame)
+    programme: pd.DataFrame = field(default_factory=pd.DataFrame)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
+    study_document: str = ""
+    findings: Sequence[Finding] = ()
+
+    @property
+    def answer(self) -> list[Sentence]:
+        """How much is known, what it buys on runs held out, and what to be careful with."""
+        known, count = int(self.estimates["identified"].sum()), len(self.estimates)
+        said = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
+        said.append(Sentence(_bought(self), "free-runs"))
+        return [*said, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
+
+
+def write_identification(content: IdentificationContent, file: Path) -> Path:
+    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
+    parts = [
+        Section(
+            "what-is-known",
+            "What is known",
+            (estimates(content), numbers(content), unseen(content), correlations(content)),
+        ),
+        Section("what-it-buys", "What it buys", (free_runs(content), errors(content), manoeuvres(content))),
+        Section("what-is-left", "What is left over", (residuals(content), profiles(content))),
+        Section("next", "What to run next", (programme(content),)),
+    ]
+    return write(page(content, [part for part in parts if any(part.items)], "identification"), file)
+
+
+def _bought(content: IdentificationContent) -> str:
+    which = "test" if content.held_out else "fit"
+    rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")]
+    rms = rows.set_index("model")[[*SIGNALS, "position"]].astype(float)
+    runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
+    told = [
+        f"{name} from {number(factor * rms[name][BEFORE])} to {number(factor * rms[name][AFTER])} {unit}"
+        for name, (_, unit, factor) in {**SIGNALS, "position": ("", "m", 1.0)}.items()
+    ]
+    return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(told)}."
+
+
+def _length(content: IdentificationContent) -> str:
+    return f"of {content.ahead:g} s" if content.ahead else "over the whole run"
+
+
+def estimates(content: IdentificationContent) -> Figure:
+    """Estimates with 95 % intervals as factors on the base values; hollow where not identified."""
+    frame = content.estimates
+    low, high = _span(frame)
+    traces = []
+    for known in (True, False):
+        mine = frame["identified"].to_numpy(dtype=bool) == known
+        rows = np.flatnonzero(mine)
+        ends = np.clip(frame.loc[mine, ["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
+        x = np.column_stack([ends, np.full(len(rows), np.nan)]).ravel()
+        y = np.repeat(rows, 3).astype(float)
+        ink = category(0) if known else MUTED
+        bar = line("interval", x, y, [_key(known)], line={"color": ink, "width": 2.5 if known else 1.2})
+        bar.hoverinfo, bar.hovertemplate = "skip", None
+        marker = {
+            "symbol": "circle" if known else "circle-open",
+            "color": ink,
+            "size": 9,
+            "line": {"color": ink, "width": 2},
+        }
+        dots = frame.loc[mine, "factor"].to_numpy(dtype=float)
+        dot = line("estimate", dots, rows.astype(float), [_key(known)], mode="markers", marker=marker)
+        dot.customdata = [_hover(row) for row in frame[mine].to_dict("records")]
+        dot.hovertemplate = "%{customdata}<extra></extra>"
+        traces += [bar, dot]
+    base = line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line={"color": INK, "width": 1, "dash": "dot"})
+    base.hoverinfo, base.hovertemplate = "skip", None
+    y_axis = axis("", tickvals=list(range(len(frame))), ticktext=list(map(label, frame["name"])), showgrid=False)
+    y_axis["range"] = [len(frame) - 0.4, -0.6]
+    x_axis = axis("factor on the base value [1]", nticks=9, range=[low, high])
+    plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44})
+    cut = bool(((frame["factor_low"] < low) | (frame["factor_high"] > high)).any())
+    vague = frame.loc[~frame["identified"].astype(bool), "name"].tolist()
+    return Figure(
+        id="estimates",
+        title="The estimates",
+        takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
+        how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
+        "an interval wider than ±100 % of the base value, or the estimate stands at a bound or was dropped."
+        + (" Bars that reach an edge go on." if cut else ""),
+        alternative="Estimates with intervals; the table below has the numbers.",
+        height=ROW * len(frame) + HEAD,
+        views={"": [Panel(go.Figure([base, *traces], plot))]},
+        chips=[
+            Chip(_key(True), "identified", category(0), symbol="circle"),
+            Chip(_key(False), "not identified", MUTED, symbol="circle-open", width=1.2),
+        ],
+    )
+
+
+def _key(known: bool) -> str:
+    return "identified" if known else "vague"
+
+
+def _span(frame: pd.DataFrame) -> tuple[float, float]:
+    """Factors that are drawn: every estimate, and intervals as far as they let estimates be told apart."""
+    dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
+    reach = FARTHEST * max(float(np.ptp(dots)), 0.25)
+    ends = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
+    ends = ends[np.isfinite(ends)]
+    low = max(float(min(ends.min(initial=1.0), dots.min())), float(dots.min()) - reach)
+    high = min(float(max(ends.max(initial=1.0), dots.max())), float(dots.max()) + reach)
+    room = 0.04 * (high - low)
+    return low - room, high + room
+
+
+def _hover(row: Mapping[Any, Any]) -> str:
+    interval = f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}"
+    words = [f"<b>{label(str(row['path']))}</b> x {row['factor']:.4g}, 95 % {interval}"]
+    return "<br>".join([*words, *_broken(label(str(row["reason"])))])
+
+
+def _broken(words: str, most: int = 70) -> list[str]:
+    """Words on lines of at most so many characters."""
+    lines = [""]
+    for word in words.split():
+        if len(lines[-1]) + len(word) > most:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return lines
+
+
+def numbers(content: IdentificationContent) -> Table:
+    """Every estimate in its unit."""
+    rows = [
+        [
+            text(row["path"] + (f" (with {row['with']})" if row["with"] else "")),
+            text(row["unit"]),
+            *(_short(row[name]) for name in ("base", "value", "error", "factor")),
+            _interval(row["factor_low"], row["factor_high"]),
+            Cell("yes" if row["identified"] else "no", "yes" if row["identified"] else "no", bad=not row["identified"]),
+        ]
+        for row in content.estimates.to_dict("records")
+    ]
+    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "95 % of it", "identified"]
+    return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False], rows)
+
+
+def _interval(low: float, high: float) -> Cell:
+    if not np.isfinite(high - low):
+        return Cell("none", tables.MISSING)
+    return Cell(f"{low:.3g} … {high:.3g}".replace("-", "−"), float(low))
+
+
+def unseen(content: IdentificationContent) -> Table | None:
+    """What keeps parameters from being identified; None where nothing does."""
+    rows = [[text(f"{sentence[0].upper()}{sentence[1:]}")] for sentence in content.unseen]
+    takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that tell them apart."
+    return Table("unseen", "What is not seen", takeaway, ["why"], [False], rows) if rows else None
+
+
+def _short(value: float) -> Cell:
+    if not np.isfinite(value):
+        return Cell("–", tables.MISSING)
+    return Cell(f"{value:.4g}".replace("-", "−"), float(value))
+
+
+def correlations(content: IdentificationContent) -> Figure | None:
+    """Correlations of the estimates; None for a single one."""
+    names, matrix = list(map(label, content.estimates["name"])), np.asarray(content.correlations, dtype=float)
+    if len(names) < 2:
+        return None
+    scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
+    font = {"font": {"size": 13}}
+    heat = go.Heatmap(
+        z=matrix.astype(np.float32), x=names, y=names, zmin=-1, zmax=1, colorscale=scale, xgap=1, ygap=1,
+        colorbar={"thickness": 12, "dtick": 0.5, "title": {"text": "correlation [1]", "side": "right"} | font},
+        hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",
+    )  # fmt: skip
+    apart = np.abs(matrix - np.eye(len(names)))
+    i, j = np.unravel_index(int(np.argmax(apart)), matrix.shape)
+    y_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, autorange="reversed")
+    x_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, tickangle=-90)
+    plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 8, "t": 8, "b": 8})
+    return Figure(
+        id="correlations",
+        title="What moves with what",
+        takeaway=f"Most correlated are {content.estimates['name'].iloc[i]} and {content.estimates['name'].iloc[j]}: "
+        f"{number(float(matrix[i, j]))}.",
+        how="Correlations of the errors of the estimates: near 1 or −1, a change of one is made good by a change of "
+        "the other, and only their combination is known.",
+        alternative="Heat map of the correlations of all pairs of estimates.",
+        height=WIDTH * len(names) + SIDE,
+        views={"": [Panel(go.Figure([heat], plot))]},
+    )
+
+
+def free_runs(content: IdentificationContent) -> Figure:
+    """Measured motion and free runs before and after, one run at a time."""
+    runs = [str(run) for run in pd.unique(content.series["run"])]
+    views = {str(i): _panels(content.series[content.series["run"] == run]) for i, run in enumerate(runs)}
+    return Figure(
+        id="free-runs",
+        title="Free runs " + ("of runs held out" if content.held_out else "of the fitted runs"),
+        takeaway=_bought(content),
+        how=f"Each free run {_length(content)} begins at the measured state and goes by the commands alone, with no "
+        "current, bias or other unknown of the run."
+        + (" New pieces begin where lines are broken." if content.ahead else "")
+        + " The map, north up with equal axes, shows what is measured and identified; the base may leave it.",
+        alternative="Speeds, yaw rate and tracks, measured and predicted; the table below has the errors.",
+        height=290,
+        views=views,
+        controls=[Control("run", runs)],
+        chips=[Chip(name, name, INKS[name], DASHES[name]) for name in INKS],
+    )
+
+
+def _panels(rows: pd.DataFrame) -> list[Panel]:
+    start, parts = float(rows["t"].min()), {name: _joined(rows[rows["model"] == name]) for name in INKS}
+    panels = []
+    for column, (title, unit, factor) in SIGNALS.items():
+        traces = [
+            line(name, mine["t"].to_numpy() - start, factor * mine[column].to_numpy(), [name], unit, line=_ink(name))
+            for name, mine in parts.items()
+        ]
+        y = axis(f"{title} [{unit}]", nticks=6, zeroline=True, zerolinecolor=GRID)
+        panels.append(Panel(go.Figure(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
+    tracks = [
+        line(name, mine["east"].to_numpy(), mine["north"].to_numpy(), [name], line=_ink(name))
+        for name, mine in parts.items()
+    ]
+    shown = pd.concat([parts[LOG], parts[AFTER]])
+    bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
+    return [*panels, Panel(go.Figure(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
+
+
+def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Spans that a map can have."""
+    return [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
+
+
+def _ink(name: str) -> dict[str, Any]:
+    return {"color": INKS[name], "width": 1.4 if name == LOG else 2, "dash": DASHES[name]}
+
+
+def _joined(mine: pd.DataFrame) -> pd.DataFrame:
+    """Pieces one after the other, broken between them."""
+    every = max(1, len(mine) // POINTS)
+    parts = []
+    for _, piece in mine.groupby("piece", sort=False):
+        gap = piece.iloc[-1:].assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
+        parts += [piece.iloc[::every], gap]
+    return pd.concat(parts)
+
+
+def errors(content: IdentificationContent) -> Table:
+    """Root mean square errors of the free runs, run by run."""
+    words = {"fit": "fitted", "test": "held out"}
+    factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
+    rows = []
+    for kind, run in _all_first(content.errors[["set", "run"]]):
+        mine = content.errors[(content.errors["set"] == kind) & (content.errors["run"] == run)].set_index("model")
+        cells = [figure(factor * mine[name][model], 3) for name, factor in factors.items() for model in (BEFORE, AFTER)]
+        rows.append([text(f"all {words[kind]}" if run == "all" else run), text(kind), *cells])
+    heads = [f"{name} {model}" for name in factors for model in (BEFORE, AFTER)]
+    title = f"Root mean square errors of free runs {_length(content)}"
+    takeaway = "u, v in m/s, r in deg/s, position in m."
+    return Table("errors", title, takeaway, ["run", "set", *heads], [False, False, *[True] * len(heads)], rows)
+
+
+def _all_first(frame: pd.DataFrame) -> list[tuple[str, str]]:
+    """Sets and runs: runs held out before fitted ones, and all of each before any of them."""
+    pairs = list(dict.fromkeys((str(kind), str(run)) for kind, run in frame.itertuples(index=False)))
+    return sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))
+
+
+def manoeuvres(content: IdentificationContent) -> Table | None:
+    """Measures of standard manoeuvres before and after; None where there are none."""
+    if content.manoeuvres.empty:
+        return None
+    noted = bool(content.manoeuvres["note"].ne("").any())
+    rows = [
+        [
+            text(row["manoeuvre"]),
+            text(row["measure"]),
+            *(_short(row[name]) for name in (BEFORE, AFTER)),
+            text(row["unit"]),
+            *[Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] * noted,
+        ]
+        for row in content.manoeuvres.to_dict("records")
+    ]
+    head = ["manoeuvre", "measure", BEFORE, AFTER, "unit", *["why missing"] * noted]
+    takeaway = "Simulated in calm deep water from a Froude number of 0.2."
+    numeric = [False, False, True, True, False, *[False] * noted]
+    return Table("manoeuvres", "Standard manoeuvres", takeaway, head, numeric, rows)
+
+
+def residuals(content: IdentificationContent) -> Figure | None:
+    """Autocorrelation of the residuals; None without any."""
+    if content.colours.empty:
+        return None
+    names = [str(name) for name in pd.unique(content.colours["signal"])]
+    parts = {name: content.colours[content.colours["signal"] == name] for name in names}
+    traces = [
+        line(
+            name,
+            mine["lag"].to_numpy(),
+            mine["correlation"].to_numpy(),
+            [name],
+            "",
+            line={"color": category(i), "width": 2},
+        )
+        for i, (name, mine) in enumerate(parts.items())
+    ]
+    y = axis("autocorrelation [1]", nticks=6, zeroline=True, zerolinecolor=INK, range=[-0.55, 1.05])
+    first = {name: float(mine["correlation"].iloc[1]) if len(mine) > 1 else 0.0 for name, mine in parts.items()}
+    told = [f"{name} {number(value)}" for name, value in first.items()]
+    return Figure(
+        id="residuals",
+        title="What the residuals remember",
+        takeaway=f"One sample later, residuals correlate by {listed(told)}.",
+        how="Autocorrelation of the weighted residuals, pooled over runs. White residuals fall to 0 at once; a long "
+        "tail is what the model, or the data on wind and current, lack, and standard errors count it by runs.",
+        alternative="Autocorrelation of the residuals of each signal over lag.",
+        height=300,
+        views={"": [Panel(go.Figure(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
+        chips=[Chip(name, name, category(i)) for i, name in enumerate(names)],
+    )
+
+
+def profiles(content: IdentificationContent) -> Figure | None:
+    """Profile likelihoods that were asked for; None without."""
+    if content.profiles.empty:
+        return None
+    panels, told = [], []
+    for path, mine in content.profiles.groupby("path", sort=False):
+        x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
+        y = np.minimum(mine["rise"].to_numpy(dtype=float), 3 * limit)
+        curve = line("profile", x, y, [], "", mode="lines+markers", line={"color": category(0), "width": 2})
+        end = line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"})
+        axes = (
+            axis(f"factor of {label(str(path))} [1]", nticks=6),
+            axis("worse by [variances]", nticks=6, rangemode="tozero"),
+        )
+        panels.append(Panel(go.Figure([end, curve], layout(*axes, hovermode="closest"))))
+        told.append(str(mine["sentence"].iloc[0]))
+    return Figure(
+        id="profiles",
+        title="Profile likelihood",
+        takeaway="; ".join(told) + ".",
+        how="How much worse the best fit becomes when one factor is held away from its estimate and all others are "
+        "fitted again; the 95 % interval is where the curve lies below the dotted line.",
+        alternative="Curves of the profile likelihood.",
+        height=290,
+        views={"": panels},
+    )
+
+
+def programme(content: IdentificationContent) -> Table | None:
+    """Manoeuvres to run next; None where nobody asked."""
+    if content.programme.empty:
+        return None
+    rows = [
+        [
+            text(row["manoeuvre"]),
+            *(figure(row[name], 2) for name in ("hours", "gain", "per_hour")),
+            text(row["narrows"]),
+            figure(100 * (1 - row["after"] / row["before"]), 0),
+        ]
+        for row in content.programme.to_dict("records")
+    ]
+    head = ["manoeuvre", "time [h]", "gain [bit]", "gain [bit/h]", "narrows most", "by [%]"]
+    best = content.programme.iloc[0]
+    takeaway = f"Most information per hour about these parameters: {best['manoeuvre']}."
+    return Table("programme", "Candidates", takeaway, head, [False, True, True, True, False, True], rows)

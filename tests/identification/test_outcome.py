@@ -1,0 +1,311 @@
+"""The whole of an identification: what is said agrees with what was done, and a patch is the vessel that was found."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError, DocumentError, ShipidError
+from shipid.identification import outcome
+from shipid.identification.free_run import ALL, CHANNELS, MEASURED, free_runs
+from shipid.identification.outcome import (
+    AFTER,
+    BEFORE,
+    Identified,
+    pick_runs,
+    read_settings,
+    run_identification,
+    write_patch,
+)
+from shipid.identification.problem import Identify
+from shipid.identification.residuals import build, predict
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import Fit, autocorrelation, statistics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.identification.trials import changed, trials
+
+SHIP = load_vessel("gunnerus-28.9")
+FEW = ["hull.derivatives.N_ur", "hull.derivatives.N_uv", "hull.derivatives.Y_ur"]
+NOISE = {"u": 0.02, "v": 0.02, "r": math.radians(0.1)}
+
+
+def noisy(dataset: Dataset, seed: int = 3) -> Dataset:
+    rng = np.random.default_rng(seed)
+    return changed(dataset, **{n: dataset.frame[n] + rng.normal(0, s, len(dataset.frame)) for n, s in NOISE.items()})
+
+
+def off() -> Vessel:
+    """The ship before it is identified."""
+    return SHIP.with_values({path: 0.7 * SHIP.parameters[path] for path in FEW})
+
+
+def settings(**more: object) -> Identify:
+    return Identify(**{"parameters": FEW, "start": "base", "horizon": 0, "weights": NOISE, **more})
+
+
+@pytest.fixture(scope="module")
+def log() -> Dataset:
+    return noisy(trials(SHIP, runs=5, steps=60))
+
+
+@pytest.fixture(scope="module")
+def found(log: Dataset) -> Identified:
+    return run_identification(off(), log, settings(), held_out=["M05"], profiles=FEW[:1], programme=True)
+
+
+def test_it_tells_what_the_parts_tell(found: Identified, log: Dataset) -> None:
+    alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
+    assert found.runs == alone.runs
+    assert found.held_out == ("M05",)
+    known = statistics(Fit.of(alone))
+    assert np.allclose(found.estimates["factor"], alone.factors, rtol=1e-6)
+    assert np.allclose(found.estimates["factor_error"], known.errors, rtol=1e-4)
+    for row in found.estimates.to_dict("records"):
+        base = off().parameters[row["path"]]
+        assert row["base"] == base
+        assert row["value"] == pytest.approx(base * row["factor"])
+        assert row["error"] == pytest.approx(abs(base) * row["factor_error"])
+        assert row["low"] < row["value"] < row["high"]
+        assert row["identified"]
+        assert row["unit"] == SHIP.units[row["path"]]
+
+
+def test_the_truth_is_within_and_free_runs_are_better(found: Identified) -> None:
+    for row in found.estimates.to_dict("records"):  # four standard errors: one in 16,000
+        assert abs(row["value"] - SHIP.parameters[row["path"]]) < 4 * row["error"]
+    rms = found.errors[(found.errors["set"] == "test") & (found.errors["run"] == ALL)].set_index("model")
+    for name, width in NOISE.items():
+        assert rms[name][AFTER] == pytest.approx(width, rel=0.5)  # what is left is the noise
+    assert rms["position"][AFTER] < 0.5 * rms["position"][BEFORE]
+    assert not found.warnings
+    assert not found.unseen
+
+
+def test_measures_before_and_after_are_those_of_the_vessels(found: Identified) -> None:
+    table = found.manoeuvres
+    truth = outcome._manoeuvres({BEFORE: off(), AFTER: SHIP})
+    assert np.allclose(table["before"], truth["before"])
+    assert np.allclose(table["after"], truth["after"], rtol=0.1)
+    assert set(table["manoeuvre"]) == {"zigzag 10/10", "zigzag 20/20", "turning 35"}
+    assert (table["note"] == "").all()
+    assert np.isfinite(table["before"]).all()
+
+
+def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
+    without = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file, "x")
+    table = outcome._manoeuvres({BEFORE: without, AFTER: SHIP})
+    assert table["before"].isna().all()
+    assert np.isfinite(table["after"]).all()
+    assert table["note"].str.contains("L_pp").all()
+
+
+def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(found: Identified, tmp_path: Path) -> None:
+    base = tmp_path / "base.toml"
+    base.write_text('base = "gunnerus-28.9"\n[set]\n' + "".join(f'"{p}" = {off().parameters[p]!r}\n' for p in FEW))
+    mine = replace(found, vessel=load_vessel(str(base)))
+    file = write_patch(mine, tmp_path / "new" / "patch.toml")
+    again = load_vessel(str(file))
+    expected = off().parameters | dict(found.solution.values)
+    assert again.parameters == expected  # bit for bit
+    document = tomllib.loads(file.read_text())
+    assert document["base"] == "../base.toml"
+    told = document["provenance"]
+    assert told["dataset"] == found.digest
+    assert told["held_out"] == ["M05"]
+    assert told["runs"] == list(found.runs)
+    assert told["settings"]["weights"]["u"] == NOISE["u"]
+    assert told["standard_errors"].keys() == set(FEW)
+    assert told["free_run_rms"].keys() == {"fit before", "fit after", "test before", "test after"}
+    assert Identify(**told["settings"]) == settings()
+    assert mine.patch(file) == file.read_text()
+    with pytest.raises(DataError, match="not written over"):
+        write_patch(mine, file)
+
+
+def test_a_patch_on_a_bundled_vessel_names_it(found: Identified, tmp_path: Path) -> None:
+    assert tomllib.loads(replace(found, vessel=SHIP).patch(tmp_path / "a.toml"))["base"] == "gunnerus-28.9"
+
+
+def test_the_profile_agrees_with_the_interval(found: Identified) -> None:
+    curve = found.profiles[0]
+    row = found.estimates.set_index("path").loc[curve.path]
+    assert curve.path == FEW[0]
+    assert curve.low == pytest.approx(row["factor_low"], abs=0.3 * row["factor_error"])
+    assert curve.high == pytest.approx(row["factor_high"], abs=0.3 * row["factor_error"])
+
+
+def test_the_programme_is_ranked(found: Identified) -> None:
+    table = found.programme
+    assert table is not None
+    assert table["per_hour"].is_monotonic_decreasing
+    assert (table["after"] <= table["before"]).all()
+    assert (table["after"] < table["before"]).iloc[0]
+    assert set(table["narrows"]) <= set(FEW)
+
+
+def test_free_runs_are_what_the_residuals_of_a_fit_see(log: Dataset) -> None:
+    """The rollout of a free run and the predictions of a fit are the same numbers, up to what compilers round."""
+    own = free_runs({BEFORE: off()}, log, ["M02", "M04"], settings(), 20.0)
+    fit = build(off(), log, ["M02", "M04"], settings(horizon=20))
+    at = predict(fit, np.ones(3), np.zeros((2, 0)))
+    rms = own.errors[own.errors["run"] == ALL].iloc[0]
+    for name, width in NOISE.items():
+        assert rms[name] == pytest.approx(np.sqrt(np.mean((width * at.r[at.signals == name]) ** 2)), rel=1e-6)
+    starts = own.series[own.series["t"] == own.series.groupby(["run", "piece"])["t"].transform("min")]
+    pairs = starts.set_index(["run", "piece", "model"])[list(CHANNELS)]
+    assert np.allclose(pairs.xs(MEASURED, level="model"), pairs.xs(BEFORE, level="model"))
+    assert own.series["piece"].max() == 2
+
+
+def test_free_runs_take_what_is_set_for_a_run(log: Dataset) -> None:
+    calm = free_runs({BEFORE: SHIP}, log, ["M01", "M02"], settings()).errors.set_index("run")["u"]
+    windy = settings(runs={"M02": {"environment": {"V_w": 15.0}}})
+    found = free_runs({BEFORE: SHIP}, log, ["M01", "M02"], windy).errors.set_index("run")["u"]
+    assert found["M01"] == calm["M01"]
+    assert found["M02"] != calm["M02"]
+
+
+def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
+    wild = SHIP.with_values({"hull.derivatives.X_u|u|": -100 * SHIP.parameters["hull.derivatives.X_u|u|"]})
+    own = free_runs({BEFORE: SHIP, AFTER: wild}, log, ["M01"], settings())
+    rows = own.errors[own.errors["run"] == ALL].set_index("model")
+    assert rows.loc[AFTER, ["u", "v", "r", "position"]].isna().all()
+    assert np.isfinite(rows["u"][BEFORE])
+
+
+def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> None:
+    rng, drift = np.random.default_rng(1), np.zeros(len(log.frame))
+    for i in range(1, len(drift)):
+        drift[i] = 0.95 * drift[i - 1] + 0.05 * rng.normal()
+    mended = changed(log, v=log.frame["v"] + drift)
+    own = run_identification(off(), mended, settings(horizon=20.0), ahead=30.0)
+    told = " ".join(own.warnings)
+    assert "remember earlier ones" in told
+    assert "the horizon of 20 s is short" in told
+    assert "no run was held out" in told
+
+
+def test_what_was_dropped_has_no_interval_and_says_so(log: Dataset) -> None:
+    extra = "hull.derivatives.X_uvv"  # true as it is
+    own = run_identification(off(), log, settings(parameters=[*FEW, extra], drop=3.0))
+    rows = own.estimates.set_index("path")
+    assert own.solution.dropped == (extra,)
+    assert rows["value"][extra] == SHIP.parameters[extra]
+    assert not rows["identified"][extra]
+    assert "dropped" in rows["reason"][extra]
+    assert rows["identified"][FEW].all()
+    with pytest.raises(ShipidError, match="nothing is left"):
+        run_identification(SHIP, log, settings(drop=5.0))
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"runs": ["M011"]}, "'M011' is no run: did you mean"),
+        ({"held_out": ["ZZ*"]}, "'ZZ.' is no run: valid: M01, M02"),
+        ({"held_out": ["*"]}, "every run is held out"),
+        ({"profiles": ["hull.derivatives.N_u"]}, "is not free in the fit: did you mean"),
+        ({"ahead": 1.0}, "must hold two steps"),
+        ({"ahead": 500.0}, "no unbroken stretch"),
+    ],
+)
+def test_mistakes_are_told_before_anything_is_solved(
+    more: dict[str, object], message: str, log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(outcome, "identify", lambda *_, **__: pytest.fail("solved"))
+    with pytest.raises(DataError, match=message):
+        run_identification(SHIP, log, settings(), **more)  # type: ignore[arg-type]
+
+
+def test_a_fit_that_fails_is_its_sentence(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = identify
+
+    def stopped(*given: object, **more: object) -> Solution:
+        return real(*given, **{**more, "progress": lambda count, _: count >= 1})  # type: ignore[arg-type]
+
+    monkeypatch.setattr(outcome, "identify", stopped)
+    with pytest.raises(ShipidError, match="stopped after"):
+        run_identification(off(), log, settings())
+
+
+def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Libraries turn an interrupt into complaints of their own; here it comes while they are at work."""
+    real = outcome._measured
+
+    def interrupted(*given: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return real(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(outcome, "_measured", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_identification(off(), log, settings())
+
+    def pressed(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_identification(off(), log, settings(), progress=pressed)
+
+
+def test_patterns_pick_runs_in_the_order_of_the_log(log: Dataset) -> None:
+    assert pick_runs(log) == (("M01", "M02", "M03", "M04", "M05"), ())
+    assert pick_runs(log, ["M04", "M01"], ["M0[12]", "M05"][1:]) == (("M01", "M04"), ("M05",))
+    assert pick_runs(log, ["*"], ["*5", "M01"]) == (("M02", "M03", "M04"), ("M01", "M05"))
+
+
+def test_settings_are_read_and_changed(tmp_path: Path) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text('[identify]\nparameters = ["hull.*"]\nhorizon = 20\nweights = {u = 0.1, r = 0.01}\n')
+    own = read_settings(file, {"horizon": 0, "weights.u": 0.05})
+    assert own.horizon == 0
+    assert own.weights == {"u": 0.05, "r": 0.01}
+    assert own.parameters == ["hull.*"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[identify]\nhorizont = 3\n", "identify.horizont: unknown key: did you mean 'horizon'"),
+        ("[identify]\n", "identify.parameters: missing"),
+        ("[identfy]\n", "identfy: unknown key: did you mean 'identify'"),
+        ("identify = 3\n", "identify: must be a table"),
+        ("[identify\n", "not valid TOML"),
+        ('[identify]\nparameters = ["a"]\nweights = {w = 1}\n', "weights.w is none"),
+        ('[identify]\nparameters = ["a"]\nhorizon = 1\n', "must hold two steps"),
+    ],
+)
+def test_a_bad_settings_file_is_one_line(text: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text(text)
+    with pytest.raises(DocumentError) as error:
+        read_settings(file)
+    assert message in str(error.value)
+    assert str(error.value).startswith(str(file))
+
+
+def test_digests_know_values_not_names_of_files(log: Dataset) -> None:
+    assert Dataset(log.frame.copy(), {**log.metadata, "source": "x"}).digest == log.digest
+    other = log.frame.copy()
+    other.loc[3, "u"] += 1e-12
+    assert Dataset(other, log.metadata).digest != log.digest
+
+
+def test_autocorrelation_of_what_is_known() -> None:
+    """A first-order autoregression of coefficient a has rho_k = a^k (Box, Jenkins, Time Series Analysis, ch. 3)."""
+    rng, runs = np.random.default_rng(2), []
+    for _ in range(4):
+        x = np.zeros(20000)
+        for i, e in enumerate(rng.normal(size=len(x) - 1)):
+            x[i + 1] = 0.8 * x[i] + e
+        runs.append(x)
+    rho = autocorrelation(runs)
+    assert rho[0] == 1
+    assert np.allclose(rho[1:6], 0.8 ** np.arange(1, 6), atol=0.03)
