@@ -341,6 +341,7 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
 
 def _block(path: str, values: Values, **words: str) -> Iterator[str]:
     yield f"[{path}]"
+    yield 'source = "the formula or guess beside each number"'
     yield from (f"{key} = {_quoted(word)}" for key, word in words.items())
     for key, value in values.items():
         shown = _quoted(key) if "|" in key and '"' not in key else key
