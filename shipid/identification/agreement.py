@@ -52,7 +52,8 @@ def agreement(one: Statistics, other: Statistics) -> Agreement:
     if a is None or b is None or len(a) != len(b):
         raise ShipidError("the fits must be of the same runs to be compared")
     inner = [own.collinearity.paths for own in (one, other)]
-    paths = tuple(path for path in inner[0] if path in inner[1])
+    seen = [set(np.array(own.fit.paths)[np.isfinite(own.alone)]) for own in (one, other)]  # others stay where they began
+    paths = tuple(path for path in inner[0] if path in seen[0] & seen[1])
     if not paths:
         raise ShipidError("the fits have no factor in common")
     places = [[own.index(path) for path in paths] for own in inner]
