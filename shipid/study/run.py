@@ -84,9 +84,7 @@ def run_study(
     fixed = {m.name: prepared.test_paths[m.name] for m in prepared.models if m.identify is None}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
     store.write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
-    store.write_json(
-        folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models]
-    )
+    store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models])
     for note in prepared.notes:
         yield Event("note", note)
     done = store.finished(folder, plan.batches)

@@ -1,7 +1,7 @@
-"""KVLCC2 identified from zigzags of HSVA and checked on others; `python -m tests.identification.kvlcc2` prints the table.
+"""KVLCC2 identified from zigzags of HSVA, checked on others; `python -m tests.identification.kvlcc2` prints the table.
 
-The logs hold the rudder angle as it stood, so the vessel to identify has no steering gear. In the zigzags that she sails
-by herself she has: the helmsman of the tests is late, by the same time in all of them.
+The logs hold the rudder angle as it stood, so the vessel to identify has no steering gear. In the zigzags that she
+sails by herself she has one: the helmsman of the tests is late, by the same time in all of them.
 """
 
 from __future__ import annotations
