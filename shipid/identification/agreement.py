@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 class Agreement:
     """Two fits compared.
 
-    paths : factors that both have found. differences, errors : (n,) first less second, and its standard error.
+    paths : factors that both have found and that their data see. differences, errors : (n,) first less second, and
+        its standard error.
     probability : (n,) of a difference this large by chance. agree : whether all may be chance. sentence : in words.
     """
 
@@ -52,7 +53,8 @@ def agreement(one: Statistics, other: Statistics) -> Agreement:
     if a is None or b is None or len(a) != len(b):
         raise ShipidError("the fits must be of the same runs to be compared")
     inner = [own.collinearity.paths for own in (one, other)]
-    paths = tuple(path for path in inner[0] if path in inner[1])
+    unseen = {path for own in (one, other) for path in np.array(own.fit.paths)[np.isinf(own.alone)].tolist()}
+    paths = tuple(path for path in inner[0] if path in inner[1] and path not in unseen)  # unseen: left where begun
     if not paths:
         raise ShipidError("the fits have no factor in common")
     places = [[own.index(path) for path in paths] for own in inner]

@@ -30,6 +30,8 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "orchestration": 1,
     "identification": 2,
 }
+ASKED = {"coverage": 1}  # the same, of what says no time and takes minutes: only where it is named
+GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
 WIDTH = 140
 
@@ -37,14 +39,18 @@ WIDTH = 140
 def main() -> int:
     """Run the benchmarks named, or all; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("groups", nargs="*", metavar="group", help=f"one of {', '.join(THREADS)}; default: all")
+    parser.add_argument(
+        "groups", nargs="*", metavar="group", help=f"of {', '.join(GROUPS)}; default: all that are timed"
+    )
     parser.add_argument("--record", action="store_true", help="accept the ratios measured now")
+    parser.add_argument("--replicates", type=int, default=200, help="of the group coverage")
     asked = parser.parse_args()
-    unknown = [name for name in asked.groups if name not in THREADS]
+    unknown = [name for name in asked.groups if name not in GROUPS]
     if unknown:
         parser.error(f"no such group: {', '.join(unknown)}")
     recorded = read_recorded()
-    figures = {name: measure(name) for name in asked.groups or THREADS}
+    options = {"coverage": {"replicates": asked.replicates}}
+    figures = {name: measure(name, **options.get(name, {})) for name in asked.groups or THREADS}
     again = {ratio.group for ratio in compare(figures, recorded) if ratio.regressed and not asked.record}
     if again:
         print(f"measured once more: {', '.join(sorted(again))}", file=sys.stderr)
@@ -59,11 +65,11 @@ def main() -> int:
     return verdict(ratios)
 
 
-def measure(name: str) -> dict[str, Any]:
-    """Figures of one group."""
+def measure(name: str, **options: Any) -> dict[str, Any]:
+    """Figures of one group; options are those of its `run`."""
     print(f"{name} ...", file=sys.stderr)
-    use_threads(THREADS[name])
-    figures: dict[str, Any] = import_module(f"tests.benchmarks.{name}").run()
+    use_threads(GROUPS[name])
+    figures: dict[str, Any] = import_module(f"tests.benchmarks.{name}").run(**options)
     return figures
 
 
@@ -95,7 +101,7 @@ def write(figures: dict[str, dict[str, Any]], ratios: list[Ratio]) -> None:
         for one in ratios
     ]
     report = {"date": date.today().isoformat(), "machine": machine() | {"processor": processor()}}
-    report |= {"threads": {name: THREADS[name] for name in figures}, "figures": figures, "ratios": compared}
+    report |= {"threads": {name: GROUPS[name] for name in figures}, "figures": figures, "ratios": compared}
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(report, indent=1) + "\n")
     print(f"-> {RESULTS}")

@@ -52,3 +52,15 @@ def test_a_fit_agrees_with_itself_and_other_runs_are_refused() -> None:
         agreement(one, statistics(part))
     with pytest.raises(ShipidError, match="in common"):
         agreement(one, statistics(replace(one.fit, paths=tuple("abcd"))))
+
+
+def test_what_the_data_do_not_see_is_not_compared() -> None:
+    """Two columns that are one: each factor alone stays where its fit began, which says nothing about a bias."""
+    error = noise(np.random.default_rng(0), RUNS, 40, 0.8)
+    begun = []
+    for jacobian, away in ((LONG, 0.0), (SHORT, 0.3)):
+        fit = fitted(np.column_stack([jacobian, jacobian[:, :1]]), error, *LABELS)
+        begun.append(statistics(replace(fit, factors=fit.factors + away * np.array([1, 0, 0, 0, -1]))))
+    found = agreement(*begun)
+    assert found.agree
+    assert set(found.paths) == {"p1", "p2", "p3"}
