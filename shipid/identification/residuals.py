@@ -106,7 +106,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
     model, unknown = dynamics(vessel), unknowns(vessel, settings)
-    own = overrides(settings, runs, vessel, model.environment)
+    own = overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
