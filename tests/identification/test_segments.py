@@ -79,3 +79,20 @@ def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
     wanted = Identify(parameters=["hull.derivatives.N_uv"], horizon=10, weights={"u": 1e-3, "v": 1e-3, "r": 1e-4})
     at = predict(build(vessel, data, data.runs, wanted), np.ones(1), np.zeros((2, 0)))
     assert np.abs(at.r).max() < 1e-6
+
+
+def test_actuators_lag_as_in_their_own_run() -> None:
+    """An override of an actuator's time constant also says where the actuator stands when a prediction begins."""
+    vessel = variety()["actuators"]
+    own = {path: 3.0 * x for path, x in vessel.parameters.items() if path.startswith("thruster.port.actuator.n.")}
+    numbers = np.tile(list(vessel.parameters.values()), (2, 1))
+    numbers[1] = list(vessel.with_values(own).parameters.values())
+    data = trials(vessel, runs=2, steps=40, parameters=numbers)
+    overrides = {f"M02.{path}": x for path, x in own.items()}
+    worst = []
+    for runs in ({}, overrides):
+        for free in ("hull.derivatives.N_uv", "thruster.starboard.actuator.*"):  # memory as given, and carried
+            fit = build(vessel, data, data.runs, Identify(parameters=[free], horizon=7, runs=runs))
+            worst.append(np.abs(predict(fit, np.ones(fit.num_factors), np.zeros((2, 0))).r).max())
+    assert min(worst[:2]) > 1e-3
+    assert max(worst[2:]) < 1e-6
