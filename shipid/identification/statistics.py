@@ -265,8 +265,9 @@ def _free(fit: Fit, free: Index) -> Fit:
     widths = _widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return Fit(
-        paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent
-    )
+        paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent,
+        runs=fit.runs,
+    )  # fmt: skip
 
 
 def _widths(fit: Fit) -> Array:

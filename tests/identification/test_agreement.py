@@ -52,3 +52,21 @@ def test_a_fit_agrees_with_itself_and_other_runs_are_refused() -> None:
         agreement(one, statistics(part))
     with pytest.raises(ShipidError, match="in common"):
         agreement(one, statistics(replace(one.fit, paths=tuple("abcd"))))
+
+
+def test_runs_are_matched_by_name() -> None:
+    """The same fit with its runs numbered the other way round agrees with itself to the last digit of its errors."""
+    one, other = (
+        statistics(replace(own.fit, runs=tuple(f"M{number}" for number in range(RUNS)))) for own in two(0, bias=0.1)
+    )
+    turned = statistics(replace(other.fit, clusters=RUNS - 1 - other.fit.clusters, runs=other.fit.runs[::-1]))
+    np.testing.assert_allclose(agreement(one, turned).errors, agreement(one, other).errors, rtol=1e-9)
+    renamed = statistics(replace(other.fit, runs=("M99", *other.fit.runs[1:])))
+    with pytest.raises(ShipidError, match=r"same runs.*M0 and M99"):
+        agreement(one, renamed)
+
+
+def test_nothing_free_is_nothing_to_compare() -> None:
+    one, other = two(0)
+    with pytest.raises(ShipidError, match="in common"):
+        agreement(one, statistics(replace(other.fit, held=np.ones(COUNT, dtype=bool))))
