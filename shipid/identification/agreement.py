@@ -48,15 +48,20 @@ def agreement(one: Statistics, other: Statistics) -> Agreement:
     ------
     ShipidError : the fits have other runs, or no factor in common.
     """
-    sandwiches = [own.covariances["sandwich"] for own in (one, other)]
-    a, b = (own.influences for own in sandwiches)
-    if a is None or b is None or len(a) != len(b):
-        raise ShipidError("the fits must be of the same runs to be compared")
+    runs = [_runs(own) for own in (one, other)]
+    if set(runs[0]) != set(runs[1]):
+        apart = listed(sorted(set(runs[0]) ^ set(runs[1])))
+        raise ShipidError(f"the fits must be of the same runs to be compared; only one of them has {apart}")
     inner = [own.collinearity.paths for own in (one, other)]
     unseen = {path for own in (one, other) for path in np.array(own.fit.paths)[np.isinf(own.alone)].tolist()}
     paths = tuple(path for path in inner[0] if path in inner[1] and path not in unseen)  # unseen: left where begun
     if not paths:
         raise ShipidError("the fits have no factor in common")
+    sandwiches = [own.covariances["sandwich"] for own in (one, other)]
+    a, b = (own.influences for own in sandwiches)
+    assert a is not None
+    assert b is not None
+    b = b[[runs[1].index(run) for run in runs[0]]]
     places = [[own.index(path) for path in paths] for own in inner]
     factors = [own.fit.factors[[own.fit.paths.index(path) for path in paths]] for own in (one, other)]
     differences = factors[0] - factors[1]
@@ -74,6 +79,12 @@ def agreement(one: Statistics, other: Statistics) -> Agreement:
             "one is biased; believe the longer horizon"
         )
     return Agreement(paths, differences, errors, probability, not names, told)
+
+
+def _runs(own: Statistics) -> list[str]:
+    """Name of each run, as the rows of the influences."""
+    numbers = np.unique(own.fit.clusters).tolist()
+    return [own.fit.runs[number] if own.fit.runs else str(number) for number in numbers]
 
 
 def _holm(probability: Array) -> NDArray[np.bool_]:

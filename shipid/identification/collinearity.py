@@ -88,8 +88,9 @@ def collinearity(jacobian: Array, paths: Sequence[str]) -> Collinearity:
     moved = lengths > 0
     scaled = _unit(jacobian)
     values, vectors = _eigen(scaled.T @ scaled)
-    indices = np.sqrt(max(values[0], UNSEEN) / np.maximum(values, UNSEEN * max(values[0], 1.0)))
-    variances = (vectors**2 / np.maximum(values, UNSEEN * max(values[0], 1.0))).T
+    largest = values.max(initial=UNSEEN)
+    indices = np.sqrt(largest / np.maximum(values, UNSEEN * max(largest, 1.0)))
+    variances = (vectors**2 / np.maximum(values, UNSEEN * max(largest, 1.0))).T
     effective = np.flatnonzero(moved)
     return Collinearity(
         paths=tuple(paths),

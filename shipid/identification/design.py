@@ -27,20 +27,19 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.errors import ShipidError, choices
+from shipid.identification.problem import SIGNALS
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import Excitation, HelmOver, Manoeuvre, Spiral
+from shipid.simulation.manoeuvre import Excitation, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.rollout import rollout
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.simulation.truth import RPM
+from shipid.simulation.truth import RPM, aboard, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 
 PERTURBED, START = 0.01, {"u": 0.01, "v": 0.01, "r": 0.001, "psi": 0.001, "north": 0.1, "east": 0.1}
-SEEN = {"u": "u", "v": "v", "r": "r", "psi": "psi", "position": "north"}
-POSITION = ("north", "east")
 UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known
 SWING = 0.3  # of the shaft speed: how far it moves in speed runs
 RUN = 20.0  # ship lengths at the speed of the approach that a run of excitation takes
@@ -121,11 +120,8 @@ def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) ->
 
 def allowed(manoeuvre: Manoeuvre, limits: Limits) -> bool:
     """Whether no order is beyond the limits; rates bind excitations alone, the actuators have their own."""
-    angle = max((abs(own) for own in manoeuvre.angles_deg), default=0.0) if isinstance(manoeuvre, Spiral) else 0.0
-    if isinstance(manoeuvre, (HelmOver, Excitation)):
-        angle = manoeuvre.angle_deg
-    time = np.linspace(0, manoeuvre.length, 1000)
-    return bool(angle <= limits.angle_deg and np.abs(manoeuvre.shaft(time)).max() <= limits.n_rpm / 60 + 1e-12)
+    shaft = manoeuvre.greatest_shaft <= limits.n_rpm * (1 + 1e-9)
+    return shaft and manoeuvre.greatest_helm <= limits.angle_deg * (1 + 1e-9)
 
 
 def informed(
@@ -154,9 +150,9 @@ def informed(
     ------
     ShipidError : a signal that is not known, no candidate, or a candidate that cannot be simulated.
     """
-    unknown = next((name for name in weights if name not in SEEN), None)
+    unknown = next((name for name in weights if name not in SIGNALS), None)
     if unknown is not None:
-        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, SEEN)}", path="weights")
+        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, SIGNALS)}", path="weights")
     if not choice:
         raise ShipidError("no manoeuvre is within the limits of the actuators")
     every = _every(vessel, interval) if step is None else max(round(interval / step), 1)
@@ -164,9 +160,7 @@ def informed(
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     log = perform(vessel, named, step=fine, environment=environment or {})
     cut = _cut(vessel, log, environment or {}, round(horizon / interval) * every, every)
-    signals = {
-        name: width for own, width in weights.items() for name in (POSITION if own == "position" else (SEEN[own],))
-    }
+    signals = {name: width for own, width in weights.items() for name in SIGNALS[own]}
     by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
     each = _projected(by_factor, by_start)
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
@@ -209,7 +203,7 @@ def _cut(vessel: Vessel, log: pd.DataFrame, environment: Mapping[str, float], st
     rows = np.minimum(np.array(firsts) + np.arange(most)[:, None], np.array(lasts))  # (T, S)
     records = np.array(firsts) + np.arange(0, most + 1, every)[:, None]
     columns = {str(name): log[name].to_numpy() for name in log.columns if name != "run"}
-    columns["down"] = columns.get("z", np.zeros(len(log)))
+    columns |= {**aboard(columns), "down": columns.get("z", np.zeros(len(log)))}
     still = np.zeros(len(log))
     given = {name: np.full(len(log), float(environment.get(name, 0.0))) for name in model.environment}
     return _Cut(
@@ -251,11 +245,13 @@ def _sensitivities(
 
         path = rollout(
             vessel, start, tiled(cut.commands), tiled(cut.environment), parameters=parameters,
-            memory=tiled(cut.memory) if cut.memory else None, keep=tuple(signals), **how,
+            memory=tiled(cut.memory) if cut.memory else None, **how,
         )  # fmt: skip
         if path.diverged.any():
             raise ShipidError(f"{vessel.name} diverges with a factor changed by {PERTURBED:.0%}: take a shorter step")
-        return np.asarray(path.states / np.array(list(signals.values())))
+        states = {name: path[name] for name in dynamics(vessel).state}
+        seen = states | horizontal(states)
+        return np.stack([seen[name] / width for name, width in signals.items()], axis=-1)
 
     def rows(values: Array) -> Array:  # (R, k, S, signals) -> (S, R * signals, k)
         inside = np.where(cut.seen[:, None, :, None], values, 0.0)

@@ -30,6 +30,7 @@ from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.errors import DataError
 from shipid.identification.collinearity import Collinearity, collinearity
 from shipid.simulation.scan import memory_along
+from shipid.simulation.truth import aboard
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -322,7 +323,7 @@ def _stretch(
     if absent is not None:
         raise DataError(f"command {absent!r} is needed by {vessel.name} and not logged", path=str(rows["run"].iloc[0]))
     zero = np.zeros(len(t))
-    columns |= _aboard(columns, zero)
+    columns |= {**aboard(columns), "down": columns.get("z", zero)}
     state = np.array([columns.get(name, zero) for name in (*model.state, *model.hidden)])
     commands = np.array([columns[name] for name in model.commands]).reshape(-1, len(t))
     reached = memory_along(vessel, {name: columns[name] for name in model.commands}, t) or {}
@@ -340,15 +341,6 @@ def _stretch(
     orders = np.concatenate([commands, commands[:, changed - 1]], axis=1)
     nu = state[model.num_dof : 2 * model.num_dof].T
     return _Stretch(run, (state[:, rows_at], memory[:, rows_at], orders, weather[:, rows_at]), nu, weigh, pull)
-
-
-def _aboard(columns: Mapping[str, Array], zero: Array) -> dict[str, Array]:
-    """Velocities along the ship's own axes from those of a log, which are horizontal (`simulation.truth.logged`)."""
-    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
-    v = (columns["v"] + w * np.sin(phi)) / np.cos(phi)
-    u = (columns["u"] - (v * np.sin(phi) + w * np.cos(phi)) * np.sin(theta)) / np.cos(theta)
-    r = (columns["r"] * np.cos(theta) - q * np.sin(phi)) / np.cos(phi)
-    return {"u": u, "v": v, "r": r, "down": columns.get("z", zero)}
 
 
 def _bumps(t: Array, window: float) -> tuple[Array, Array, Array]:

@@ -205,13 +205,15 @@ def run_identification(
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
             return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
 
-        _check(vessel, settings, (*fitted, *tested), profiles)
+        _check(vessel, dataset, settings, (*fitted, *tested), profiles)
         free({BEFORE: vessel})  # what cannot be run is said before the fit, not after it
         _go_on(held)
         own = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
         solution = identify(vessel, dataset, fitted, own, progress=progress)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
+        if (solution.at_bound | solution.held).all():
+            raise ShipidError("every parameter stands at a bound, is held or was dropped: nothing is left to be judged")
         _go_on(held)
         found = statistics(Fit.of(solution))
         curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
@@ -243,9 +245,9 @@ def _go_on(held: Sequence[int]) -> None:
         raise KeyboardInterrupt
 
 
-def _check(vessel: Vessel, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
+def _check(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
     """Refuse overrides of what is not there and profiles of what is not free."""
-    overrides(settings, runs, vessel, dynamics(vessel).environment)
+    overrides(settings, runs, vessel, dynamics(vessel).environment, known=dataset.runs)
     known = unknowns(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:

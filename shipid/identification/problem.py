@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from shipid.vessel.perturb import select
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 BLOCK = "identify"
+POSITIVE = 1e-3  # least factor of a number that must not be 0: a mass, a diameter, a resistance
 ENVIRONMENT = "environment"
 SIGNALS = {"u": ("u",), "v": ("v",), "r": ("r",), "psi": ("psi",), "position": ("north", "east")}
 """Name in `weights` -> columns of the data that it fits."""
@@ -106,7 +108,7 @@ class Unknowns:
     groups : paths that share each factor; the first names it.
     scale : per group, the value of each of its paths at factor 1.
     centre : (n,) factor of the base, 1, or 0 where the base value is 0.
-    low, high : (n,) bounds; at least 0 where the vessel's own checks refuse the other sign.
+    low, high : (n,) bounds; at least 0, or `POSITIVE`, where the vessel's own checks refuse the other sign, or 0.
     prior : (n,) standard deviations, inf where there is none.
     """
 
@@ -138,8 +140,17 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
         return select(patterns, base, file, f"{BLOCK}.{key}")
 
-    fixed = set(chosen(settings.fixed, "fixed"))
-    free = [path for path in chosen(settings.parameters, "parameters") if path not in fixed]
+    asked = chosen(settings.parameters, "parameters")
+
+    def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
+        found = [path for path in chosen([pattern], key) if path in among]
+        if not found:
+            message = f"{pattern!r} reaches nothing that is free in the fit: add it to parameters, or leave it out"
+            raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+        return found
+
+    fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", asked)}
+    free = [path for path in asked if path not in fixed]
     if not free:
         raise DocumentError("every parameter is fixed again: nothing is left", file=file, path=f"{BLOCK}.fixed")
     unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
@@ -149,6 +160,9 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     groups = _groups(settings, free, chosen, file)
     scales = []
     for group in groups:
+        if len({base[path] == 0 for path in group}) > 1:
+            message = f"{' and '.join(group)} share a factor, but some are 0 and some are not: untie them"
+            raise DocumentError(message, file=file, path=f"{BLOCK}.together")
         bare = next((path for path in group if base[path] == 0 and path not in settings.scale), None)
         if bare is not None:
             message = f"{bare} is 0, which no factor changes: give its size under scale, or fix it"
@@ -156,32 +170,41 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
     high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
-    low = np.array([0.0 if any(_keeps_sign(vessel, path) for path in group) else -np.inf for group in groups])
+    key = _Digested(vessel.digest, vessel)
+    low = np.array([max(_least(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
     for pattern, limits in settings.bounds.items():
-        for path in chosen([pattern], "bounds"):
-            if path in place:
-                low[place[path]], high[place[path]] = limits  # as the user says, also below 0
+        for path in reached(pattern, "bounds", place):
+            low[place[path]], high[place[path]] = limits  # as the user says, also below 0
     for pattern, width in settings.prior.items():
-        for path in chosen([pattern], "prior"):
-            if path in place:
-                prior[place[path]] = width
+        for path in reached(pattern, "prior", place):
+            prior[place[path]] = width
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
 
 
-_SIGNED: dict[tuple[str, str], bool] = {}
+@dataclass(frozen=True)
+class _Digested:
+    """A vessel as a key of caches: equal where its document is."""
+
+    digest: str
+    vessel: Vessel = field(compare=False)
 
 
-def _keeps_sign(vessel: Vessel, path: str) -> bool:
-    """Whether the vessel's own checks refuse the other sign: added mass, drag coefficients, lengths."""
-    key = (vessel.digest, path)
-    if key not in _SIGNED:
-        try:
-            vessel.with_values({path: -vessel.parameters[path]})
-            _SIGNED[key] = False
-        except DocumentError:
-            _SIGNED[key] = vessel.parameters[path] != 0
-    return _SIGNED[key]
+@lru_cache(maxsize=4096)
+def _least(key: _Digested, path: str) -> float:
+    """Least factor by the vessel's own checks: -inf, or 0 where they refuse the other sign, `POSITIVE` where also 0."""
+    vessel, base = key.vessel, key.vessel.parameters[path]
+    if base == 0 or _accepts(vessel, path, -base):
+        return -math.inf
+    return 0.0 if _accepts(vessel, path, 0.0) else POSITIVE
+
+
+def _accepts(vessel: Vessel, path: str, value: float) -> bool:
+    try:
+        vessel.with_values({path: value})
+    except DocumentError:
+        return False
+    return True
 
 
 def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list[tuple[str, ...]]:
@@ -203,20 +226,25 @@ def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list
     return [tuple(group) for group in found.values()]
 
 
-def overrides(settings: Identify, runs: Sequence[str], vessel: Vessel, channels: Sequence[str]) -> dict[str, Any]:
-    """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name."""
-    result: dict[str, dict[str, float]] = {run: {} for run in runs}
+def overrides(
+    settings: Identify, runs: Sequence[str], vessel: Vessel, channels: Sequence[str], known: Sequence[str] = ()
+) -> dict[str, dict[str, float]]:
+    """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name.
+
+    known : runs that exist; what is set for those that are not in the fit is left out.
+    """
+    result: dict[str, dict[str, float]] = {run: {} for run in (*runs, *known)}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]
     for key, value in documents.leaves(settings.runs):
-        run = next((name for name in sorted(runs, key=len, reverse=True) if key.startswith(f"{name}.")), None)
+        run = next((name for name in sorted(result, key=len, reverse=True) if key.startswith(f"{name}.")), None)
         where = f"{BLOCK}.runs.{key}"
         if run is None:
-            hint = choices(key.split(".", 1)[0], runs)
-            raise DocumentError(f"begins with no run of the fit: {hint}", file=vessel.file, path=where)
+            hint = choices(key.split(".", 1)[0], result)
+            raise DocumentError(f"begins with no run of the data: {hint}", file=vessel.file, path=where)
         path = key[len(run) + 1 :]
         if path not in valid:
             raise DocumentError(f"{path!r} is nothing to set: {choices(path, valid)}", file=vessel.file, path=where)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise DocumentError(f"{value!r} is no number", file=vessel.file, path=where)
         result[run][path] = float(value)
-    return result
+    return {run: result[run] for run in runs}

@@ -61,7 +61,7 @@ class _Curve:
     refit: Refit
     ratio: float
     points: dict[float, tuple[float, Array]] = field(default_factory=dict)
-    failed: int = 0
+    failed: set[float] = field(default_factory=set)
 
     @property
     def least(self) -> float:
@@ -69,12 +69,14 @@ class _Curve:
 
     def rise(self, value: float) -> float:
         """Profile at a value, refitted from the nearest point; infinite where the refit fails."""
+        if value in self.failed:
+            return float("inf")
         if value not in self.points:
             nearest = min(self.points, key=lambda own: abs(own - value))
             start = self.points[nearest][1]
             objective, factors = self.refit(self.path, value, start)
             if not np.isfinite(objective):
-                self.failed += 1
+                self.failed.add(value)
                 return float("inf")
             self.points[value] = objective, factors
         return max((self.points[value][0] - self.least) / self.ratio, 0.0)
@@ -117,8 +119,8 @@ def profile(
     moved = (objective - curve.least) / ratio > 0.01 * limit
     sentence = _sentence(path, ends[-1], ends[1], (float(values[0]), float(values[-1])), best if moved else None)
     if curve.failed:
-        sentence += f"; {curve.failed} refits failed and count as outside"
-    return Profile(path, values, rises, limit, ends[-1], ends[1], curve.failed, sentence)
+        sentence += f"; {len(curve.failed)} refits failed and count as outside"
+    return Profile(path, values, rises, limit, ends[-1], ends[1], len(curve.failed), sentence)
 
 
 def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, bound: float) -> float:

@@ -106,11 +106,12 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
     model, unknown = dynamics(vessel), unknowns(vessel, settings)
-    own = overrides(settings, runs, vessel, model.environment)
+    own = overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
-    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags)
+    numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in own.items()}
+    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers)
     weather = _weather(segments, own, model.environment, [n for n in names if n.startswith("current")])
     free = {path for group in unknown.groups for path in group}
     twice = next(((run, path) for run, values in own.items() for path in values if path in free), None)

@@ -45,11 +45,18 @@ class Segment:
 
 
 def cut_segments(
-    vessel: Vessel, dataset: Dataset, runs: Sequence[str], step: float, horizon: float, lags: int = 0
+    vessel: Vessel,
+    dataset: Dataset,
+    runs: Sequence[str],
+    step: float,
+    horizon: float,
+    lags: int = 0,
+    own: Mapping[str, Mapping[str, float]] | None = None,
 ) -> list[Segment]:
     """Cut the runs into predictions of `horizon` [s] (0: as long as a run is unbroken), one after the other.
 
-    What is left at the end of a run counts where it is at least half a horizon. Raises DataError for a run that is not
+    What is left at the end of a run counts where it is at least half a horizon. `own` are parameters that single runs
+    have of their own, which their actuators feel. Raises DataError for a run that is not
     there, a command that was not recorded, or runs that are all too short.
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
@@ -61,11 +68,12 @@ def cut_segments(
         found = ", ".join(dataset.commands) or "none"
         raise DataError(f"{vessel.name} takes this command; the data have {found}", path=missing)
     result = []
+    vessels = {run: vessel.with_values(values) if values else vessel for run, values in (own or {}).items()}
     table = {name: dataset.frame[name].to_numpy() for name in map(str, dataset.frame.columns) if name != "run"}
     for run, places in stretches(dataset):
         if run in runs:
             rows = {name: values[places] for name, values in table.items()}
-            result += _cut(vessel, rows, list(runs).index(run), step, horizon, lags)
+            result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags)
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
         wanted = max(LEAST_STEPS * step, horizon / 2)

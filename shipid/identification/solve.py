@@ -14,6 +14,7 @@ from shipid.errors import DocumentError, choices
 from shipid.identification.problem import BLOCK, Identify, overrides
 from shipid.identification.residuals import Fit, Prediction, build, predict
 from shipid.identification.shooting import Point, Progress, Result, loss, poses, solve
+from shipid.identification.statistics import inverted
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -36,15 +37,18 @@ class Solution:
     paths, factors : name and estimate (n,) of each factor; a tied group goes by its first path.
     values : path -> value of every parameter that a factor acts on, ties written out.
     nuisances : run -> name -> value [SI] of its own unknowns.
-    residuals : (m,) predicted less measured over the declared standard deviation; by run, then time. Their sum of
-        squares is the objective without the priors of the factors, those of the nuisances included.
+    residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
+        time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
+        With huber each is scaled by the square root of its weight, and their squares sum to less than that.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
     prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) where they stand.
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
     spent : (m,) share of each residual that the nuisances have taken.
     objective_start, objective : sum of squares at the start, from the measured states, and at the end.
-    status, sentence : `ok`, `not converged`, `infeasible`, `diverged` or `stopped`, and what that means here.
-    at_bound : (n,) whether the estimate stands at a bound.
+    status, sentence : `ok`, `refused` (converged to values that the vessel's own checks refuse), `not converged`,
+        `infeasible`, `diverged` or `stopped`, and what that means here.
+    at_bound : (n,) whether the estimate stands at a bound. held : (n,) factors that are not free: dropped, or given
+        bounds that are equal. dropped : paths of the former.
     """
 
     vessel: Vessel
@@ -69,12 +73,13 @@ class Solution:
     status: str
     sentence: str
     at_bound: NDArray[np.bool_]
+    held: NDArray[np.bool_]
     dropped: tuple[str, ...] = ()
     point: Point | None = field(default=None, repr=False)
 
     @property
     def identified(self) -> Vessel:
-        """The vessel with the values found."""
+        """The vessel with the values found; DocumentError where it refuses them, as the sentence says then."""
         return self.vessel.with_values(self.values)
 
 
@@ -102,7 +107,7 @@ def identify(
     factors = _start(fit, dataset, start)
     solution = _solved(fit, factors, start.point if isinstance(start, Solution) else None, progress, begun)
     targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
-    while settings.drop is not None and solution.status == "ok":
+    while settings.drop is not None and solution.status in ("ok", "refused"):
         weakest = _weakest(solution, settings.drop, targets)
         if weakest is None:
             break
@@ -128,7 +133,7 @@ def _start(fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | N
     elif settings.start == "inverse":
         from shipid.identification.inverse import inverse_dynamics  # it needs all of this package
 
-        own = overrides(settings, fit.runs, fit.vessel, fit.layout.model.environment)
+        own = overrides(settings, fit.runs, fit.vessel, fit.layout.model.environment, dataset.runs)
         weather = {
             run: {key.split(".", 1)[1]: value for key, value in values.items() if key.startswith("environment.")}
             for run, values in own.items()
@@ -202,13 +207,17 @@ def _solution(
     threshold = settings.threshold if settings.loss == "huber" else np.inf
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
     residuals, jacobian, spent = end.marginal(threshold)
+    values, sentence = unknown.values(factors), _sentence(fit, result, word, lost, at_bound)
+    reason = _refusal(fit.vessel, values)
+    if reason is not None:
+        word, sentence = ("refused" if word == "ok" else word), f"{sentence}; {reason}"
     return Solution(
         vessel=fit.vessel,
         runs=fit.runs,
         settings=settings,
         paths=unknown.paths,
         factors=factors,
-        values=unknown.values(factors),
+        values=values,
         nuisances=end.named(),
         residuals=residuals,
         jacobian=jacobian,
@@ -223,10 +232,20 @@ def _solution(
         iterations=result.iterations,
         seconds=seconds,
         status=word,
-        sentence=_sentence(fit, result, word, lost, at_bound),
+        sentence=sentence,
         at_bound=at_bound,
+        held=unknown.low == unknown.high,
         point=result.point,
     )
+
+
+def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
+    """Why the vessel refuses the values found; None if it takes them."""
+    try:
+        vessel.with_values(values)
+    except DocumentError as error:
+        return f"the vessel refuses the values found: {error.path}: {error.message}; give bounds or priors, or fix some"
+    return None
 
 
 def _sentence(fit: Fit, result: Result, word: str, lost: str | None, at_bound: NDArray[np.bool_]) -> str:
@@ -249,13 +268,14 @@ def _sentence(fit: Fit, result: Result, word: str, lost: str | None, at_bound: N
 
 
 def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None:
-    """The free factor nearest to its target in standard errors, if nearer than the threshold."""
+    """The free factor nearest to its target in standard errors (infinite ones if unseen), if within the threshold."""
     information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
-    free = np.array([path not in solution.dropped for path in solution.paths])
+    free = ~solution.held
     if not free.any():
         return None
     level = (solution.residuals**2).sum() / max(1, len(solution.residuals) - free.sum())
-    errors = np.sqrt(np.diag(np.linalg.pinv(information[np.ix_(free, free)], rcond=1e-14, hermitian=True)) * level)
+    inverse, unseen = inverted(information[np.ix_(free, free)])
+    errors = np.where(unseen, np.inf, np.sqrt(np.diag(inverse) * level))
     away = np.abs(solution.factors - targets)[free] / np.maximum(errors, 1e-300)
     weakest = int(np.argmin(away))
     return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None

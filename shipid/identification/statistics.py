@@ -67,7 +67,9 @@ class Fit:
     clusters, signals : run number and signal of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
-    at_bound : (n,) estimates that stand at a bound, and so have no interval.
+    at_bound : (n,) estimates that stand at a bound, and so have no interval. held : (n,) factors that were not free,
+        which have none either. dropped : paths of those that the data did not support.
+    runs : name of each run number; empty: they go by number.
     """
 
     paths: tuple[str, ...]
@@ -79,13 +81,14 @@ class Fit:
     prior_widths: Array | None = None
     spent: Array | None = None
     at_bound: NDArray[np.bool_] | None = None
+    held: NDArray[np.bool_] | None = None
+    dropped: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, solution: Solution) -> Fit:
-        """What a solution of `identify` holds of it; what was dropped is held, like what stands at a bound."""
-        own = {name: getattr(solution, name) for name in cls.__dataclass_fields__}
-        dropped = np.array([path in solution.dropped for path in solution.paths], dtype=bool)
-        return cls(**{**own, "at_bound": solution.at_bound | dropped})
+        """What a solution of `identify` holds of it."""
+        return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
 
     def __post_init__(self) -> None:
         m, n = self.jacobian.shape
@@ -202,9 +205,9 @@ def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
     that is wider, it does not judge: what is collinear may still be found. All is linear at the estimate; where an
     interval is wide the profile (`shipid.identification.profile`) says whether it ends at all.
     """
-    free = np.flatnonzero(~_at_bound(fit))
+    free = _free_places(fit)
     if not len(free):
-        raise ShipidError("every parameter stands at a bound or was dropped: nothing is left to be judged")
+        return _nothing(fit)
     inner = _free(fit, free)
     basis = _Basis.of(inner)
     colours = whiteness(inner, basis.leverage)
@@ -245,17 +248,35 @@ def _last(found: Mapping[Kind, Covariance]) -> Kind:
     return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
 
 
-def _at_bound(fit: Fit) -> NDArray[np.bool_]:
-    return np.zeros(len(fit.paths), dtype=bool) if fit.at_bound is None else fit.at_bound
+def _nothing(fit: Fit) -> Statistics:
+    """What is known where no factor is free."""
+    n, jacobian = len(fit.paths), fit.jacobian[:, :0]
+    none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
+    seen = collinearity(jacobian, ())
+    covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free", none.reshape(0, 0))
+    sentences = _sentences(fit, wide, wide, fixed, seen)
+    low, high, levels = fit.factors - wide, fit.factors + wide, whiteness(fit)
+    return Statistics(
+        fit, {"fisher": covariance}, "fisher", wide, low, high, wide, np.eye(n), fixed, sentences, seen, levels
+    )
+
+
+def _free_places(fit: Fit) -> Index:
+    """Columns of the factors that are neither held nor at a bound."""
+    fixed = np.zeros(len(fit.paths), dtype=bool)
+    for own in (fit.at_bound, fit.held):
+        fixed |= False if own is None else own
+    return np.flatnonzero(~fixed)
 
 
 def _free(fit: Fit, free: Index) -> Fit:
-    """The fit with what stands at a bound held there."""
+    """The fit of these columns, all others held."""
     widths = _widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return Fit(
-        paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent
-    )
+        paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent,
+        runs=fit.runs,
+    )  # fmt: skip
 
 
 def _widths(fit: Fit) -> Array:
@@ -387,7 +408,7 @@ def fisher(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covaria
 
 def declared_error(fit: Fit, path: str) -> float:
     """Standard error of one factor if residuals err independently, by the declared standard deviations."""
-    inner = _free(fit, np.flatnonzero(~_at_bound(fit)))
+    inner = _free(fit, _free_places(fit))
     inverse = _Basis.of(inner).inverse
     j = inner.paths.index(path)
     return float(np.sqrt(inverse[j, j]))
@@ -471,11 +492,15 @@ def _sentences(
     fit: Fit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
 ) -> tuple[str, ...]:
     """One sentence for each parameter: how well it is known or why not."""
-    bound, told = _at_bound(fit), []
+    free, told = _free_places(fit), list[str]()
     for j, (path, name) in enumerate(zip(fit.paths, short(fit.paths), strict=True)):
         together = next((own for own in seen.combinations if path in own.paths), None)
         known = f"{name} is known to +-{100 * half[j]:.2g} % of its base value"
-        if bound[j]:
+        if path in fit.dropped:
+            told.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
+        elif fit.held is not None and fit.held[j]:
+            told.append(f"{name} was held at {fit.factors[j]:.4g}: no interval")
+        elif j not in free:
             told.append(f"{name} stands at its bound, {fit.factors[j]:.4g}: no interval")
         elif identifiable[j] and together is None:
             told.append(known)
@@ -501,7 +526,8 @@ def identifiable_subset(fit: Fit, widest: float = WIDEST) -> tuple[str, ...]:
     """
     from scipy.linalg import qr
 
-    order = qr(fit.jacobian, mode="economic", pivoting=True)[2]
+    free = _free_places(fit)
+    order = free[qr(fit.jacobian[:, free], mode="economic", pivoting=True)[2]] if len(free) else free
     for count in range(len(order), 0, -1):
         own = np.sort(order[:count])
         if (statistics(_free(fit, own), widest).alone <= widest).all():

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from shipid.identification.problem import MOVING
 from shipid.simulation.integrate import Method, integrate
 from shipid.simulation.scan import summed_rates, uninterrupted
+from shipid.simulation.truth import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 
 Array = NDArray[np.float64]
@@ -245,12 +246,13 @@ def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
 def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
     """What a log with these faults would show.
 
-    heading_bias is what the compass reads too much; u and v are resolved along what it reads, so that the velocity over
-    ground stays. The logged point lies lever_arm ahead of the origin.
+    Its velocities are horizontal. heading_bias is what the compass reads too much; u and v are resolved along what it
+    reads, so that the velocity over ground stays. The logged point lies lever_arm ahead of the origin.
     """
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
-    u, v, r, psi = (state.get(name, zero) for name in ("u", "v", "r", "psi"))
+    u, v, r = map(SX, horizontal({**dict.fromkeys(("u", "v", "r"), zero), **state}, ca).values())
+    psi = state.get("psi", zero)
     across = v + x * r
     read = {
         "u": lambda: ca.cos(b) * u + ca.sin(b) * across + value_of.get("velocity_bias_u", zero),
@@ -272,6 +274,7 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     psi = entry["psi"] - b
     true = dict(entry)
     true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * entry["r"], "psi": psi}
+    true |= aboard(true, ca)
     true |= {"north": entry["north"] - x * ca.cos(psi), "east": entry["east"] - x * ca.sin(psi)}
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.errors import DocumentError, choices
-from shipid.physics import helm
+from shipid.physics import SIGNALS, helm
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
@@ -45,6 +45,16 @@ class Manoeuvre(BaseModel, ABC):
     @abstractmethod
     def length(self) -> float:
         """Length of the log [s]."""
+
+    @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg] that it may order, to either side."""
+        return 0.0
+
+    @property
+    def greatest_shaft(self) -> float:
+        """Greatest shaft speed [rpm] that it may order, ahead or astern."""
+        return abs(self.n_rpm)
 
     def shaft(self, t: Array) -> Array:
         """Ordered shaft speed [rev/s] at times (T,) [s]."""
@@ -86,6 +96,16 @@ class Turning(Timed):
     kind: Literal["turning"] = "turning"
     orders: Annotated[dict[str, FiniteFloat], Field(description="command -> rev/s or rad, as the vessel takes it")]
 
+    @property
+    def greatest_helm(self) -> float:
+        """Of the orders that are angles [deg]."""
+        return max((abs(order) / DEGREE for name, order in self.orders.items() if not _is_shaft(name)), default=0.0)
+
+    @property
+    def greatest_shaft(self) -> float:
+        """Of n_rpm and the orders that are shaft speeds [rpm]."""
+        return max(abs(self.n_rpm), *(abs(order) / RPM for name, order in self.orders.items() if _is_shaft(name)), 0.0)
+
     def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
         """Commands from times (T,) on."""
         straight = super().told(controls, t, speed)
@@ -102,6 +122,11 @@ class HelmOver(Timed):
 
     angle_deg: Annotated[Positive, Field(description="deg of helm")] = 20.0
     side: Annotated[Literal["starboard", "port"], Field(description="to which the ship turns first")] = "starboard"
+
+    @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg]."""
+        return self.angle_deg
 
     @property
     def sense(self) -> float:
@@ -158,6 +183,11 @@ class Spiral(Executed):
     hold: Annotated[Positive, Field(description="s that each is held")]
 
     @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg]."""
+        return max(map(abs, self.angles_deg))
+
+    @property
     def length(self) -> float:
         """Length of the log [s]."""
         return self.execute_at + len(self.angles_deg) * self.hold
@@ -176,6 +206,11 @@ class ReverseSpiral(Executed):
     ] = RATES
     hold: Annotated[Positive, Field(description="s that each is held")]
     angle_deg: Annotated[Positive, Field(description="deg: greatest helm")] = 35.0
+
+    @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg]."""
+        return self.angle_deg
 
     @property
     def length(self) -> float:
@@ -203,6 +238,11 @@ class CrashStop(Timed):
     kind: Literal["crash_stop"] = "crash_stop"
     astern_rpm: Annotated[Positive, Field(description="rpm ordered astern")]
 
+    @property
+    def greatest_shaft(self) -> float:
+        """Ahead or astern [rpm]."""
+        return max(abs(self.n_rpm), self.astern_rpm)
+
     def shaft(self, t: Array) -> Array:
         """Shaft speed [rev/s] at times (T,)."""
         return np.where(_from(self.execute_at, t), -self.astern_rpm, self.n_rpm) * RPM
@@ -223,6 +263,16 @@ class Excitation(Timed):
     angle_rate_deg: Annotated[Positive | None, Field(description="deg/s, limit of the ordered helm")] = None
     shaft_rate_rpm: Annotated[Positive | None, Field(description="rpm/s, limit of the ordered shaft")] = None
     seed: Annotated[int, Field(description="of the levels, and of the search for phases")] = 0
+
+    @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg]."""
+        return self.angle_deg
+
+    @property
+    def greatest_shaft(self) -> float:
+        """About n_rpm [rpm]."""
+        return abs(self.n_rpm) + self.amplitude_rpm
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
@@ -266,6 +316,16 @@ class StationKeeping(Manoeuvre):
     most_rpm: Annotated[Positive, Field(description="rpm, limit of a unit")] = 200.0
 
     @property
+    def greatest_helm(self) -> float:
+        """Units may push anywhere [deg]."""
+        return 180.0
+
+    @property
+    def greatest_shaft(self) -> float:
+        """Of a unit [rpm]."""
+        return max(abs(self.n_rpm), self.most_rpm)
+
+    @property
     def length(self) -> float:
         """Length of the log [s]."""
         return self.duration
@@ -289,6 +349,10 @@ AnyManoeuvre = Annotated[
     Field(discriminator="kind"),
 ]
 """Any kind, told apart by `kind`: a `[[manoeuvre]]` block."""
+
+
+def _is_shaft(command: str) -> bool:
+    return SIGNALS.commands.get(command.rsplit(".", 1)[-1]) == "rev/s"
 
 
 def _from(moment: float, t: Array) -> NDArray[np.bool_]:

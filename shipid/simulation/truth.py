@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -164,7 +164,7 @@ def _log(path: Trajectories, beside: dict[str, np.ndarray]) -> pd.DataFrame:
 def logged(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
     """States of the first variant as a log has them, column -> (R, S): u, v and r are those of the horizontal plane."""
     columns = {_column(name): path[name][:, 0] for name in names}
-    return columns | _horizontal(columns)
+    return columns | horizontal(columns)
 
 
 def _column(state: str) -> str:
@@ -172,15 +172,28 @@ def _column(state: str) -> str:
     return "z" if state == "down" else state
 
 
-def _horizontal(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Horizontal u and v along and across the heading, r = d(psi)/dt (Fossen 2021, eqs. 2.31 and 2.40)."""
-    zero = np.zeros_like(columns["u"])
+def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
+    """Horizontal u and v along and across the heading, r = d(psi)/dt (Fossen 2021, eqs. 2.31 and 2.40).
+
+    maths : what has cos and sin for the columns; casadi for symbols.
+    """
+    zero = 0.0 * columns["u"]
     phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
     u, v, r = columns["u"], columns["v"], columns["r"]
-    across = v * np.cos(phi) - w * np.sin(phi)
-    down = v * np.sin(phi) + w * np.cos(phi)
-    turning = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
-    return {"u": u * np.cos(theta) + down * np.sin(theta), "v": across, "r": turning}
+    across = v * maths.cos(phi) - w * maths.sin(phi)
+    down = v * maths.sin(phi) + w * maths.cos(phi)
+    turning = (q * maths.sin(phi) + r * maths.cos(phi)) / maths.cos(theta)
+    return {"u": u * maths.cos(theta) + down * maths.sin(theta), "v": across, "r": turning}
+
+
+def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
+    """Body-fixed u, v and r of a log's columns: the reverse of `horizontal`, whose w and q are body-fixed already."""
+    zero = 0.0 * columns["u"]
+    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
+    v = (columns["v"] + w * maths.sin(phi)) / maths.cos(phi)
+    u = (columns["u"] - (v * maths.sin(phi) + w * maths.cos(phi)) * maths.sin(theta)) / maths.cos(theta)
+    r = (columns["r"] * maths.cos(theta) - q * maths.sin(phi)) / maths.cos(phi)
+    return {"u": u, "v": v, "r": r}
 
 
 def run_names(count: int) -> list[str]:

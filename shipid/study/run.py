@@ -170,7 +170,8 @@ def _judged(plan: Plan, test: Windows, foundation: Foundation, predictor: Predic
     words = ", ".join(f"{name} {chosen[name]:.3g}" for name in plan.recipe.varied() if name in chosen)
     failed = ~np.isfinite(foundation.test_paths).all(axis=(0, 2))
     if failed.any():
-        sentence = foundation.sentence or f"physics diverges on {failed.mean():.1%} of the test windows"
+        share = f"physics diverges on {failed.mean():.1%} of the test windows"
+        sentence = share if np.isfinite(foundation.paths).all() else foundation.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}
     paths = foundation.test_paths + predictor.compensation(test.columns, test.planned)
     error = summary(position_error(paths, test.future))

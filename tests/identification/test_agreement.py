@@ -64,3 +64,21 @@ def test_what_the_data_do_not_see_is_not_compared() -> None:
     found = agreement(*begun)
     assert found.agree
     assert set(found.paths) == {"p1", "p2", "p3"}
+
+
+def test_runs_are_matched_by_name() -> None:
+    """The same fit with its runs numbered the other way round agrees with itself to the last digit of its errors."""
+    one, other = (
+        statistics(replace(own.fit, runs=tuple(f"M{number}" for number in range(RUNS)))) for own in two(0, bias=0.1)
+    )
+    turned = statistics(replace(other.fit, clusters=RUNS - 1 - other.fit.clusters, runs=other.fit.runs[::-1]))
+    np.testing.assert_allclose(agreement(one, turned).errors, agreement(one, other).errors, rtol=1e-9)
+    renamed = statistics(replace(other.fit, runs=("M99", *other.fit.runs[1:])))
+    with pytest.raises(ShipidError, match=r"same runs.*M0 and M99"):
+        agreement(one, renamed)
+
+
+def test_nothing_free_is_nothing_to_compare() -> None:
+    one, other = two(0)
+    with pytest.raises(ShipidError, match="in common"):
+        agreement(one, statistics(replace(other.fit, held=np.ones(COUNT, dtype=bool))))

@@ -6,10 +6,24 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.identification.design import Candidate, Informed, Limits, candidates, informed, plan, rank
-from shipid.simulation.manoeuvre import Zigzag
+from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, plan, rank
+from shipid.simulation.manoeuvre import (
+    CrashStop,
+    Excitation,
+    Manoeuvre,
+    PullOut,
+    ReverseSpiral,
+    Spiral,
+    StationKeeping,
+    Turning,
+    TurningCircle,
+    Zigzag,
+)
+from shipid.simulation.perform import perform
+from shipid.simulation.rollout import rollout
 from shipid.simulation.standard import standard
 from shipid.vessel.load import load_vessel
+from tests.conftest import variety
 
 SHIP = load_vessel("gunnerus-28.9")
 WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
@@ -104,6 +118,45 @@ def test_limits_of_the_actuators_hold() -> None:
     assert max(angles) <= 15.0
     assert max(np.abs(one.manoeuvre.shaft(time)).max() for one in weak) <= 2.0 + 1e-9
     assert len(weak) < len(CHOICE)
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "helm", "rpm"),
+    [
+        (Turning(n_rpm=100, duration=60, orders={"port.alpha": -0.5, "port.n": 2.5}), np.degrees(0.5), 150),
+        (Turning(n_rpm=100, duration=60, orders={}), 0, 100),
+        (TurningCircle(n_rpm=100, duration=60), 35, 100),
+        (PullOut(n_rpm=100, duration=60, turn=30, angle_deg=15), 15, 100),
+        (Zigzag(n_rpm=100, duration=60), 20, 100),
+        (Spiral(n_rpm=100, hold=60), 25, 100),
+        (ReverseSpiral(n_rpm=100, hold=60), 35, 100),
+        (CrashStop(n_rpm=100, astern_rpm=130, duration=60), 0, 130),
+        (Excitation(signal="aprbs", n_rpm=100, amplitude_rpm=20, angle_deg=12, duration=60), 12, 120),
+        (StationKeeping(duration=60), 180, 200),
+    ],
+)
+def test_no_kind_orders_more_than_the_limits(manoeuvre: Manoeuvre, helm: float, rpm: float) -> None:
+    assert manoeuvre.greatest_helm == pytest.approx(helm)
+    assert manoeuvre.greatest_shaft == pytest.approx(rpm)
+    assert allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
+    assert not allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
+    assert not helm or not allowed(manoeuvre, Limits(angle_deg=0.99 * helm))
+    time = np.linspace(0, manoeuvre.length, 1000)
+    assert np.abs(manoeuvre.helm(time)).max() <= np.radians(helm) + 1e-9
+    assert np.abs(manoeuvre.shaft(time)).max() <= rpm / 60 + 1e-9
+
+
+@pytest.mark.parametrize("name", ["gunnerus-33.9", "roll", "six"])
+def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
+    """Their starts are along the ship's own axes, the velocities of a log are horizontal: the next start is met."""
+    ship = variety()[name]
+    one = TurningCircle(n_rpm=180, approach="rest", duration=60)
+    log = perform(ship, [one], step=0.2, environment={})
+    cut = _cut(ship, log, {}, 50, 5)
+    how = {"step": 0.2, "num_steps": 50, "method": "rk4", "memory": cut.memory or None}
+    path = rollout(ship, cut.start, cut.commands, cut.environment, **how)  # type: ignore[arg-type]
+    for state in ("u", "v", "r"):
+        np.testing.assert_allclose(path[state][-1, 0, :-1], cut.start[state][1:], rtol=1e-5, atol=1e-7)
 
 
 def test_position_and_heading_and_whole_runs_count() -> None:

@@ -91,10 +91,14 @@ def test_a_better_fit_on_the_way_is_told() -> None:
 
 
 def test_a_refit_that_fails_counts_as_outside() -> None:
+    asked: list[float] = []
+
     def refit(path: str, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:  # noqa: ARG001
+        asked.append(value)
         return (np.inf if value > 1.3 else ((value - 1) / 0.5) ** 2), start
 
     own = profile("a", np.ones(1), 0, 0.0, refit, half_width=1.0, freedom=1e6)
     assert own.high == pytest.approx(1.3, abs=0.02)
     assert own.failed > 0
     assert "failed" in own.sentence
+    assert len(set(asked)) == len(asked)

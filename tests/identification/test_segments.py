@@ -11,6 +11,7 @@ from shipid.identification.problem import Identify
 from shipid.identification.residuals import Intervals, build, predict
 from shipid.identification.segments import cut_segments
 from shipid.vessel.load import load_vessel
+from tests.conftest import variety
 from tests.identification.trials import changed, trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -67,3 +68,31 @@ def test_a_command_that_was_not_logged_is_told() -> None:
     without = Dataset(DATA.frame.drop(columns="port.n"), DATA.metadata)
     with pytest.raises(DataError, match=r"port\.n: .* takes this command; the data have port\.alpha"):
         cut_segments(SHIP, without, without.runs, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["roll", "six"])
+def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
+    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along her own axes."""
+    vessel = variety()[name]
+    data = trials(vessel, runs=2, steps=40)
+    assert np.abs(data.frame["phi"]).max() > 0.02
+    wanted = Identify(parameters=["hull.derivatives.N_uv"], horizon=10, weights={"u": 1e-3, "v": 1e-3, "r": 1e-4})
+    at = predict(build(vessel, data, data.runs, wanted), np.ones(1), np.zeros((2, 0)))
+    assert np.abs(at.r).max() < 1e-6
+
+
+def test_actuators_lag_as_in_their_own_run() -> None:
+    """An override of an actuator's time constant also says where the actuator stands when a prediction begins."""
+    vessel = variety()["actuators"]
+    own = {path: 3.0 * x for path, x in vessel.parameters.items() if path.startswith("thruster.port.actuator.n.")}
+    numbers = np.tile(list(vessel.parameters.values()), (2, 1))
+    numbers[1] = list(vessel.with_values(own).parameters.values())
+    data = trials(vessel, runs=2, steps=40, parameters=numbers)
+    overrides = {f"M02.{path}": x for path, x in own.items()}
+    worst = []
+    for runs in ({}, overrides):
+        for free in ("hull.derivatives.N_uv", "thruster.starboard.actuator.*"):  # memory as given, and carried
+            fit = build(vessel, data, data.runs, Identify(parameters=[free], horizon=7, runs=runs))
+            worst.append(np.abs(predict(fit, np.ones(fit.num_factors), np.zeros((2, 0))).r).max())
+    assert min(worst[:2]) > 1e-3
+    assert max(worst[2:]) < 1e-6

@@ -9,10 +9,11 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
-from shipid.identification.problem import Identify
+from shipid.identification.problem import POSITIVE, Identify, unknowns
 from shipid.identification.residuals import build, predict
 from shipid.identification.shooting import Problem, solve
 from shipid.identification.solve import WORDS, Solution, identify
+from shipid.identification.statistics import Fit, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
 
@@ -89,6 +90,7 @@ def test_bounds_hold_and_are_flagged() -> None:
     held = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 1.1)}), start=found)
     assert held.factors[0] == 1.1
     assert not held.at_bound.any()
+    assert held.held.tolist() == [True, False, False, False]
     assert held.objective == pytest.approx(found.objective, rel=1e-4)
 
 
@@ -242,9 +244,56 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     found = identify(base, noisy, noisy.runs, settings(drop=3.0))
     assert FEW[3] not in found.dropped
     assert len(found.dropped) >= 2
+    assert [path for path, there in zip(found.paths, found.held, strict=True) if there] == [
+        path for path in found.paths if path in found.dropped
+    ]
+    judged = statistics(Fit.of(found))
+    assert np.isinf(judged.errors[found.held]).all()
+    assert "dropped" in judged.sentences[found.paths.index(found.dropped[0])]
     for path in found.dropped:
         assert found.values[path] == base.parameters[path]
     assert found.factors[3] == pytest.approx(2.0, rel=0.02)
+
+
+def test_what_cannot_be_seen_is_dropped_first() -> None:
+    """No wind comes from astern here, so its coefficient has no effect, however far it begins from the base."""
+    dataset, rng = trials(SHIP, runs=2, steps=30), np.random.default_rng(4)
+    noisy = changed(dataset, **{k: dataset.frame[k] + rng.normal(0, s, len(dataset.frame)) for k, s in SHARP.items()})
+    wanted = settings(parameters=[*FEW[:2], "wind.C_X.18"], drop=1e-6)
+    found = identify(SHIP, noisy, noisy.runs, wanted, start={"wind.C_X.18": 3.0})
+    assert found.dropped == ("wind.C_X.18",)
+    assert found.factors[2] == 1.0
+
+
+def test_a_mass_stays_above_zero() -> None:
+    wanted = settings(parameters=["inertia.m", "inertia.I_z", "added_mass.X_udot", "thruster.*.D_p", *FEW])
+    own = unknowns(SHIP, wanted)
+    low = dict(zip(own.paths, own.low, strict=True))
+    for path in ("inertia.m", "inertia.I_z", "thruster.port.D_p"):
+        assert low[path] == POSITIVE
+        assert POSITIVE * SHIP.parameters[path] > 0
+    assert low["added_mass.X_udot"] == 0.0
+    assert low[FEW[0]] == -np.inf
+
+
+def test_values_that_the_vessel_refuses_are_told() -> None:
+    """Bounds may allow what no ship can be, here added mass below zero: the fit ends, its values are not taken."""
+    path, dataset = "added_mass.X_udot", trials(SHIP, runs=2, steps=30)
+    found = identify(SHIP, dataset, dataset.runs, settings(parameters=[path, FEW[0]], bounds={path: (-0.2, -0.1)}))
+    assert found.status == "refused"
+    assert f"the vessel refuses the values found: {path}: " in found.sentence
+    assert "\n" not in found.sentence
+    with pytest.raises(ShipidError, match="X_udot is negative"):
+        _ = found.identified
+
+
+def test_overrides_of_other_runs_of_the_data_are_left_out() -> None:
+    """A batch of fits shares one block: what is set for a run that is not in this fit does not count here."""
+    dataset = trials(SHIP, 3, 30)
+    own = {"M01.environment.V_w": 3.0, "M02.environment.V_w": 5.0}
+    found = identify(SHIP, dataset, ["M01", "M03"], settings(runs=own))
+    alone = identify(SHIP, dataset, ["M01", "M03"], settings(runs={"M01.environment.V_w": 3.0}))
+    assert np.array_equal(found.factors, alone.factors)
 
 
 def test_progress_is_told() -> None:
@@ -309,6 +358,21 @@ def test_a_start_that_diverges_is_told() -> None:
         ({"together": [FEW[:2], FEW[1:3]]}, "is in two groups"),
         ({"parameters": ["inertia.x_G"]}, "give its size under scale"),
         ({"scale": {FEW[0]: 2.0}}, "scale is for a 0"),
+        ({"bounds": {"inertia.m": (0.5, 2.0)}}, "reaches nothing that is free"),
+        ({"prior": {"wind.*": 0.5}}, "reaches nothing that is free"),
+        ({"fixed": ["wind.*"]}, "reaches nothing that is free"),
+        (
+            {"parameters": [FEW[0], "inertia.x_G"], "together": [["*"]], "scale": {"inertia.x_G": 1.0}},
+            "is tied but not free",
+        ),
+        (
+            {
+                "parameters": [FEW[0], "inertia.x_G"],
+                "together": [[FEW[0], "inertia.x_G"]],
+                "scale": {"inertia.x_G": 1.0},
+            },
+            "some are 0 and some are not",
+        ),
         ({"runs": {"M09.environment.V_w": 1.0}}, "begins with no run"),
         ({"runs": {"M01.environment.V_x": 1.0}}, "is nothing to set"),
         ({"runs": {"M01.environment.V_w": "calm"}}, "is no number"),

@@ -172,6 +172,30 @@ def test_what_stands_at_a_bound_has_no_interval_and_harms_no_other() -> None:
     np.testing.assert_allclose(found.errors[~bound], statistics(without).errors, rtol=1e-9)
 
 
+def test_what_is_held_counts_as_known() -> None:
+    """Held or dropped factors have no interval and do not widen those of others."""
+    held = np.array([False, True, False, True, False, False])
+    found = statistics(one(held=held, dropped=("p3",)))
+    assert np.isinf(found.high[held]).all()
+    assert not found.identifiable[held].any()
+    assert "p1 was held at " in found.sentences[1]
+    assert "p3 was dropped" in found.sentences[3]
+    without = replace(one(), **{"paths": tuple("abcd"), "factors": np.ones(4), "jacobian": one().jacobian[:, ~held]})
+    np.testing.assert_allclose(found.errors[~held], statistics(without).errors, rtol=1e-9)
+    assert set(identifiable_subset(found.fit)) == {"p0", "p2", "p4", "p5"}
+
+
+def test_nothing_free_is_nothing_known() -> None:
+    fit = one(at_bound=np.arange(COUNT) < 2, held=np.arange(COUNT) >= 2)
+    found = statistics(fit)
+    assert np.isinf(found.errors).all()
+    assert (found.low, found.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
+    assert not found.identifiable.any()
+    assert len(found.sentences) == COUNT
+    assert found.directions() == []
+    assert identifiable_subset(fit) == ()
+
+
 def test_nuisances_cost_degrees_of_freedom() -> None:
     """A free level for each run and signal, projected out: the level of the noise stays right."""
     error = noise(np.random.default_rng(0), RUNS, 8, 0.0)

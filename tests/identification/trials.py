@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
+from shipid.simulation import truth
 from shipid.simulation.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -67,7 +68,7 @@ def trials(
             engine="casadi",
         )
         assert not path.diverged.any()
-        columns = {"z" if key == "down" else key: path[key][:, 0, 0] for key in model.state}
+        columns = {key: values[:, 0] for key, values in truth.logged(path, model.state).items()}
         frames.append(
             pd.DataFrame(
                 {
