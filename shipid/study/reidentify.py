@@ -11,7 +11,6 @@ import numpy as np
 from shipid.data.dataset import BREAK, Dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
-from shipid.identification.solve import identify
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, own_vessel, paths_of
@@ -87,6 +86,8 @@ def _identified(
     windows: Windows,
     device: str,
 ) -> Foundation:
+    from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
+
     assert model.identify is not None
     assert model.variant is not None
     try:

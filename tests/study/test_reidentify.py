@@ -13,8 +13,9 @@ import pytest
 
 from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DocumentError
+from shipid.identification import solve
 from shipid.predictor import Predictor
-from shipid.study import reidentify, store
+from shipid.study import store
 from shipid.study.advise import answer
 from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import prepare, window_memory
@@ -136,7 +137,7 @@ def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
     plan, dataset = study(recorded, [FITTED])
     prepared = prepare(plan, dataset)
     found = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
-    monkeypatch.setattr(reidentify, "identify", lambda *_: found)
+    monkeypatch.setattr(solve, "identify", lambda *_: found)
     both = foundations(plan, prepared, plan.batches[0], "cpu")["wrong-both"]
     assert np.isnan(both.paths).all()
     assert both.sentence.startswith("identification: ")
