@@ -419,11 +419,13 @@ def study_screen(
     device: Device = "cpu",
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    from shipid.estimation.training import check_device
     from shipid.study import screen
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
     from shipid.study.store import check_table, write_table
 
+    check_device(device)
     plan = read_plan(study, _parsed(changes))
     file = out or Path(f"{plan.name}-screen.csv")
     check_table(file)
@@ -457,11 +459,13 @@ def study_rotate(
     device: Device = "cpu",
 ) -> None:
     """Let every run test in its turn, all others train: how much the answer owes to the choice of the test run."""
+    from shipid.estimation.training import check_device
     from shipid.study import rotate
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
     from shipid.study.store import check_table, write_table
 
+    check_device(device)
     plan = read_plan(study, _parsed(changes))
     file = out or Path(f"{plan.name}-rotate.csv")
     check_table(file)
@@ -502,11 +506,15 @@ def _counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterat
 
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        task = progress.add_task(what, total=total)
-        for block in blocks:
-            progress.advance(task, len(block))
-            yield block
+    try:
+        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+            task = progress.add_task(what, total=total)
+            for block in blocks:
+                progress.advance(task, len(block))
+                yield block
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted: nothing was written\n")
+        raise
 
 
 @study_app.command("run")
@@ -578,7 +586,7 @@ def predict(
     frame, outside = predict_log(folder, cell, log, mapping, file)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
-        typer.echo(f"{outside:.0%} of the instants lie outside what the compensator was trained on (column `outside`)")
+        typer.echo(f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)")
 
 
 @app.command("identify")
@@ -600,9 +608,9 @@ def identify(
     ] = None,
     horizon: Annotated[float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs")] = None,
     changes: Annotated[
-        list[str] | None, typer.Option("--set", help="key=value: any other key of [identify], such as weights.u=0.05")
+        list[str] | None, typer.Option("--set", help="key=value: any other key of \\[identify], such as weights.u=0.05")
     ] = None,
-    settings: Annotated[Path | None, typer.Option(help="TOML file with an [identify] table to begin with")] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with an \\[identify] table to begin with")] = None,
     runs: Annotated[list[str] | None, typer.Option(help="runs to fit, * for any part of a name; default: all")] = None,
     test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
     ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
@@ -646,7 +654,8 @@ def identify(
         sys.exit(130)
     _show_identified(found)
     write_patch(found, file)
-    typer.echo(f"{len(found.solution.values)} numbers as a patch on {ship.key} -> {file}")
+    count = len(found.solution.values)
+    typer.echo(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}")
     if html is not None:
         from shipid.report.identification import write_identification
 

@@ -242,7 +242,7 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     text = said("predict", folder, folder / DATASET, "--cell", "none-N0004-s0")
     assert f"{12 * 21} instants, {12 * 21 * 5} points -> none-N0004-s0.parquet" in text
     assert len(pd.read_parquet("none-N0004-s0.parquet")) == 12 * 21 * 5
-    assert "outside what the compensator was trained on" in text
+    assert "outside what the cell was trained on" in text
 
 
 def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:

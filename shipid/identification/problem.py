@@ -165,7 +165,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
             raise DocumentError(message, file=file, path=f"{BLOCK}.together")
         bare = next((path for path in group if base[path] == 0 and path not in settings.scale), None)
         if bare is not None:
-            message = f"{bare} is 0, which no factor changes: give its size under scale, or fix it"
+            message = f'{bare} is 0, which no factor changes: give its size, scale."{bare}" = ..., or fix it'
             raise DocumentError(message, file=file, path=f"{BLOCK}.scale")
         scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])

@@ -77,7 +77,8 @@ def cut_segments(
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
         wanted = max(LEAST_STEPS * step, horizon / 2)
-        message = f"{without!r} has no unbroken stretch of {wanted:g} s: take a shorter horizon, or leave it out"
+        half = f", half of {horizon:g} s" if horizon and wanted == horizon / 2 else ""
+        message = f"{without!r} has no unbroken stretch of {wanted:g} s{half}: predict less far, or leave it out"
         raise DataError(message, path="runs")
     return result
 

@@ -141,7 +141,16 @@ class _Ship:
     @property
     def moving(self) -> SX:
         """What is unknown and changes how the ship moves."""
-        return ca.vertcat(self.theta, self.q[: self.layout.num_moving])
+        return ca.vertcat(self.theta, *self._nuisances[: self.layout.num_moving])
+
+    @property
+    def seen(self) -> SX:
+        """What is unknown and changes only what is seen of it."""
+        return ca.vertcat(SX(0, 1), *self._nuisances[self.layout.num_moving :])
+
+    @property
+    def _nuisances(self) -> list[SX]:
+        return ca.vertsplit(self.q) if self.layout.nuisances else []
 
     @property
     def fixed(self) -> SX:
@@ -190,7 +199,7 @@ def variation(layout: Layout) -> Variation:
         slope += ca.jacobian(f, ship.memory) @ D
         more = ca.jacobian(later, ship.memory) @ D + direct(later)
     seen, count = SX.sym("seen", 2 * len(layout.signals)), len(layout.signals)
-    R = ca.horzcat(ca.jacobian(h, z) @ S, ca.jacobian(h, ship.q[layout.num_moving :]))
+    R = ca.horzcat(ca.jacobian(h, z) @ S, ca.jacobian(h, ship.seen))
     weighted = [seen[count:] * (h - seen[:count]), ca.vec(ca.repmat(seen[count:], 1, R.shape[1]) * R)]
     entries, begin = _begin(states, ship.value_of)
     both = {"z": ca.vertcat(z, ca.vec(S)), "m": ca.vertcat(ship.memory, ca.vec(D)), "fixed": ship.fixed}

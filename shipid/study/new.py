@@ -18,6 +18,7 @@ import pandas as pd
 import tomlkit
 from tomlkit.items import Table
 
+from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.survey import Survey, helm_sense, separation, survey, typical_runs
 from shipid.data.windows import cut_windows
@@ -154,8 +155,20 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     amounts = ladder(len(partition(least, dataset)[0].spans))
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts)]
-    warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset)]
+    warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
     return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+
+
+def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
+    """A warning for each vessel whose patch says that it was identified from runs that are to test it."""
+    found = []
+    for name, vessel in vessels.items():
+        known = documents.read(vessel.file).get("provenance", {}).get("runs", [])
+        seen = [run for run in tests if run in known]
+        if seen:
+            words = f"{name} was identified from {', '.join(seen)}, which now test{'s' * (len(seen) == 1)} it"
+            found.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
+    return found
 
 
 def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:

@@ -169,7 +169,11 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     """
     rest, test, notes = partition(plan, dataset)
     both = [rest, test]
+    longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
     for model in plan.models:
+        if model.identify is not None and model.identify.horizon / 2 > longest:
+            message = f"{model.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
+            raise DocumentError(message, file=plan.file, path=f"family.{model.family}.identify.horizon")
         if model.vessel is not None:
             check_columns(model.vessel, test.columns, plan.file)
             notes += not_measured(model.vessel, test)

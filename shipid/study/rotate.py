@@ -28,10 +28,11 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
     for pattern in patterns:
         found = documents.match(pattern, runs)
         if not found:
-            raise DocumentError(f"{pattern!r} matches no run: {choices(pattern, runs)}", file=plan.file, path="--tests")
+            raise DocumentError(f"{pattern!r} matches no run: {choices(pattern, runs)}", path="--tests")
         chosen.update(found)
     if len(chosen) < 2:
-        raise DocumentError("only one run matches: take turns with two or more", file=plan.file, path="--tests")
+        message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
+        raise DocumentError(message, path="--tests")
     return [run for run in runs if run in chosen]
 
 

@@ -356,7 +356,7 @@ def test_a_start_that_diverges_is_told() -> None:
         ({"fixed": ["hull.*"]}, "nothing is left"),
         ({"together": [[FEW[0], "hull.derivatives.X_rr"]]}, "is tied but not free"),
         ({"together": [FEW[:2], FEW[1:3]]}, "is in two groups"),
-        ({"parameters": ["inertia.x_G"]}, "give its size under scale"),
+        ({"parameters": ["inertia.x_G"]}, "give its size, scale"),
         ({"scale": {FEW[0]: 2.0}}, "scale is for a 0"),
         ({"bounds": {"inertia.m": (0.5, 2.0)}}, "reaches nothing that is free"),
         ({"prior": {"wind.*": 0.5}}, "reaches nothing that is free"),

@@ -89,9 +89,9 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
     """State after 8 s of the ordinary ship: smooth, one side of every kink (rates and drift keep their sign)."""
     given, slow = draw_inputs(vessel, 3, seed), pace(vessel)
     given["start"] |= {"u": np.full(3, 3.0 * slow), "v": np.full(3, 0.4 * slow), "r": np.full(3, -0.05)}
-    commands = {name: np.full(3, 0.6 if name.endswith("alpha") else 2.0) for name in given["commands"]}
+    commands = {name: np.full(3, 0.7 if name.endswith("alpha") else 2.0) for name in given["commands"]}
     environment = {name: np.zeros(3) for name in given["environment"]}
-    memory = {name: np.full(3, 0.5 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
+    memory = {name: np.full(3, 0.6 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
     found = rollout(
         vessel,
         given["start"],

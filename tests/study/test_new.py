@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import tomlkit
 from typer.testing import CliRunner
 
 from shipid.cli import app
@@ -155,6 +156,16 @@ def test_a_wrong_sign_of_the_helm_is_told(tmp_path: Path) -> None:
     assert {np.sign(value) for value in helm_sense(mirrored).values()} == {1.0}
     warnings = drafted(tmp_path, mirrored)[0].warnings
     assert sum(".alpha > 0 turns" in warning for warning in warnings) == 2
+
+
+def test_a_patch_that_has_seen_the_test_is_told(tmp_path: Path) -> None:
+    """Identified from every run, the proposed test among them; and from other runs than those."""
+    base = {"base": SHIP, "set": {"hull.derivatives.N_ur": -479060.0}}
+    for known, told in ((list(trial().runs), 1), (["elsewhere"], 0)):
+        patch = tmp_path / f"patch-{told}.toml"
+        patch.write_text(tomlkit.dumps({**base, "provenance": {"runs": known}}))
+        warnings = drafted(tmp_path, trial(), str(patch))[0].warnings
+        assert sum("was identified from" in warning for warning in warnings) == told
 
 
 def test_runs_shorter_than_the_horizon_are_named(tmp_path: Path) -> None:

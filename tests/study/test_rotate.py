@@ -62,7 +62,7 @@ def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) ->
     assert turns(plan, dataset, ["c", "a*"]) == ["a", "c"]
     with pytest.raises(DocumentError, match="'z' matches no run: valid: a, b, c"):
         turns(plan, dataset, ["z"])
-    with pytest.raises(DocumentError, match="only one run"):
+    with pytest.raises(DocumentError, match="only 'a' matches"):
         turns(plan, dataset, ["a"])
 
 
