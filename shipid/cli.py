@@ -395,6 +395,9 @@ def study_variants(
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
     rows = []
     for model in models:
+        if model.identify is not None:
+            rows.append((model.name, "-", "-", "identified from the runs of each cell, and so its A"))
+            continue
         factors = model.variant.factors if model.variant else {}
         changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in factors.items())
         shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)

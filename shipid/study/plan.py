@@ -24,7 +24,8 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
-ALONE, BOTH = "-identified", "-both"  # added to names: identified from the runs alone; then compensated as well
+ALONE, BOTH = "-identified", "-both"  # added to the names of a family and its members
+WAYS = {ALONE: "identified from the runs of each cell", BOTH: "identified from the runs of each cell, then compensated"}
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 PUBLISHED = {  # key of a published envelope -> signal, factor to SI
     **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
@@ -394,9 +395,10 @@ def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, 
         drawn = members(family, vessel, file)
         settings = _identify(study, family, index, vessel, file)
         found += [Model(v.name, v.family, v.member, v, vessel, words) for v in drawn]
-        for suffix in (ALONE, BOTH) if settings is not None else ():
+        for suffix, way in WAYS.items() if settings is not None else ():
+            told = ", ".join(filter(None, (words, way)))
             found += [
-                Model(f"{v.name}{suffix}", f"{v.family}{suffix}", v.member, v, vessel, words, settings, suffix == BOTH)
+                Model(f"{v.name}{suffix}", f"{v.family}{suffix}", v.member, v, vessel, told, settings, suffix == BOTH)
                 for v in drawn
             ]
     names = [model.name for model in found]
