@@ -109,8 +109,10 @@ def models(content: ReportContent) -> Table:
     names = frame.model[frame.A.notna()]
     takeaway = "No physics model could be judged."
     if len(valid):
+        takeaway = f"A of {names.iloc[0]} is {number(valid.iloc[0])} m."
+    if len(valid) > 1:
         takeaway = f"A runs from {number(valid.iloc[0])} m ({names.iloc[0]}) to {number(valid.iloc[-1])} m "
-        takeaway += f"({names.iloc[-1]})." if len(valid) > 1 else "."
+        takeaway += f"({names.iloc[-1]})."
     return _table("models", "Every model", takeaway, frame, MODELS)
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, naive_summary
-from shipid.study.verdict import interval, metres, named, words
+from shipid.study.verdict import interval, metres, named, runs, words
 
 
 def by_model(results: Results) -> pd.DataFrame:
@@ -43,7 +43,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     top = table[table["N_D"] == largest]
     physics = top[top["kind"] != NO_MODEL]
     if physics.empty:
-        where = f" at {largest} runs" if largest else ""
+        where = f" at {runs(largest)}" if largest else ""
         return [*sentences, (f"No cell with physics has a result{where}, so nothing can be said yet.", "cells")]
     best = physics.iloc[int(physics["loss"].argmin())]  # chosen by validation, never by the test
     chart = "map" if _has_map(table) else "gain"
@@ -57,7 +57,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     if len(known):
         left = known["H"] / known["A"]
         text = (
-            f"Compensation with {largest} runs leaves {left.min():.0%} to {left.max():.0%} of the error of physics "
+            f"Compensation with {runs(largest)} leaves {left.min():.0%} to {left.max():.0%} of the error of physics "
             f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
         )
         sentences.append((text, "horizon"))
@@ -80,7 +80,7 @@ def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
     return [
         f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "
         f"coefficient, such as waves, Euler steps and held commands, and {metres(row['H'])}{_spread(row)} compensated "
-        f"with {largest} runs."
+        f"with {runs(largest)}."
         for _, row in nominal[nominal["N_D"] == largest].iterrows()
     ]
 
@@ -88,7 +88,7 @@ def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
 def _headline(best: pd.Series, largest: int, ahead: float) -> str:
     """What the model that validation prefers does at the largest amount of data."""
     return (
-        f"With {largest} runs, {best['model']} (best in validation; {metres(best['A'])} mean error on its own) "
+        f"With {runs(largest)}, {best['model']} (best in validation; {metres(best['A'])} mean error on its own) "
         f"predicts {ahead:g} s ahead with {metres(best['H'])} mean error{_spread(best)}; nine errors in ten are below "
         f"{metres(best['H_90'])}."
     )
@@ -117,7 +117,7 @@ def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
     """Which physics models do no better than none, at the largest and at the smallest amount of data."""
     largest, smallest = int(table["N_D"].max()), int(table["N_D"].min())
     if largest not in pure.index:
-        return f"There is no result without physics at {largest} runs, so whether physics harms there cannot be told."
+        return f"There is no result without physics at {runs(largest)}, so whether physics harms there cannot be told."
 
     def harming(amount: int) -> list[str]:
         rows = table[(table["N_D"] == amount) & (table["kind"] != NO_MODEL)]
@@ -125,11 +125,11 @@ def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
 
     if names := harming(largest):
         verb = "does" if len(names) == 1 else "do"
-        return f"At {largest} runs {named(names)} {verb} no better than no physics at all."
-    better = f"t {largest} runs {every} does better than none."
+        return f"At {runs(largest)} {named(names)} {verb} no better than no physics at all."
+    better = f"t {runs(largest)} {every} does better than none."
     if smallest in pure.index and (names := harming(smallest)):
         verb = "harms" if len(names) == 1 else "harm"
-        return f"At {smallest} runs {named(names)} {verb}: no physics at all does as well or better; a{better}"
+        return f"At {runs(smallest)} {named(names)} {verb}: no physics at all does as well or better; a{better}"
     return f"A{better}"
 
 
@@ -151,14 +151,14 @@ def _trend(table: pd.DataFrame) -> str:
     least, most = H.columns.min(), H.columns.max()
     names = [str(name) for name in H.index[H[most] >= H[least]]] if least != most else []
     verb = "is" if len(names) == 1 else "are"
-    return f"With {most} runs {named(names)} {verb} no better than with {least}." if names else ""
+    return f"With {runs(int(most))} {named(names)} {verb} no better than with {least}." if names else ""
 
 
 def _floor(top: pd.DataFrame, largest: int, floor: float) -> str:
     """Which models do no better than constant motion, at the largest amount of data."""
     names = [str(name) for name in top[top["H"] >= floor]["model"]]
     beats = f"{named(names)} {'does' if len(names) == 1 else 'do'} not beat it" if names else "every model beats it"
-    return f"Keeping u, v and r constant gives {metres(floor)}: at {largest} runs {beats}."
+    return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(largest)} {beats}."
 
 
 def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
@@ -168,12 +168,12 @@ def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
         return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
     first = table[(table["model"] == best["model"]) & (table["N_D"] == fewest)]
     if first.empty:
-        return f"{best['model']} has no result at {fewest} runs, so its worth in runs cannot be told."
+        return f"{best['model']} has no result at {runs(fewest)}, so its worth in runs cannot be told."
     level = float(first["H"].iloc[0])
-    here = f"with {fewest} runs {best['model']} has {metres(level)}"
+    here = f"with {runs(fewest)} {best['model']} has {metres(level)}"
     enough, last = pure[pure["H"] <= level], int(pure.index.max())
     if enough.empty:
-        return f"Without physics {last} runs give {metres(float(pure['H'].loc[last]))}; {here}."
+        return f"Without physics {runs(last)} give {metres(float(pure['H'].loc[last]))}; {here}."
     if int(enough.index.min()) == fewest:
-        return f"Without physics {fewest} runs do as well, {metres(float(pure['H'].loc[fewest]))}: {here}."
-    return f"Without physics it takes {int(enough.index.min())} runs to do as well: {here}."
+        return f"Without physics {runs(fewest)} do as well, {metres(float(pure['H'].loc[fewest]))}: {here}."
+    return f"Without physics it takes {runs(int(enough.index.min()))} to do as well: {here}."

@@ -41,6 +41,11 @@ def interval(low: float, high: float, seeds: int) -> str:
     return f" [{low:.2f}, {high:.2f}] over {seeds} seeds" if seeds > 1 else ""
 
 
+def runs(count: int) -> str:
+    """Return `1 run`, `2 runs`, ..."""
+    return f"{count} run{'s' * (count != 1)}"
+
+
 def words(model: str) -> str:
     """Name a model inside a sentence, where `none` would say something else."""
     return "pure data-driven" if model == NO_MODEL else model
