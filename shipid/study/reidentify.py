@@ -10,7 +10,7 @@ import numpy as np
 
 from shipid.data.dataset import BREAK, Dataset
 from shipid.data.windows import Windows
-from shipid.errors import DataError, DocumentError
+from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Model, Plan
 from shipid.study.prepare import Prepared, own_vessel, paths_of
@@ -97,7 +97,7 @@ def _identified(
         values: Mapping[str, float] = {**model.variant.values, **solution.values}
         now = replace(model, variant=replace(model.variant, values=values))
         pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device)
-    except (DataError, DocumentError) as error:
+    except ShipidError as error:
         return _nothing(model, windows, prepared.test, error.message)
     if not np.isfinite(pair[0]).all():
         return _nothing(model, windows, prepared.test, "the identified model diverges on training windows")
