@@ -87,6 +87,9 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     ------
     ShipidError : a vessel or dataset that cannot be read or do not fit each other, or too few runs.
     """
+    twice = next((name for name in vessels if list(vessels).count(name) > 1), None)
+    if twice is not None:
+        raise ShipidError(f"{twice!r} is named twice: name each vessel once", path="--vessel")
     found = {_named(name, out): load_vessel(name) for name in vessels}
     if not found:
         raise ShipidError("name a vessel: a bundled name (see `shipid vessel list`) or a path", path="--vessel")

@@ -222,6 +222,7 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
         (["gunnerus"], 5, "no vessel of this name comes with shipid"),
         (["./no.toml"], 5, "no such file"),
         ([], 5, "name a vessel"),
+        ([SHIP, SHIP], 5, "is named twice"),
     ],
 )
 def test_what_cannot_be_studied_is_one_line(tmp_path: Path, vessels: list[str], runs: int, said: str) -> None:
