@@ -11,9 +11,9 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "load_vessel": "shipid.vessel.load",
     "Vessel": "shipid.vessel.load",
-    "rollout": "shipid.simulation.rollout",
+    "rollout": "shipid.engine.rollout",
     "read_dataset": "shipid.data.dataset",
-    "import_log": "shipid.data.importing",
+    "import_log": "shipid.logs.importing",
     "cut_windows": "shipid.data.windows",
     "identify": "shipid.identification.solve",
     "Identify": "shipid.identification.problem",

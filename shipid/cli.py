@@ -194,7 +194,7 @@ def _limits(row: Any) -> str:
 @data_app.command("fetch")
 def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
-    from shipid.data.catalogue import fetch
+    from shipid.logs.catalogue import fetch
 
     typer.echo(str(fetch(name)))
 
@@ -218,10 +218,10 @@ def data_import(
         return
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
-    from shipid.data.catalogue import fetch
     from shipid.data.dataset import write_dataset
-    from shipid.data.importing import import_log
-    from shipid.data.mapping import read_mapping
+    from shipid.logs.catalogue import fetch
+    from shipid.logs.importing import import_log
+    from shipid.logs.mapping import read_mapping
 
     if out is not None and out.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
@@ -236,8 +236,9 @@ def data_import(
 
 
 def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
-    from shipid.data.draft import draft_mapping, write_new
-    from shipid.data.guess import guess
+    from shipid.files import write_new
+    from shipid.logs.guess.columns import guess
+    from shipid.logs.guess.draft import draft_mapping
 
     found = guess(log, names)
     file = write_new(draft_mapping(found), out)
@@ -255,9 +256,10 @@ def data_segment(
     out: Annotated[Path | None, typer.Option(help="TOML file to write; default: beside you")] = None,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
-    from shipid.data.catalogue import fetch
-    from shipid.data.draft import moment, segment_log, segments_text, write_new
-    from shipid.data.mapping import read_mapping
+    from shipid.files import write_new
+    from shipid.logs.catalogue import fetch
+    from shipid.logs.guess.draft import moment, segment_log, segments_text
+    from shipid.logs.mapping import read_mapping
 
     declared = read_mapping(mapping)
     unit = declared.clock.unit
@@ -323,7 +325,7 @@ def data_measures(
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
     from shipid.data.dataset import read_dataset
-    from shipid.data.measuring import measure_dataset
+    from shipid.logs.measuring import measure_dataset
 
     found = measure_dataset(read_dataset(dataset), manoeuvre, length)
     if len(found.measures):
@@ -359,7 +361,7 @@ def study_new(
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
     import shlex
 
-    from shipid.data.draft import check_new, write_new
+    from shipid.files import check_new, write_new
     from shipid.study.new import draft_study
 
     file = out or Path(f"{_stem(data or vessel[0])}-study.toml")
@@ -422,11 +424,11 @@ def study_screen(
     device: Device = "cpu",
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.estimation.training import check_device
+    from shipid.files import check_table, write_table
+    from shipid.hybrid.training import check_device
     from shipid.study import screen
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
-    from shipid.study.store import check_table, write_table
 
     check_device(device)
     plan = read_plan(study, _parsed(changes))
@@ -462,11 +464,11 @@ def study_rotate(
     device: Device = "cpu",
 ) -> None:
     """Let every run test in its turn, all others train: how much the answer owes to the choice of the test run."""
-    from shipid.estimation.training import check_device
+    from shipid.files import check_table, write_table
+    from shipid.hybrid.training import check_device
     from shipid.study import rotate
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
-    from shipid.study.store import check_table, write_table
 
     check_device(device)
     plan = read_plan(study, _parsed(changes))
@@ -626,7 +628,7 @@ def identify(
 ) -> None:
     """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
     from shipid.data.dataset import read_dataset
-    from shipid.data.draft import check_new
+    from shipid.files import check_new
     from shipid.identification.outcome import read_settings, run_identification, write_patch
     from shipid.vessel.load import load_vessel
 
@@ -902,7 +904,7 @@ def _manoeuvre_content(
 
 
 def _write_measures(frame: DataFrame, file: Path) -> None:
-    from shipid.study.store import write_table
+    from shipid.files import write_table
 
     write_table(file, frame)
     typer.echo(f"measures -> {file}")
@@ -1031,9 +1033,10 @@ def _stem(name: str | Path) -> str:
 
 
 def _report(folder: Path) -> Path:
+    from shipid.files import write_text
     from shipid.report import write_report, write_summary
     from shipid.study.results import read_results
-    from shipid.study.store import write_results, write_text
+    from shipid.study.store import write_results
 
     results = read_results(folder)
     write_results(folder, results.cells)

@@ -14,9 +14,10 @@ from typing import Any, Self
 import numpy as np
 
 from shipid.data.windows import Commands, from_frame, planned_means, to_frame
+from shipid.engine.rollout import Distances, Engine, distances, rollout
 from shipid.errors import DataError, ResultError
-from shipid.estimation.compensator import Compensator
-from shipid.simulation.rollout import Distances, Engine, distances, rollout
+from shipid.files import write_arrays
+from shipid.hybrid.compensator import Compensator
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -103,11 +104,7 @@ class Predictor:
         }
         arrays = {} if self.compensator is None else self.compensator.arrays()
         target = Path(file)
-        temporary = target.with_name(f".{target.name}")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)  # weights do not shrink
-        os.replace(temporary, target)
+        write_arrays(target, {"header": np.array(json.dumps(header)), **arrays})  # weights do not shrink
         return target
 
     @classmethod

@@ -21,7 +21,7 @@ from shipid.document import bundled, bundled_folder
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
-from tests.data.simulated import as_bridge, si_log
+from tests.logs.simulated import as_bridge, si_log
 from tests.study.tiny import TINY
 
 BAD = Path(__file__).parent / "bad"

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipid import document as documents
+from shipid.engine.lowering import lower
 from shipid.physics import SIGNALS, TERMS
 from shipid.physics.grammar import Grammar
-from shipid.simulation.lowering import lower
 from shipid.simulation.sea import wave_loads
 from shipid.vessel.bindings import bindings
 from shipid.vessel.load import Vessel, check_vessel, load_vessel

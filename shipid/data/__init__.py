@@ -1,1 +1,1 @@
-"""From logs to windows: a dataset and its schema, declared imports and repairs, checks, cutting, public sets."""
+"""Datasets of runs, windows cut from them, and checks: what every method and study sees."""

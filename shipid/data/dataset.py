@@ -6,8 +6,7 @@ import hashlib
 import json
 import os
 import re
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
+from shipid.files import whole
 
 Array = NDArray[np.float64]
 
@@ -213,19 +213,12 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
-    write_whole(target, lambda part: pyarrow.parquet.write_table(table, part, compression="zstd"))
-    return target
-
-
-def write_whole(target: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` make a file that appears whole or not at all; raises DataError if the place cannot be written."""
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
-            write(Path(folder) / target.name)
-            os.replace(Path(folder) / target.name, target)
+        with whole(target) as part:
+            pyarrow.parquet.write_table(table, part, compression="zstd")
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
+    return target
 
 
 def read_dataset(file: str | os.PathLike[str]) -> Dataset:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.engine.integrate import cores, integrate
+from shipid.engine.native import C, Target, compiled, head, target
+from shipid.engine.printing import Printed, print_function
 from shipid.identification.variation import Layout, Variation, variation
-from shipid.simulation.integrate import cores, integrate
-from shipid.simulation.native import C, Target, compiled, head, target
-from shipid.simulation.printing import Printed, print_function
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step

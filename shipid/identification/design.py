@@ -26,14 +26,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.problem import SIGNALS
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import Excitation, Manoeuvre
 from shipid.simulation.perform import perform
-from shipid.simulation.rollout import rollout
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.simulation.truth import RPM, aboard, horizontal
+from shipid.simulation.truth import aboard, horizontal
+from shipid.units import RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

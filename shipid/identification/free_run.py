@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.identification.problem import Identify
 from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, Segment
 from shipid.identification.variation import COLUMNS
-from shipid.simulation.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

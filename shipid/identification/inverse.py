@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import ANGLES, Dataset, pieces
 from shipid.data.kinematics import STATES, Noise, smooth
+from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
 from shipid.identification.collinearity import Collinearity, collinearity
-from shipid.simulation.scan import memory_along
 from shipid.simulation.truth import aboard
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel

@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict
 from shipid import __version__
 from shipid import document as documents
 from shipid.data.dataset import Dataset
-from shipid.data.draft import write_new
 from shipid.errors import DataError, DocumentError, ShipidError, choices
+from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.collinearity import listed, short
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
@@ -26,11 +26,11 @@ from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.shooting import Progress
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import Fit, Statistics, autocorrelation, statistics
+from shipid.interrupts import uninterrupted
 from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.rows import measure_rows
 from shipid.simulation.perform import perform
-from shipid.simulation.scan import uninterrupted
 from shipid.simulation.standard import length_of, standard
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
+from shipid.engine.native import compiler
 from shipid.errors import DataError, DocumentError
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.problem import (
@@ -29,7 +30,6 @@ from shipid.identification.problem import (
 )
 from shipid.identification.segments import Segment, cut_segments
 from shipid.identification.variation import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
-from shipid.simulation.native import compiler
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

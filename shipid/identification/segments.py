@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, clock_slack, sample, stretches
+from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
-from shipid.simulation.scan import memory_along
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

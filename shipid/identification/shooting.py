@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.identification.residuals import Evaluation, Fit, Intervals
-from shipid.simulation.scan import uninterrupted
+from shipid.interrupts import uninterrupted
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -16,9 +16,10 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
+from shipid.engine.casadi import summed_rates
+from shipid.engine.integrate import Method, integrate
 from shipid.identification.problem import MOVING
-from shipid.simulation.integrate import Method, integrate
-from shipid.simulation.scan import summed_rates, uninterrupted
+from shipid.interrupts import uninterrupted
 from shipid.simulation.truth import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipid.measures.record import DEGREE, Measures
+from shipid.measures.record import Measures
+from shipid.units import DEGREE
 
 SOURCE = "IMO MSC.137(76)"
 SHORTEST = 100.0  # m: length from which the standards apply

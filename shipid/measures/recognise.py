@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from shipid.errors import DataError
-from shipid.measures.record import DEGREE, Array, Record, helm_over, plateaus, released
+from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
+from shipid.units import DEGREE
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
 LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE

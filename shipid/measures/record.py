@@ -12,7 +12,6 @@ from shipid.errors import DataError
 
 Array = NDArray[np.float64]
 
-DEGREE = np.pi / 180
 POINTS = 4  # of the polynomial on which a value between samples lies
 HALVINGS = 60
 TOP = 0.2  # share of a rise that is its top

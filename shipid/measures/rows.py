@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from shipid.measures.criteria import Criterion
-from shipid.measures.record import DEGREE, Measures
+from shipid.measures.record import Measures
+from shipid.units import DEGREE
 
 SHOWN = {"rad": ("deg", DEGREE), "rad/s": ("deg/s", DEGREE)}  # SI unit -> what is shown, and how much of SI it is
 

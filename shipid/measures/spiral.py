@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipid.measures.record import DEGREE, Array, Measures, Record, mean, plateaus, settled
+from shipid.measures.record import Array, Measures, Record, mean, plateaus, settled
+from shipid.units import DEGREE
 
 LEVEL_HELM = 0.5 * DEGREE  # under which two helm angles are one level
 LEVEL_RATE = 0.05  # of the greatest rate, under which two rates are one level

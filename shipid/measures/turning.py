@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.measures.record import (
-    DEGREE,
     STEADY,
     Array,
     Measures,
@@ -20,6 +19,7 @@ from shipid.measures.record import (
     settled,
     value_at,
 )
+from shipid.units import DEGREE
 
 NAN = float("nan")
 MIDSHIPS = 0.25  # of the helm in the turn, up to which it counts as amidships

@@ -6,18 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from shipid.measures.record import (
-    DEGREE,
-    Array,
-    HelmOver,
-    Measures,
-    Record,
-    crossing,
-    extreme,
-    helm_over,
-    integral,
-    value_at,
-)
+from shipid.measures.record import Array, HelmOver, Measures, Record, crossing, extreme, helm_over, integral, value_at
+from shipid.units import DEGREE
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
 MOST = 4  # overshoots that are measured: later ones repeat them

@@ -1,1 +1,1 @@
-"""From equations to trajectories: rollouts on CasADi or lowered to PyTorch, manoeuvres and the simulated truth."""
+"""Simulated runs: manoeuvres, weather, sea and sensors, and the truth of a study."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.engine.integrate import Method
+from shipid.engine.rollout import Engine, rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit, steers
-from shipid.simulation.integrate import Method
-from shipid.simulation.rollout import Engine, rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

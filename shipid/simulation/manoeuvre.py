@@ -18,7 +18,7 @@ from shipid.physics import SIGNALS, helm
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
-from shipid.simulation.truth import DEGREE, RPM
+from shipid.units import DEGREE, RPM
 
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]

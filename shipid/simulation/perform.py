@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.engine.integrate import Method
+from shipid.engine.rollout import Engine, Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
-from shipid.simulation.integrate import Method
 from shipid.simulation.manoeuvre import Manoeuvre
-from shipid.simulation.rollout import Engine, Trajectories, rollout
-from shipid.simulation.truth import DEGREE, ON_BOARD, RPM, logged, run_names
+from shipid.simulation.truth import ON_BOARD, logged, run_names
+from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 

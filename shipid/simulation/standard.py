@@ -21,7 +21,7 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.truth import RPM
+from shipid.units import RPM
 from shipid.vessel.load import Vessel
 
 FROUDE, GRAVITY = 0.2, 9.81  # speed where none is asked for: U = 0.2 sqrt(g L)

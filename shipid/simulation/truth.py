@@ -9,12 +9,13 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, choices
 from shipid.simulation import gusts
 from shipid.simulation.gusts import Gusts
-from shipid.simulation.rollout import Trajectories, rollout
 from shipid.simulation.sea import Sea, draw_components, share_outside, table_range, wave_loads
 from shipid.simulation.sensors import Sensor, measure
+from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
@@ -22,8 +23,6 @@ from shipid.vessel.perturb import uniform
 Range = tuple[FiniteFloat, FiniteFloat]
 NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
 MOST_LOST = 0.05  # of the energy of a sea may lie beyond the frequencies of a vessel's tables
-RPM = 1 / 60
-DEGREE = np.pi / 180
 ON_BOARD = ("V_w", "beta_w")  # what of the environment a ship logs: neither current nor waves
 
 

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
 from shipid.data.windows import from_frame
 from shipid.errors import DataError, ResultError, choices
+from shipid.files import check_table, write_table
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.predictor import Predictor, check_columns
 from shipid.study.prepare import states_along
-from shipid.study.store import cell_file, check_table, write_table
+from shipid.study.store import cell_file
 
 
 def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Path) -> tuple[pd.DataFrame, float]:

@@ -9,12 +9,16 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.windows import Windows
-from shipid.estimation.compensator import choose_features, feature_table
+from shipid.hybrid.compensator import choose_features, feature_table
 from shipid.study.plan import PUBLISHED, Plan, Published
 from shipid.study.prepare import nested
+from shipid.units import DEGREE, RPM
 
-RPM, DEGREE = 60.0, 180.0 / np.pi
-SAILORS = {"n": ("shaft", "rpm", RPM), "alpha": ("azimuth", "deg", DEGREE), "delta": ("rudder", "deg", DEGREE)}
+SAILORS = {
+    "n": ("shaft", "rpm", 1 / RPM),
+    "alpha": ("azimuth", "deg", 1 / DEGREE),
+    "delta": ("rudder", "deg", 1 / DEGREE),
+}
 LIMITS = ("min", "mean", "max")
 
 
@@ -61,4 +65,4 @@ def sailors_unit(quantity: str) -> tuple[str, float]:
     """Unit in which sailors read a quantity, and the factor to it from SI."""
     if "." in quantity:
         return SAILORS[quantity.rpartition(".")[2]][1:]
-    return ("deg/s", DEGREE) if quantity == "r" else ("m/s", 1.0)
+    return ("deg/s", 1 / DEGREE) if quantity == "r" else ("m/s", 1.0)

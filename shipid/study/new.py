@@ -20,15 +20,15 @@ from tomlkit.items import Table
 
 from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
-from shipid.data.survey import Survey, helm_sense, separation, survey, typical_runs
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.predictor import assumed, check_columns
 from shipid.simulation.approach import Controls
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
-from shipid.simulation.truth import RPM
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import obtain, partition, prepare
+from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
+from shipid.units import RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of

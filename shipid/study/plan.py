@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,14 +11,15 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
-from shipid.data.importing import sha256_of
-from shipid.data.mapping import read_mapping
 from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
-from shipid.estimation.recipe import Recipe
+from shipid.hybrid.recipe import Recipe
 from shipid.identification.problem import Identify, unknowns
+from shipid.logs.importing import sha256_of
+from shipid.logs.mapping import read_mapping
 from shipid.simulation.truth import Truth, check_truth
+from shipid.units import DEGREE, RPM
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -29,8 +29,8 @@ WAYS = {ALONE: "identified from the runs of each cell", BOTH: "identified from t
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 PUBLISHED = {  # key of a published envelope -> signal, factor to SI
     **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
-    "n_rpm": ("n", 1 / 60),
-    **{f"{name}_deg": (name, math.pi / 180) for name in ("r", "alpha", "delta")},
+    "n_rpm": ("n", RPM),
+    **{f"{name}_deg": (name, DEGREE) for name in ("r", "alpha", "delta")},
 }
 
 

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.catalogue import fetch
 from shipid.data.dataset import Dataset, pieces, read_dataset
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
 from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, part_folds, split_folds, split_runs
+from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DocumentError, choices
-from shipid.estimation.recipe import RidgeRecipe
+from shipid.hybrid.recipe import RidgeRecipe
+from shipid.logs.catalogue import fetch
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.metrics import Summary, position_error, summary
 from shipid.predictor import assumed, check_columns, physics_paths
-from shipid.simulation.scan import memory_along
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Model, Plan, beside, mapping_of
 from shipid.vessel.load import Vessel

@@ -14,6 +14,7 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
+from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -81,13 +82,13 @@ def read_results(folder: Path) -> Results:
         naive=naive,
         paths=paths,
         dataset=dataset,
-        provenance=store.read_json(folder / store.PROVENANCE),
+        provenance=read_json(folder / store.PROVENANCE),
     )
 
 
 def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
     """One row per model: accuracy [m], also by axis of the frame (11), and whether it diverged on the test windows."""
-    frame = pd.DataFrame(store.read_json(folder / store.MODELS))
+    frame = pd.DataFrame(read_json(folder / store.MODELS))
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
@@ -259,7 +260,7 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    return envelope_table(store.read_json(results.folder / store.ENVELOPE), results.plan.study.published)
+    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.study.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:

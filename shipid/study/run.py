@@ -19,9 +19,10 @@ import numpy as np
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Windows, covered, planned_means
 from shipid.errors import ShipidError
-from shipid.estimation.compensator import Tuned
-from shipid.estimation.training import check_device, use_threads
-from shipid.estimation.tuning import tune
+from shipid.files import read_json, write_json
+from shipid.hybrid.compensator import Tuned
+from shipid.hybrid.training import check_device, use_threads
+from shipid.hybrid.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -83,8 +84,8 @@ def run_study(
     prepared = prepare(plan, dataset, device)
     fixed = {m.name: prepared.test_paths[m.name] for m in prepared.models if m.identify is None}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
-    store.write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
-    store.write_json(folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models])
+    write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
+    write_json(folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models])
     for note in prepared.notes:
         yield Event("note", note)
     done = store.finished(folder, plan.batches)
@@ -97,15 +98,15 @@ def run_study(
             if predictor is not None:
                 predictor.save(store.cell_file(folder, row["cell"]))
             rows.append(row)
-        store.write_json(store.batch_file(folder, batch), rows)
+        write_json(store.batch_file(folder, batch), rows)
         for row in rows:
             cells += 1
             yield Event("cell", done=cells, total=plan.cells, row=row)
-    record = store.read_json(folder / store.PROVENANCE)
+    record = read_json(folder / store.PROVENANCE)
     record["notes"] = list(prepared.notes)
     record["machine"] = {**machine(), "device": device}
     record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
-    store.write_json(folder / store.PROVENANCE, record)
+    write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder))
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
 

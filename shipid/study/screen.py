@@ -13,10 +13,10 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
+from shipid.engine.native import compiler
 from shipid.errors import DocumentError, choices
 from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.predictor import check_columns, physics_distances
-from shipid.simulation.native import compiler
 from shipid.study.plan import Plan
 from shipid.study.prepare import not_measured, partition, planned, window_memory
 from shipid.vessel.load import Vessel

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,71 +13,15 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.data.windows import Windows
-from shipid.errors import DataError, DocumentError, ResultError
+from shipid.errors import DocumentError, ResultError
+from shipid.files import read_json, write_arrays, write_json, write_table, write_text
 from shipid.predictor import read_arrays
 from shipid.study.plan import Batch, Model, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, MODELS = "study.toml", "vessels.json", "provenance.json", "models.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
-TABLES = (".parquet", ".csv")
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
-
-
-def write_text(file: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(f".{file.name}.{os.getpid()}")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, file)
-
-
-def check_table(file: Path) -> None:
-    """Raise DataError for a table file of another kind than `write_table` writes, before any work is done for it."""
-    if file.suffix not in TABLES:
-        raise DataError(f"{file.suffix or 'no ending'}: write to a file ending in {' or '.join(TABLES)}", file=file)
-
-
-def write_table(file: Path, frame: pd.DataFrame) -> None:
-    """Write a frame as Parquet or CSV by the file's ending, whole or not at all."""
-    check_table(file)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        if file.suffix == ".csv":
-            frame.to_csv(temporary, index=False)
-        else:
-            frame.to_parquet(temporary, index=False)
-        os.replace(temporary, file)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_json(file: Path, content: Any) -> None:
-    """Write plain data as JSON, whole or not at all; NaN becomes null."""
-    write_text(file, json.dumps(_plain(content), indent=1))
-
-
-def read_json(file: Path) -> Any:
-    """Read JSON; ResultError if it is missing or damaged."""
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
-    except ValueError:
-        raise ResultError("damaged: run the study again into a new folder", file=file) from None
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
@@ -174,9 +117,9 @@ def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     keys = ["cell", "model", "kind", "member", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
-    table.to_parquet(folder / "results.parquet", index=False)
+    write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
-    pd.DataFrame(trials).to_parquet(folder / "trials.parquet", index=False)
+    write_table(folder / "trials.parquet", pd.DataFrame(trials))
     return folder / "results.parquet"
 
 
@@ -191,10 +134,7 @@ def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], nai
     arrays |= {f"planned {name}": values for name, values in test.planned.items()}
     arrays |= {f"physics {name}": values for name, values in paths.items()}
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
-    temporary = folder / f".{TEST}"
-    with temporary.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
-    os.replace(temporary, folder / TEST)
+    write_arrays(folder / TEST, arrays, compressed=True)
 
 
 def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:

@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from typing import Any, TypeVar, cast
 
 from shipid.errors import ShipidError
+from shipid.interrupts import uninterrupted
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
@@ -49,8 +50,6 @@ def on_workers(work: Callable[[Task], Result], tasks: Sequence[Task], count: int
     What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this
     process, whatever they are doing.
     """
-    from shipid.simulation.scan import uninterrupted
-
     left, workers, doing = iter(tasks), ExitStack(), {}
     try:
         with uninterrupted(), _one_thread():  # half a process would complain

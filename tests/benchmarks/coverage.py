@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
 from shipid.identification.agreement import agreement
 from shipid.identification.problem import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import Fit, Statistics, statistics
-from shipid.simulation.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials

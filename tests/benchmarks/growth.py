@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.simulation.rollout import rollout
+from shipid.engine.rollout import rollout
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.rollouts import inputs
 from tests.benchmarks.timing import best_of

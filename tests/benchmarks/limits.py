@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch.profiler import ProfilerActivity, profile
 
-from shipid.estimation.recipe import Recipe, RidgeRecipe
-from shipid.estimation.tuning import tune
+from shipid.hybrid.recipe import Recipe, RidgeRecipe
+from shipid.hybrid.tuning import tune
 from tests.benchmarks.timing import best_of
 
 ORDER = 2048  # of the big matrices

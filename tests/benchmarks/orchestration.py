@@ -23,8 +23,8 @@ import numpy as np
 import torch
 
 from shipid import cli
-from shipid.estimation.recipe import Recipe
-from shipid.estimation.tuning import Tuned, tune
+from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.tuning import Tuned, tune
 from shipid.study import run as study
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare

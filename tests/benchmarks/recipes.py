@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.estimation.recipe import Recipe
+from shipid.hybrid.recipe import Recipe
 from shipid.study.run import run_batch
 from tests.benchmarks.yardstick import KEPT, Cell, tune_cell, world
 

@@ -13,8 +13,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.simulation.rollout import rollout
-from shipid.simulation.scan import casadi_scan
+from shipid.engine.casadi import casadi_scan
+from shipid.engine.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.timing import best_of

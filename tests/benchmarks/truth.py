@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from shipid.simulation import native
+from shipid.engine import native
 from shipid.simulation.truth import Truth, simulate
 from shipid.study.plan import read_plan
 from tests.benchmarks.timing import best_of

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.checks import check_dataset
-from tests.data.conftest import as_dataset, turning
+from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 120.0, 0.5)
 

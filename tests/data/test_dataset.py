@@ -10,7 +10,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, pieces, read_dataset, sample, unit_of, write_dataset
 from shipid.errors import DataError
-from tests.data.conftest import as_dataset, turning
+from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 20.0, 0.5)
 

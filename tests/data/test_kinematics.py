@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from shipid.data.kinematics import STATES, Noise, smooth
-from tests.data.conftest import turning
+from tests.logs.conftest import turning
 
 T = np.arange(0.0, 120.0, 1.0)
 

@@ -23,7 +23,7 @@ from shipid.data.windows import (
     to_frame,
 )
 from shipid.errors import DataError
-from tests.data.conftest import as_dataset, turning
+from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 60.5, 0.5)
 finite = st.floats(-1e4, 1e4)

@@ -14,16 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.identification.problem import Identify
 from shipid.identification.solve import Solution, identify
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.measures import turning, zigzag
 from shipid.measures.recognise import record_of
-from shipid.measures.record import DEGREE, Measures
+from shipid.measures.record import Measures
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman, Named
-from shipid.simulation.rollout import Trajectories, rollout
+from shipid.units import DEGREE
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, plan, rank
 from shipid.simulation.manoeuvre import (
@@ -20,7 +21,6 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform
-from shipid.simulation.rollout import rollout
 from shipid.simulation.standard import standard
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety

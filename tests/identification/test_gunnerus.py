@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
 from shipid.identification.free_run import ALL, free_runs
 from shipid.identification.solve import identify
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.study.plan import read_plan
 from shipid.vessel.load import load_vessel
 

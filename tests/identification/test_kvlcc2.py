@@ -9,7 +9,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification.solve import Solution
-from shipid.measures.record import DEGREE
+from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from tests.identification.kvlcc2 import (
     FITTED,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipid.engine.native import compiler
+from shipid.engine.rollout import rollout
 from shipid.identification import residuals
 from shipid.identification.problem import NUISANCES, Identify
 from shipid.identification.residuals import Intervals, build, predict
-from shipid.simulation.native import compiler
-from shipid.simulation.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED, variety

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
 from shipid.simulation import truth
-from shipid.simulation.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from tests.conftest import pace

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipid.measures.record import DEGREE, Record
+from shipid.measures.record import Record
+from shipid.units import DEGREE
 
 Array = np.ndarray
 FINE = 0.01  # s

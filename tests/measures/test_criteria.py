@@ -7,7 +7,8 @@ import pytest
 
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria, first_limit, second_limit
-from shipid.measures.record import DEGREE, Measures
+from shipid.measures.record import Measures
+from shipid.units import DEGREE
 from tests.measures.sailed import SAILED, every
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
-from shipid.measures.record import DEGREE
+from shipid.units import DEGREE
 
 # README beside the files; the tank repeats them to 0.2 to 0.5 deg
 READ_OFF = {

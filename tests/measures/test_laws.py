@@ -10,8 +10,9 @@ import pytest
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of
-from shipid.measures.record import DEGREE, Measures, Record
+from shipid.measures.record import Measures, Record
 from shipid.measures.rows import measure_rows
+from shipid.units import DEGREE
 from tests.measures.sailed import SAILED, every, rows
 
 KINDS = list(MEASURES)

@@ -8,7 +8,8 @@ import pytest
 from shipid.errors import DataError
 from shipid.measures import turning, zigzag
 from shipid.measures.recognise import kinds_of, record_of
-from shipid.measures.record import DEGREE, Record
+from shipid.measures.record import Record
+from shipid.units import DEGREE
 from tests.measures.sailed import GAIN, SAILED, START, clock, every, nomoto, sailed
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shipid.measures import reverse_spiral, spiral
-from shipid.measures.record import DEGREE
 from shipid.measures.spiral import levels
+from shipid.units import DEGREE
 from tests.measures.sailed import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral
 
 

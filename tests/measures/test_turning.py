@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.measures import pull_out, turning
-from shipid.measures.record import DEGREE
+from shipid.units import DEGREE
 from tests.measures.sailed import DRIFT, GAIN, RATE, SPEED, START, circle, every, perfect_circle, released, rows
 
 

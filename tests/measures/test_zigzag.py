@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.measures import zigzag
-from shipid.measures.record import DEGREE
+from shipid.units import DEGREE
 from tests.measures.sailed import GAIN, START, TIME, clock, every, nomoto, sailed, zigzag_10, zigzag_legs
 
 

@@ -25,7 +25,7 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform
-from shipid.simulation.truth import DEGREE
+from shipid.units import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 

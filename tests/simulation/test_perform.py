@@ -21,7 +21,7 @@ from shipid.simulation.manoeuvre import (
 )
 from shipid.simulation.perform import perform
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import DEGREE
+from shipid.units import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 

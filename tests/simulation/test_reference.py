@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipid.simulation.rollout import Trajectories, rollout
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 

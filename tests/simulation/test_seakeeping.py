@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from shipid.engine.native import compiler
+from shipid.engine.rollout import Engine, Trajectories, rollout
 from shipid.physics.frames import skew
-from shipid.simulation.native import compiler
-from shipid.simulation.rollout import Engine, Trajectories, rollout
 from shipid.simulation.sea import GRAVITY, Sea, draw_components, jonswap, wave_loads
 from shipid.simulation.truth import Truth, simulate
 from shipid.vessel.dynamics import dynamics

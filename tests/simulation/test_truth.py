@@ -10,8 +10,8 @@ import pytest
 from pydantic import ValidationError
 
 from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
-from shipid.simulation.rollout import rollout
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.vessel.dynamics import dynamics

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset, write_dataset
+from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
-from shipid.simulation.rollout import rollout
 from shipid.study import store
 from shipid.study.apply import predict_log
 from shipid.study.plan import Plan

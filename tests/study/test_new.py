@@ -14,13 +14,13 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.data.dataset import Dataset, cumulative_integral, write_dataset
-from shipid.data.importing import import_log
-from shipid.data.mapping import read_mapping
-from shipid.data.survey import helm_sense, separation, survey, typical_runs
 from shipid.errors import ShipidError
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
 from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, draft_study, horizon_of, ladder, step_of
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
+from shipid.study.survey import helm_sense, separation, survey, typical_runs
 from shipid.vessel.template import Particulars, first_guess
 from tests.study.tiny import logged
 

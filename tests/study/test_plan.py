@@ -9,7 +9,7 @@ import pytest
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
-from shipid.estimation.recipe import Recipe, RidgeRecipe
+from shipid.hybrid.recipe import Recipe, RidgeRecipe
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan

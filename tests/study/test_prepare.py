@@ -14,10 +14,10 @@ import tomlkit
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
+from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
-from shipid.estimation.recipe import Recipe
+from shipid.hybrid.recipe import Recipe
 from shipid.predictor import Predictor
-from shipid.simulation.rollout import rollout
 from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import Prepared, constant_motion, limits, obtain, own_vessel, prepare, window_memory

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
-from shipid.estimation.recipe import RidgeRecipe
+from shipid.hybrid.recipe import RidgeRecipe
 from shipid.study import results as frames
 from shipid.study import store
 from shipid.study.plan import build_plan, read_plan

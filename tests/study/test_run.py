@@ -13,6 +13,7 @@ import pytest
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
+from shipid.files import read_json, write_json
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -131,10 +132,10 @@ def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
 
 
 def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Path) -> None:
-    record = store.read_json(tiny_run / store.PROVENANCE)
+    record = read_json(tiny_run / store.PROVENANCE)
     assert record["digest"] == tiny_plan(tmp_path).digest
     assert {"shipid", "torch", "casadi", "optuna"} <= record["machine"]["packages"].keys()
-    models = store.read_json(tiny_run / store.MODELS)
+    models = read_json(tiny_run / store.MODELS)
     variant = next(m.variant for m in tiny_plan(tmp_path).models if m.name == "wrong-2")
     assert variant is not None
     entry = next(row for row in models if row["model"] == "wrong-2")
@@ -156,7 +157,7 @@ def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Pat
 
 def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
-    from shipid.estimation.tuning import Tuned, tune
+    from shipid.hybrid.tuning import Tuned, tune
     from shipid.study import run
 
     def failing(*args: Any, **kwargs: Any) -> dict[str, Tuned]:
@@ -296,7 +297,7 @@ def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
 
 
 def test_json_holds_no_nan(tmp_path: Path) -> None:
-    store.write_json(tmp_path / "a.json", {"x": np.float64("nan"), "y": [np.int64(3), (1.5, np.inf)], "z": np.True_})
+    write_json(tmp_path / "a.json", {"x": np.float64("nan"), "y": [np.int64(3), (1.5, np.inf)], "z": np.True_})
     assert json.loads((tmp_path / "a.json").read_text()) == {"x": None, "y": [3, [1.5, None]], "z": True}
 
 

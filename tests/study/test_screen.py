@@ -11,15 +11,15 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
+from shipid.engine import native, rollout
 from shipid.errors import DataError, DocumentError
+from shipid.files import write_table
 from shipid.metrics import position_error, summary
 from shipid.predictor import physics_paths
-from shipid.simulation import native, rollout
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, prepare, window_memory
 from shipid.study.screen import drivers, families, joined, notes, screen, spread
-from shipid.study.store import write_table
 from shipid.vessel.perturb import members
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan

@@ -1,0 +1,141 @@
+"""The CasADi engine: one sample's steps as a scan, samples on threads. Best for long simulations of few samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from shipid.engine.integrate import Array, Batch, Method, cores, integrate
+from shipid.interrupts import uninterrupted
+from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.load import Vessel
+
+
+def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
+    """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
+    for term in model.sums:
+        own = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
+        columns = [ca.repmat(one, 1, own.shape[1]) for one in inputs]
+        tau = tau + ca.sum2(term.function.map(own.shape[1])(*columns, own))
+    return model.rates(*inputs, tau)
+
+
+@lru_cache(maxsize=32)
+def casadi_scan(
+    model: Dynamics, step: float, num_steps: int, method: Method, every: int, counts: tuple[int, ...] = ()
+) -> ca.Function:
+    """One sample: ([state, memory, greatest speed], commands, environment, tau, fixed) -> records of the first.
+
+    fixed is what does not change from step to step: the parameters, then the components that are drawn for the sample,
+    so many of each drawn sum as `counts` says.
+    """
+    num_states = len(model.state) + len(model.hidden)
+    state, memory = ca.MX.sym("state", num_states), ca.MX.sym("memory", len(model.memory))
+    commands, environment = ca.MX.sym("commands", len(model.commands)), ca.MX.sym("environment", len(model.environment))
+    tau = ca.MX.sym("tau", model.num_dof)
+    sizes = [sum(term.widths.values()) for term in model.drawn]
+    places = np.cumsum([0, len(model.parameters), *(n * size for n, size in zip(counts, sizes, strict=True))])
+    fixed = ca.MX.sym("fixed", int(places[-1]))
+    parameters, *drawn = ca.vertsplit(fixed, places.tolist())
+    entries = {
+        term.path: ca.reshape(part, size, -1) for term, part, size in zip(model.drawn, drawn, sizes, strict=True)
+    }
+
+    def rates(x: Any, m: Any) -> Any:
+        return summed_rates(model, [x, m, commands, environment, parameters], tau, entries)
+
+    def advance(m: Any, dt: float) -> Any:
+        return model.advance(state, m, commands, environment, parameters, dt)
+
+    greatest = ca.MX.sym("greatest")
+    after, memory_after = integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
+    one = ca.Function(
+        "step",
+        [ca.vertcat(state, memory, greatest), commands, environment, tau, fixed],
+        [
+            ca.vertcat(
+                after, memory_after, ca.fmax(greatest, ca.mmax(ca.fabs(after[model.num_dof : 2 * model.num_dof])))
+            )
+        ],
+    )
+    if every > 1:
+        x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), every)
+        e, t = ca.MX.sym("e", len(model.environment), every), ca.MX.sym("t", model.num_dof, every)
+        inner = one.mapaccum(every)(x, c, e, t, ca.repmat(fixed, 1, every))
+        one = ca.Function("steps", [x, c, e, t, fixed], [inner[:, -1]])
+    count = num_steps // every
+    x = ca.MX.sym("x", one.size1_in(0))
+    c, e = ca.MX.sym("c", len(model.commands), num_steps), ca.MX.sym("e", len(model.environment), num_steps)
+    t = ca.MX.sym("t", model.num_dof, num_steps)
+    path = one.mapaccum(count)(x, c, e, t, ca.repmat(fixed, 1, count))
+    return ca.Function("rollout", [x, c, e, t, fixed], [path])
+
+
+def run_casadi(
+    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
+) -> tuple[Array, Array]:
+    """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
+    scan = casadi_scan(model, step, num_steps, method, every, tuple(drawn.shape[2] for drawn in batch.components))
+    num_samples, num_records = batch.state.shape[1], num_steps // every
+    greatest = np.abs(batch.state[model.num_dof : 2 * model.num_dof]).max(axis=0, keepdims=True)
+    start = np.concatenate([batch.state, batch.memory, greatest])
+
+    def over_time(held: Array) -> Array:  # (T, C, S) -> (C, S * num_steps), a sample's steps side by side
+        full = np.broadcast_to(held, (num_steps, *held.shape[1:]))
+        return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
+
+    inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
+    mapped = scan.map(num_samples, "thread", min(cores(), num_samples))
+    drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
+    records, worst = [], []
+    for values in batch.parameters:
+        with uninterrupted():
+            found = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
+        path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
+        path = np.concatenate([start.T[None], path])
+        records.append(path[:, :, rows])
+        worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so
+    return np.stack(records, axis=1), np.stack(worst)
+
+
+def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
+    """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
+
+    The first order is taken as reached; each order is held until the next row. They are modelled, not measured.
+    """
+    model = dynamics(vessel)
+    if not model.memory:
+        return None
+    orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
+    first = orders[[model.commands.index(name) for name in model.memory], 0]
+    count = len(t) - 1
+    if count == 0:
+        return dict(zip(model.memory, first[:, None], strict=True))
+    scan = ca.Function(
+        "advance",
+        [
+            memory := ca.MX.sym("memory", len(model.memory)),
+            order := ca.MX.sym("order", len(model.commands)),
+            dt := ca.MX.sym("dt"),
+            parameters := ca.MX.sym("parameters", len(model.parameters)),
+        ],
+        [
+            model.advance(
+                ca.MX.zeros(len(model.state) + len(model.hidden)),
+                memory,
+                order,
+                ca.MX.zeros(len(model.environment)),
+                parameters,
+                dt,
+            )
+        ],
+    ).mapaccum(count)
+    values = np.array(list(vessel.parameters.values()))[:, None]
+    with uninterrupted():
+        after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
+    states = np.concatenate([first[:, None], after], axis=1)
+    return dict(zip(model.memory, states, strict=True))

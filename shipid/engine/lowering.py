@@ -1,0 +1,135 @@
+"""A CasADi SX function as PyTorch: one tensor operation an instruction, broadcast over (variant, sample)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import torch
+
+from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, print_function
+
+_UNARY: dict[int, str] = {
+    ca.OP_EXP: "torch.exp({0})",
+    ca.OP_LOG: "torch.log({0})",
+    ca.OP_SQRT: "torch.sqrt({0})",
+    ca.OP_SIN: "torch.sin({0})",
+    ca.OP_COS: "torch.cos({0})",
+    ca.OP_TAN: "torch.tan({0})",
+    ca.OP_ASIN: "torch.asin({0})",
+    ca.OP_ACOS: "torch.acos({0})",
+    ca.OP_ATAN: "torch.atan({0})",
+    ca.OP_SINH: "torch.sinh({0})",
+    ca.OP_COSH: "torch.cosh({0})",
+    ca.OP_TANH: "torch.tanh({0})",
+    ca.OP_FABS: "torch.abs({0})",
+    ca.OP_SIGN: "torch.sign({0})",
+    ca.OP_INV: "torch.reciprocal({0})",
+    ca.OP_FLOOR: "torch.floor({0})",
+    ca.OP_CEIL: "torch.ceil({0})",
+}
+_BINARY: dict[int, str] = {
+    ca.OP_POW: "torch.pow({0}, {1})",
+    ca.OP_CONSTPOW: "torch.pow({0}, {1})",
+    ca.OP_ATAN2: "_atan2({0}, {1})",
+    ca.OP_FMIN: "_minimum({0}, {1})",
+    ca.OP_FMAX: "_maximum({0}, {1})",
+    ca.OP_IF_ELSE_ZERO: "_where({0}, {1})",
+}
+
+
+def _minimum(a: Any, b: Any) -> torch.Tensor:
+    if isinstance(b, float):
+        return torch.clamp(a, max=b)
+    return torch.clamp(b, max=a) if isinstance(a, float) else torch.minimum(a, b)
+
+
+def _maximum(a: Any, b: Any) -> torch.Tensor:
+    if isinstance(b, float):
+        return torch.clamp(a, min=b)
+    return torch.clamp(b, min=a) if isinstance(a, float) else torch.maximum(a, b)
+
+
+def _atan2(a: Any, b: Any) -> torch.Tensor:
+    like = b if isinstance(a, float) else a
+    return torch.atan2(torch.as_tensor(a, dtype=like.dtype), torch.as_tensor(b, dtype=like.dtype))
+
+
+def _where(condition: Any, value: Any) -> torch.Tensor:
+    if isinstance(value, float):  # two bare numbers would give single precision
+        value = torch.full((), value, dtype=torch.float64, device=condition.device)
+    return torch.where(condition != 0, value, 0.0)
+
+
+def _number(truth: torch.Tensor) -> torch.Tensor:
+    return truth.to(torch.float64)  # arithmetic on booleans is logic in PyTorch, counting in CasADi
+
+
+_NAMES = {
+    "torch": torch,
+    "_minimum": _minimum,
+    "_maximum": _maximum,
+    "_atan2": _atan2,
+    "_where": _where,
+    "_number": _number,
+    "inf": math.inf,
+    "nan": math.nan,
+}
+
+
+PYTORCH = Dialect(ARITHMETIC | _UNARY | _BINARY, "    {0} = {1}", repr, "_number({0})")
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """A lowered function as PyTorch, in stages.
+
+    early : one function a stage: (the stage's inputs, then what earlier stages saved) -> saved (num_saved, ...).
+    main : the other inputs in the function's order, then what all stages saved -> list of output channels.
+    stage_of : the stage that takes each input of the function (main takes the last).
+    num_instructions : of main.
+    """
+
+    early: tuple[Callable[..., torch.Tensor], ...]
+    main: Callable[..., list[Any]]
+    stage_of: tuple[int, ...]
+    num_instructions: int
+
+    def __call__(self, *inputs: Any) -> list[Any]:
+        """Output channels for all inputs in the function's order: every stage, then main."""
+        saved: list[Any] = []
+        for number, stage in enumerate((*self.early, self.main)):
+            own = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
+            saved.append(stage(*own, *saved))
+        return list(saved[-1])
+
+
+def lower(function: ca.Function, stages: Sequence[Sequence[str]] = STAGES) -> Lowered:
+    """Lower an SX function of dense vectors with one output; `stages` names the inputs that are known early.
+
+    An instruction that has no PyTorch counterpart raises ValueError with its number.
+    """
+    printed = print_function(function, stages, PYTORCH)
+    last = len(stages)
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack}
+    for number in range(last + 1):
+        arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])
+        saved = "" if number == last else ", ".join(printed.saved[number])
+        end = f"[{', '.join(printed.outputs)}]" if number == last else f"_stack([{arguments}], [{saved}])"
+        source = [f"def stage{number}({arguments}):", *printed.lines[number], f"    return {end}"]
+        exec(compile("\n".join(source), f"<lowered {function.name()}>", "exec"), space)
+    early = tuple(space[f"stage{number}"] for number in range(last))
+    return Lowered(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
+
+
+def _stack(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
+    """What a stage saves (num_saved, ...), as numbers; the shape is that of its inputs broadcast together."""
+    shape = np.broadcast_shapes(*(channels.shape[1:] for channels in inputs))
+    like = inputs[0]
+    if not values:
+        return like.new_empty((0, *shape))
+    return torch.stack([torch.as_tensor(value, dtype=like.dtype).expand(shape) for value in values])

@@ -1,0 +1,501 @@
+"""The native engine: a vessel's step as C on SIMD vectors, several samples a vector, groups of them on threads.
+
+The source is printed from the symbolic step and compiled once for each structure, step and method; the library stays
+in the user's cache (XDG_CACHE_HOME), by the digest of source, compiler and processor.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from shipid.engine.integrate import Array, Batch, Method, cores, integrate
+from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
+from shipid.errors import ShipidError
+from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
+from shipid.vessel.dynamics import Dynamics
+
+OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w")  # of the C compiler
+_CALLS = {
+    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
+    ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
+}  # fmt: skip
+_OPERATIONS = {
+    **{operation: f"v_{name}({{0}})" for operation, name in _CALLS.items()},
+    ca.OP_FABS: "v_fabs({0})",
+    ca.OP_SIGN: "(NUMBER({0} > 0) - NUMBER({0} < 0))",
+    ca.OP_INV: "(1 / {0})",
+    ca.OP_POW: "v_pow({0}, {1})",
+    ca.OP_CONSTPOW: "v_pow({0}, {1})",
+    ca.OP_ATAN2: "v_atan2({0}, {1})",
+    ca.OP_FMIN: "v_min({0}, {1})",
+    ca.OP_FMAX: "v_max({0}, {1})",
+    ca.OP_IF_ELSE_ZERO: "((V)(({0} != 0) & (M){1}))",
+}
+C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
+_SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
+_ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
+
+BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
+
+_HEAD = """
+#include <math.h>
+typedef double V __attribute__((vector_size(8 * W)));
+typedef long long M __attribute__((vector_size(8 * W)));
+typedef double U __attribute__((vector_size(8 * W), aligned(8), may_alias));
+#define K(x) ((V){} + (x))
+#define NUMBER(m) ((V)((m) & (M)K(1.0)))
+#define EACH(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i]); return r;
+#define EACH2(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i], y[i]); return r;
+static inline V v_fabs(V x) { return (V)((M)x & ((M){} + 0x7fffffffffffffffLL)); }
+static inline V v_sqrt(V x) { EACH(__builtin_sqrt) }
+static inline V v_floor(V x) { EACH(__builtin_floor) }
+static inline V v_ceil(V x) { EACH(__builtin_ceil) }
+#ifdef __AVX__ // one instruction, that compilers do not find
+#define PICK(name, relation) V r; __asm__(name " %2, %1, %0" : "=v"(r) : "v"(x), "vm"(y)); return r;
+#else
+#define PICK(name, relation) M m = x relation y; return (V)((m & (M)x) | (~m & (M)y));
+#endif
+static inline V v_min(V x, V y) { PICK("vminpd", <) }
+static inline V v_max(V x, V y) { PICK("vmaxpd", >) }
+"""
+_MEASURE = f"""
+static inline V measured(V north, V east, long samples, unsigned *tally) {{
+  V distance = v_sqrt(north * north + east * east);
+  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({MOST!r})) >> {SHIFT}) - {FIRST};
+  for (int i = 0; i < W && i < samples; ++i) ++tally[bins[i]];
+  return distance;
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What the processor and the C library offer: lanes of a vector, flags, and the prefix of vector functions."""
+
+    lanes: int
+    flags: tuple[str, ...]
+    prefix: str
+
+
+@cache
+def compiler() -> str | None:
+    """The C compiler, if there is one that makes a library."""
+    trial = "#include <math.h>\ndouble probe(double x) { return sin(x); }"
+    for name in ("gcc", "cc", "clang"):
+        found = shutil.which(name)
+        if found is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                if _compile(found, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
+                    return found
+    return None
+
+
+@cache
+def _processor() -> frozenset[str]:
+    """Features of the processor, where the system tells them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return frozenset()
+    return frozenset(word for line in lines if line.startswith("flags") for word in line.split()[2:])
+
+
+@cache
+def target() -> Target:
+    """Widest vectors of this processor; vector functions of glibc where they link, else one lane at a time."""
+    found, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
+    if x86 and "avx512f" in _processor():
+        best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
+    elif x86 and {"avx2", "fma"} <= _processor():
+        best = Target(4, ("-march=native",), "_ZGVdN4")
+    else:
+        best = Target(2, (), "")
+    if found is None or not best.prefix:
+        return best
+    probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
+    with tempfile.TemporaryDirectory() as folder:
+        linked = _compile(
+            found, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
+        )
+    return best if linked is None else Target(best.lanes, best.flags, "")
+
+
+def _compile(found: str, source: str, library: Path, wanted: Target) -> str | None:
+    """Compile C into a shared library, whole or not at all; what the compiler says if it fails."""
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
+        text.write_text(source, encoding="utf-8")
+        mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
+        command = [found, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
+        result = subprocess.run(command, capture_output=True, text=True)
+        if result.returncode:
+            return result.stderr.strip() or "it gave no reason"
+        os.replace(fresh, library)
+    return None
+
+
+@cache
+def _version(found: str) -> str:
+    """What a compiler calls itself."""
+    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout
+
+
+def _vector_functions(wanted: Target) -> str:
+    lines = []
+    for name in _ONE:
+        if wanted.prefix:
+            lines.append(f"V {wanted.prefix}v_{name}(V);\n#define v_{name} {wanted.prefix}v_{name}")
+        else:
+            lines.append(f"static inline V v_{name}(V x) {{ EACH({name}) }}")
+    for name in _TWO:
+        if wanted.prefix:
+            lines.append(f"V {wanted.prefix}vv_{name}(V, V);\n#define v_{name} {wanted.prefix}vv_{name}")
+        else:
+            lines.append(f"static inline V v_{name}(V x, V y) {{ EACH2({name}) }}")
+    return "\n".join(lines)
+
+
+class _Source:
+    """Writes the C of one model: parameters once, held inputs once while held, rates and advance at every stage."""
+
+    def __init__(self, model: Dynamics, step: float, method: Method) -> None:
+        self.model, self.step, self.method = model, step, method
+        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+        self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
+        self.all = [*self.own, *self.sums]
+
+    def offset(self, stage: int, printed: Printed) -> int:
+        """Where a function's saved values of a stage begin."""
+        before = self.all[: next(i for i, other in enumerate(self.all) if other is printed)]
+        return sum(len(other.saved[stage]) for other in before)
+
+    def total(self, stage: int) -> int:
+        """How many values a stage saves, at least one."""
+        return max(1, sum(len(printed.saved[stage]) for printed in self.all))
+
+    def stage(self, number: int, printed: Printed) -> str:
+        """One early stage of one function."""
+        saves = [f"saved[{self.offset(number, printed) + i}] = {text};" for i, text in enumerate(printed.saved[number])]
+        return self.block(printed, range(number), [*printed.lines[number], *saves])
+
+    def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
+        """Lines that read what the named stages saved."""
+        heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
+        return "{ " + "\n".join([*heads, *lines]) + " }"
+
+    def sum(self, i: int) -> str:
+        """The loop over components of one sum."""
+        printed, term = self.sums[i], self.model.sums[i]
+        before = [*printed.lines[2], f"V s2[] = {{ {', '.join((*printed.saved[2], 'K(0)'))} }};"]
+        entries = sum(term.widths.values())
+        if term.arrays is None:
+            place = next(k for k, drawn in enumerate(self.model.drawn) if drawn is term)
+            head = f"const U *component = drawn[{place}] + c * {entries};"
+            count = f"counts[{place}]"
+        else:
+            rows = ", ".join("{" + ", ".join(repr(float(value)) for value in row) + "}" for row in term.arrays)
+            before.append(f"static const double values[][{entries}] = {{ {rows} }};")
+            head = f"V component[{entries}]; for (int j = 0; j < {entries}; ++j) component[j] = K(values[c][j]);"
+            count = str(len(term.arrays))
+        adds = [f"total[{j}] += {text};" for j, text in enumerate(printed.outputs)]
+        loop = f"for (long c = 0; c < {count}; ++c) {{ {head}\n" + "\n".join([*printed.lines[3], *adds]) + " }"
+        return self.block(printed, (0, 1), [*before, loop])
+
+    def functions(self) -> str:
+        """Stages, rates and advance."""
+        rates, advance = self.own
+        n = self.model.num_dof
+        ends = [f"out[{i}] = {text};" for i, text in enumerate(rates.outputs)]
+        lags = [f"out[{i}] = {text};" for i, text in enumerate(advance.outputs)]
+        return f"""
+static void stage0(const V *parameters, V *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
+static void stage1(const V *commands, const V *environment, const V *saved0, V *saved) {{
+{" ".join(self.stage(1, p) for p in self.all)} }}
+static void rates(const V *state, const V *memory, const V *tau, const V *saved0, const V *saved1,
+                  const U *const *drawn, const long *counts, V *out) {{
+V total[{n}]; for (int i = 0; i < {n}; ++i) total[i] = tau[i];
+{" ".join(self.sum(i) for i in range(len(self.sums)))}
+const V *tau_extra = total;
+{self.block(rates, (0, 1), [*rates.lines[2], *ends])} }}
+static void advance(const V *state, const V *memory, double step, const V *saved0, const V *saved1, V *out) {{
+const V dt[1] = {{ K(step) }};
+{self.block(advance, (0, 1), [*advance.lines[2], *lags])} }}
+"""
+
+    def one_step(self) -> str:
+        """The integrator, by running it on names: what it would compute is written down instead."""
+        lines: list[str] = []
+        num_states = len(self.model.state) + len(self.model.hidden)
+
+        def name(size: int) -> str:
+            lines.append(f"V b{len(lines)}[{max(1, size)}];")
+            return f"b{len(lines) - 1}"
+
+        def rates(state: str, memory: str) -> str:
+            out = name(num_states)
+            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, own, counts, {out});")
+            return out
+
+        def advance(memory: str, dt: float) -> str:
+            out = name(len(self.model.memory))
+            lines.append(f"advance(x, {memory}, {dt!r}, saved0, saved1, {out});")
+            return out
+
+        def add(state: str, a: float, k: str) -> str:
+            out = name(num_states)
+            lines.append(f"for (int i = 0; i < {num_states}; ++i) {out}[i] = {state}[i] + {a!r} * {k}[i];")
+            return out
+
+        after, memory_after = integrate(rates, advance, add, "x", "m", self.step, self.method)
+        copy = f"for (int i = 0; i < {num_states}; ++i) x[i] = {after}[i];"
+        lags = f"for (int i = 0; i < {len(self.model.memory)}; ++i) m[i] = {memory_after}[i];"
+        return "\n".join([*lines, copy, lags])
+
+    def text(self, wanted: Target) -> str:
+        """The whole source."""
+        model = self.model
+        nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
+        nc, ne, parameters = len(model.commands), len(model.environment), len(model.parameters)
+        widths = [sum(term.widths.values()) for term in model.drawn]
+        block = 1 if widths else BLOCK
+        drawn = " ".join(f"own[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
+        return f"""{head(wanted)}
+{self.functions()}
+{_MEASURE}
+#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
+#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
+#define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
+#define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
+#define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
+void run(long first, long last, long stride, long samples, long steps, long every, const long *lengths,
+         const double *numbers, double *start, double *memory, double *commands, double *environment, double *extra,
+         const double *const *drawn, const long *counts, const long *rows, long num_rows, double *records,
+         const U *goal, double *sums, unsigned *tally, double *worst) {{
+V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
+V states[{block}][{nx}], memories[{block}][{max(1, nm)}], taus[{block}][{n}], greatest[{block}], distance[{block}];
+for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
+stage0(parameters, saved0);
+for (long front = first; front < last; front += {block}) {{
+  long end = front + {block} < last ? front + {block} : last;
+  EACH_GROUP(end) {{
+    V *x = states[j], *m = memories[j], sum = K(0);
+    greatest[j] = distance[j] = K(0);
+    for (int i = 0; i < {nx}; ++i) {{ x[i] = *AT(start, i); sum += x[i]; }}
+    for (int i = 0; i < {nm}; ++i) {{ m[i] = *AT(memory, i); sum += m[i]; }}
+    for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
+    greatest[j] += 0 * sum;
+    if (records) NOTE(0)
+  }}
+  for (long k = 0; k < steps; ++k) EACH_GROUP(end) {{
+    V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
+    const U *own[{max(1, len(widths))}];
+    {drawn}
+    if (k == 0 || k < lengths[2])
+      for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, k * {n} + i);
+    if (k == 0 || k < lengths[0] || k < lengths[1]) {{
+      V c[{max(1, nc)}], e[{max(1, ne)}];
+      for (int i = 0; i < {nc}; ++i) c[i] = *AT(commands, NOW(0, k) * {nc} + i);
+      for (int i = 0; i < {ne}; ++i) e[i] = *AT(environment, NOW(1, k) * {ne} + i);
+      stage1(c, e, saved0, saved1);
+    }}
+    {self.one_step()}
+    for (int i = 0; i < {nx}; ++i) all += x[i];
+    for (int i = 0; i < {nm}; ++i) all += m[i];
+    for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
+    greatest[j] += 0 * all;
+    if ((k + 1) % every == 0) {{
+      long record = (k + 1) / every;
+      const U *there = goal + 2 * (g * (steps / every) + record - 1);
+      if (records) NOTE(record)
+      if (goal) distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, tally);
+    }}
+  }}
+  EACH_GROUP(end) {{
+    if (goal) *AT(sums, 0) = distance[j];
+    *AT(worst, 0) = greatest[j];
+  }}
+}} }}
+"""
+
+
+@cache
+def _folder(wanted: str) -> Path:
+    """The user's cache, if libraries can be kept there, else a folder for this process."""
+    folder = Path(wanted) / "shipid"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        own = tempfile.TemporaryDirectory(prefix="shipid-")
+        atexit.register(own.cleanup)
+        return Path(own.name)
+
+
+@lru_cache(maxsize=64)
+def _library(model: Dynamics, step: float, method: Method) -> Any:
+    """The `run` of a model, compiled or from the cache; ShipidError if there is no compiler or it fails."""
+    if compiler() is None:
+        raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
+    try:
+        return compiled(_Source(model, step, method).text(target()))
+    except ShipidError as error:
+        raise ShipidError(f"{error.message}: use engine 'torch'") from None
+
+
+def compiled(source: str) -> Any:
+    """The `run` of C source, compiled or from the cache; ShipidError if the compiler fails. There must be one."""
+    found = compiler()
+    assert found is not None
+    words = "\n".join([source, *OPTIONS, found, _version(found), platform.machine(), *sorted(_processor())])
+    folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
+    library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
+    try:
+        return _loaded(library)
+    except OSError:  # not there, or not whole
+        failure = _compile(found, source, library, target())
+    if failure is not None:
+        raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]})")
+    return _loaded(library)
+
+
+def _loaded(library: Path) -> Any:
+    run = ctypes.CDLL(str(library)).run
+    run.restype = None
+    return run
+
+
+def head(wanted: Target) -> str:
+    """What every source begins with: the vector type of the target and its functions."""
+    return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
+
+
+def _padded(array: Array, width: int) -> Array:
+    """(..., S) -> (..., width), the last sample repeated."""
+    fill = width - array.shape[-1]
+    filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
+    return np.ascontiguousarray(filled, dtype=float)
+
+
+def _packed(array: Array, lanes: int) -> Array:
+    """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
+    count, entries, num_samples = array.shape
+    groups = -(-num_samples // lanes)
+    filled = _padded(array, groups * lanes).reshape(count, entries, groups, lanes)
+    return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
+
+
+def run_native(
+    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
+) -> tuple[Array, Array]:
+    """Records (R, V, S, C) and the greatest speed (V, S)."""
+    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
+    records = np.empty((num_variants, num_steps // every + 1, len(rows), width))
+    worst = np.empty((num_variants, width))
+    _run(model, batch, step, num_steps, method, every, rows, worst, records=records)
+    return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
+
+
+def measure_native(
+    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, rows: list[int], goal: Array
+) -> tuple[Array, Array, Array]:
+    """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
+
+    The distances are those of the two channels `rows` to `goal` (T, 2, S), after every step.
+    """
+    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
+    sums, worst = np.empty((num_variants, width)), np.empty((num_variants, width))
+    tally = np.zeros((_parts(batch), num_variants, BINS), dtype=np.uint32)
+    there = _packed(goal, target().lanes)
+    _run(model, batch, step, num_steps, method, 1, rows, worst, goal=there, sums=sums, tally=tally)
+    return sums[:, :num_samples], tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
+
+
+def _width(batch: Batch) -> int:
+    """Samples, filled up to whole vectors."""
+    lanes = target().lanes
+    return -(-int(batch.state.shape[1]) // lanes) * lanes
+
+
+def _parts(batch: Batch) -> int:
+    """Into how many parts the samples go, so that all threads are busy to the end."""
+    num_variants, groups = len(batch.parameters), _width(batch) // target().lanes
+    return min(-(-4 * cores() // num_variants), groups)
+
+
+def _run(
+    model: Dynamics,
+    batch: Batch,
+    step: float,
+    num_steps: int,
+    method: Method,
+    every: int,
+    rows: list[int],
+    worst: Array,
+    **wanted: Array,
+) -> None:
+    """Fill the arrays that are wanted; parts of the samples on threads, variants one after another."""
+    run, lanes, width, parts = _library(model, step, method), target().lanes, _width(batch), _parts(batch)
+    series = [_padded(part, width) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
+    drawn = [_packed(part.transpose(2, 0, 1), lanes) for part in batch.components]
+    counts = (ctypes.c_long * max(1, len(drawn)))(*(part.shape[1] for part in drawn))
+    pointers = (ctypes.c_void_p * max(1, len(drawn)))(*(part.ctypes.data for part in drawn))
+    places = (ctypes.c_long * len(rows))(*rows)
+    inputs = [_padded(batch.state, width), _padded(batch.memory, width), *series]
+    values = np.ascontiguousarray(batch.parameters, dtype=float)
+    edges = np.linspace(0, width // lanes, parts + 1).astype(int).tolist()
+    records, goal, sums, tally = (wanted.get(name) for name in ("records", "goal", "sums", "tally"))
+
+    def longs(*numbers: int) -> list[Any]:
+        return [ctypes.c_long(number) for number in numbers]
+
+    def address(array: Array | None, *place: int) -> Any:
+        return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
+
+    def work(variant: int, part: int) -> None:
+        run(
+            *longs(edges[part], edges[part + 1], width, batch.state.shape[1], num_steps, every),
+            lengths,
+            *(address(array) for array in (values[variant], *inputs)),
+            pointers,
+            counts,
+            places,
+            *longs(len(rows)),
+            *(address(records, variant), address(goal), address(sums, variant), address(tally, part, variant)),
+            address(worst, variant),
+        )
+
+    waiting = product(range(len(values)), range(parts))
+
+    def drain() -> None:
+        for task in waiting:
+            work(*task)
+
+    with ThreadPoolExecutor(max(1, cores() - 1)) as pool:
+        helpers = [pool.submit(drain) for _ in range(cores() - 1)]
+        try:
+            drain()
+        finally:
+            deque(waiting, maxlen=0)  # after an interrupt the others begin nothing new
+        for helper in helpers:
+            helper.result()

@@ -1,0 +1,289 @@
+"""Rollouts: one step rule, many ways to run it.
+
+The integrator is written once, over `rates` and `advance`. Where there is a C compiler it runs as C on SIMD vectors;
+else CasADi runs it sample by sample, PyTorch over whole batches. All give the same numbers, to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from shipid.engine.casadi import run_casadi
+from shipid.engine.integrate import Array, Batch, Method
+from shipid.engine.native import compiler, measure_native, run_native
+from shipid.errors import DataError, ShipidError, choices
+from shipid.metrics import position_error, tally
+from shipid.physics.helm import Helmsman
+from shipid.vessel.dynamics import HELM, Dynamics, dynamics
+from shipid.vessel.load import Vessel
+
+Engine = Literal["auto", "casadi", "torch", "compiled", "native"]
+
+SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
+COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
+NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
+COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
+PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
+BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """What a rollout returns.
+
+    states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
+    diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
+        unharmed.
+    interval : time between records [s].
+    """
+
+    states: Array
+    names: tuple[str, ...]
+    diverged: Array
+    interval: float
+
+    def __getitem__(self, name: str) -> Array:
+        """One channel, (num_records, num_variants, num_samples)."""
+        return self.states[..., self.names.index(name)]
+
+
+def rollout(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array] | None = None,
+    *,
+    step: float,
+    num_steps: int,
+    method: Method = "euler",
+    every: int = 1,
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    tau_extra: Array | None = None,
+    components: Mapping[str, Array] | None = None,
+    helmsman: Helmsman | None = None,
+    keep: Sequence[str] | None = None,
+    engine: Engine = "auto",
+    device: str = "cpu",
+) -> Trajectories:
+    """Open-loop prediction of many samples by many variants of one vessel structure.
+
+    Parameters
+    ----------
+    start : state name -> (S,), SI; names that the vessel does not have are ignored, missing ones raise DataError.
+    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
+    step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
+    parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. Default: the vessel's own.
+    memory : hidden state -> (S,); default: each actuator has reached its first order.
+    tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
+    components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
+        from `shipid.simulation.sea`; default: none, calm water.
+    helmsman : gives the orders in place of the commands, which are then what he is told; see `simulation.manoeuvre`.
+    keep : channels to record, default all states and memories.
+    engine : `native` (C on SIMD vectors and threads), `casadi` (its virtual machine, sample by sample), `torch`
+        (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
+    device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
+    """
+    _check(engine, device, num_steps, every)
+    given = start, commands, environment or {}, components or {}
+    model, batch = _prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
+    names = (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
+    kept = tuple(names if keep is None else keep)
+    unknown = next((name for name in kept if name not in names), None)
+    if unknown is not None:
+        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
+    rows = [names.index(name) for name in kept]
+    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
+    with np.errstate(all="ignore"):
+        if chosen == "casadi":
+            records, worst = run_casadi(model, batch, step, num_steps, method, every, rows)
+        elif chosen == "native":
+            records, worst = run_native(model, batch, step, num_steps, method, every, rows)
+        else:
+            from shipid.engine.torch import run_torch
+
+            records, worst = run_torch(model, batch, step, num_steps, method, every, rows, chosen == "compiled", device)
+    return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~_finite(batch), step * every)
+
+
+@dataclass(frozen=True)
+class Distances:
+    """How far variants end up from true paths; what was predicted is not kept.
+
+    total : (V, S) sum [m] over the steps of the distance to the true path.
+    tally : (V, BINS) how often each distance occurs, see `shipid.metrics.tally`.
+    diverged : (V, S) as in `Trajectories`.
+    """
+
+    total: Array
+    tally: Array
+    diverged: Array
+
+
+def distances(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array],
+    goal: Array,
+    *,
+    step: float,
+    method: Method = "euler",
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    engine: Engine = "auto",
+    device: str = "cpu",
+) -> Distances:
+    """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
+
+    As `rollout`, but the native engine measures while it runs, so that nothing grows with the horizon; the others keep
+    the paths of a few variants at a time.
+    """
+    num_steps = len(goal)
+    _check(engine, device, num_steps, 1)
+    model, batch = _prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
+    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
+    rows = [model.state.index("north"), model.state.index("east")]
+    if chosen == "native":
+        there = goal.transpose(0, 2, 1)
+        total, counts, worst = measure_native(model, batch, step, num_steps, method, rows, there)
+        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~_finite(batch))
+    few = max(1, PATHS_KEPT // goal.size)
+    found = []
+    for first in range(0, len(batch.parameters), few):
+        part = rollout(
+            vessel, start, commands, environment, step=step, num_steps=num_steps, method=method, memory=memory,
+            parameters=batch.parameters[first : first + few], keep=("north", "east"), engine=chosen, device=device,
+        )  # fmt: skip
+        with np.errstate(all="ignore"):
+            apart = [position_error(part.states[1:, own], goal) for own in range(part.states.shape[1])]
+        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), part.diverged))
+    return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _prepared(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array],
+    components: Mapping[str, Array],
+    num_steps: int,
+    parameters: Array | None,
+    memory: Mapping[str, Array] | None,
+    tau_extra: Array | None,
+    helmsman: Helmsman | None,
+) -> tuple[Dynamics, Batch]:
+    """Equations and inputs as every engine takes them; whatever is missing or of another shape is told."""
+    model = dynamics(vessel, helmsman)
+    if not start:
+        raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
+    num_samples = len(next(iter(start.values())))
+    if num_samples == 0:
+        raise ShipidError("a rollout needs at least one sample")
+    values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
+    if values.shape[1] != len(model.parameters):
+        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), found {values.shape}")
+    begun = {**dict.fromkeys(model.hidden, np.zeros(num_samples)), **start}
+    batch = Batch(
+        state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel)[0],
+        memory=np.zeros((0, num_samples)),
+        commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
+        environment=_channels(model.environment, environment, num_samples, num_steps, "environment", vessel),
+        tau_extra=_tau(tau_extra, model.num_dof, num_samples, num_steps),
+        parameters=values,
+        components=_components(model, components, num_samples),
+    )
+    return model, replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
+
+
+def _check(engine: str, device: str, num_steps: int, every: int) -> None:
+    if engine not in get_args(Engine):
+        raise ShipidError(f"there is no engine {engine!r}: {choices(engine, get_args(Engine))}")
+    if engine in ("native", "casadi") and device != "cpu":
+        raise ShipidError(f"engine {engine!r} runs on the CPU: use 'torch' or 'compiled' on {device!r}")
+    if num_steps < 1 or every < 1 or num_steps % every:
+        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, found {num_steps} and {every}")
+
+
+def _finite(batch: Batch) -> Array:
+    """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
+    drawn = (part.swapaxes(1, 2) for part in batch.components)
+    inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
+    samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
+    return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
+
+
+def _by_size(batch: Batch, num_steps: int, method: Method, device: str) -> Engine:
+    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
+    width = batch.state.shape[1] * len(batch.parameters)
+    work = num_steps * width * (4 if method == "rk4" else 1) * weight
+    if device != "cpu":
+        return "compiled" if work > COMPILE_FROM else "torch"
+    if work > NATIVE_FROM and compiler() is not None:
+        return "native"
+    return "casadi" if width < BATCH_FROM else "torch"
+
+
+def _channels(
+    names: Sequence[str], given: Mapping[str, Array], num_samples: int, num_steps: int, what: str, vessel: Vessel
+) -> Array:
+    """Named arrays as (T, channel, S), T = 1 when all are held; a missing name says which vessel needs it."""
+    columns = []
+    for name in names:
+        if name not in given:
+            raise DataError(
+                f"{what} {name!r} is needed by {vessel.name} and missing: {choices(name, given)}", file=vessel.file
+            )
+        column = np.asarray(given[name], dtype=float)
+        if column.shape not in ((num_samples,), (num_steps, num_samples)):
+            raise ShipidError(
+                f"{what} {name!r} must be ({num_samples},) or ({num_steps}, {num_samples}): {column.shape}"
+            )
+        columns.append(np.atleast_2d(column))
+    length = max((len(column) for column in columns), default=1)
+    stacked = [np.broadcast_to(column, (length, num_samples)) for column in columns]
+    return np.stack(stacked, axis=1) if stacked else np.zeros((1, 0, num_samples))
+
+
+def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, num_steps: int, vessel: Vessel) -> Array:
+    """Hidden memories (nm, S) at the start: as given, else what a helmsman begins with and orders already reached."""
+    num_samples = batch.state.shape[1]
+    begun = model.helmsman.memory if model.helmsman else {}
+    helm = {f"{HELM}.{name}": np.full(num_samples, float(value)) for name, value in begun.items()}
+    if memory is not None:
+        return np.asarray(
+            _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel)[0]
+        )
+    if model.helmsman is None:
+        return np.asarray(batch.commands[0, [model.commands.index(name) for name in model.memory]])
+    unknown = np.zeros((len(model.memory) - len(helm), num_samples))
+    known = np.concatenate([np.array(list(helm.values())).reshape(-1, num_samples), unknown])
+    inputs = (batch.state, known, batch.commands[0], batch.environment[0], batch.parameters[:1].T)
+    orders = dict(zip(model.ordered, np.array(model.orders.map(num_samples)(*inputs)), strict=True))
+    return np.array([helm[name] if name in helm else orders[name] for name in model.memory]).reshape(-1, num_samples)
+
+
+def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
+    """Drawn components, channel first, for each sum that has them; still water where none are given."""
+    result = []
+    for term in model.drawn:
+        entries = sum(term.widths.values())
+        found = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
+        if found.ndim != 3 or found.shape[::2] != (num_samples, entries):
+            raise ShipidError(
+                f"components of {term.path} must be ({num_samples}, count, {entries}), found {found.shape}"
+            )
+        result.append(np.ascontiguousarray(found.transpose(2, 0, 1)))
+    return tuple(result)
+
+
+def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:
+    if tau_extra is None:
+        return np.zeros((1, num_dof, num_samples))
+    tau = np.asarray(tau_extra, dtype=float)
+    length = num_steps if tau.ndim == 3 else 1
+    return np.ascontiguousarray(np.broadcast_to(tau, (length, num_samples, num_dof)).transpose(0, 2, 1))

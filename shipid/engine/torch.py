@@ -1,0 +1,233 @@
+"""The PyTorch engine: all samples and variants of a step at once, eager or as one compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import torch
+import torch._inductor
+from torch.fx.experimental.proxy_tensor import make_fx
+
+from shipid.engine.integrate import Batch, Method, integrate
+from shipid.engine.lowering import lower
+from shipid.vessel.dynamics import Dynamics
+
+EAGER_BLOCK = 16384  # samples x variants of one block
+COMPILED_BLOCK = 8192  # samples of one block, one variant
+DEVICE_BLOCK = 262144  # samples of one block on a GPU
+GRAIN = 256  # compiled blocks are a multiple of it: similar batches share a kernel
+COMPONENT_GRAIN = 8  # the same where each sample has components of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A lowered step.
+
+    parameters_stage : parameters (P, V, 1) -> saved tensors of all functions, once a rollout.
+    held_stage : (commands, environment, saved) -> what else is known before the state is, once while they are held.
+    rates : (state, memory, tau, *drawn, *known) -> d(state)/dt. `drawn` are the components of each drawn sum,
+        (num_entries, 1, S, num_components); `known` is what the two stages saved or, with commands that vary,
+        (commands, environment, *saved of the first stage).
+    advance : (state, memory, dt, *known) -> memory after dt.
+    step : (rates, advance, state, memory, greatest, tau, *drawn, *known) -> the three after the step, and the record
+        (C, V, S) of the kept channels.
+    """
+
+    parameters_stage: Callable[[torch.Tensor], list[torch.Tensor]]
+    held_stage: Callable[[torch.Tensor, torch.Tensor, Sequence[torch.Tensor]], list[torch.Tensor]]
+    rates: Callable[..., torch.Tensor]
+    advance: Callable[..., torch.Tensor]
+    step: Callable[..., tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]]
+
+
+@lru_cache(maxsize=32)
+def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], varying: bool) -> Program:
+    """Lower the functions of a vessel's structure and put the integrator around them."""
+    functions = [lower(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
+    num_drawn, speeds = len(model.drawn), slice(model.num_dof, 2 * model.num_dof)
+    fixed = [None if term.arrays is None else torch.tensor(term.arrays.T) for term in model.sums]
+
+    def parameters_stage(parameters: torch.Tensor) -> list[torch.Tensor]:
+        return [function.early[0](parameters) for function in functions]
+
+    def held_stage(
+        commands: torch.Tensor, environment: torch.Tensor, first: Sequence[torch.Tensor]
+    ) -> list[torch.Tensor]:
+        second = [f.early[1](commands, environment, saved) for f, saved in zip(functions, first, strict=True)]
+        return [*first, *second]
+
+    def saved_of(known: Sequence[torch.Tensor]) -> list[tuple[torch.Tensor, torch.Tensor]]:
+        saved = held_stage(known[0], known[1], known[2:]) if varying else known
+        return list(zip(saved[: len(functions)], saved[len(functions) :], strict=True))
+
+    def rates(state: torch.Tensor, memory: torch.Tensor, tau: torch.Tensor, *rest: torch.Tensor) -> torch.Tensor:
+        drawn, saved = list(rest[:num_drawn]), saved_of(rest[num_drawn:])
+        total = list(tau)
+        for arrays, function, early in zip(fixed, functions[2:], saved[2:], strict=True):
+            wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory)]
+            entries = drawn.pop(0) if arrays is None else arrays.to(tau)
+            wrench = function.main(*wide, entries, *(part.unsqueeze(-1) for part in early))
+            total = [a + _sum(b, entries.shape[-1]) for a, b in zip(total, wrench, strict=True)]
+        return _stacked(functions[0].main(state, memory, total, *saved[0]), state)
+
+    def advance(state: torch.Tensor, memory: torch.Tensor, dt: torch.Tensor, *known: torch.Tensor) -> torch.Tensor:
+        return _stacked(functions[1].main(state, memory, [dt], *saved_of(known)[1]), memory)
+
+    def one_step(
+        rates: Callable[..., torch.Tensor],
+        advance: Callable[..., torch.Tensor],
+        x: torch.Tensor,
+        m: torch.Tensor,
+        greatest: torch.Tensor,
+        tau: torch.Tensor,
+        *rest: torch.Tensor,
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+        after, memory_after = integrate(
+            lambda state, memory: rates(state, memory, tau, *rest),
+            lambda memory, dt: (
+                advance(x, memory, torch.full_like(greatest, dt), *rest[num_drawn:]) if len(memory) else memory
+            ),
+            lambda state, a, k: state + a * k,
+            x,
+            m,
+            step,
+            method,
+        )
+        both = torch.cat([after, memory_after])
+        speed = torch.maximum(greatest, after[speeds].abs().amax(0)) + 0 * both.sum(0)  # not finite stays so
+        return after, memory_after, speed, torch.stack([both[row] for row in rows])
+
+    return Program(parameters_stage, held_stage, rates, advance, one_step)
+
+
+Key = tuple[Any, tuple[tuple[int, ...], ...], torch.device]
+kernels: dict[Key, Callable[..., Any]] = {}
+
+
+def _compiled(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> Callable[..., Any]:
+    """A function as one kernel for the shapes at hand, from a cache; as much slower to make as it is faster to run.
+
+    It is traced and handed to TorchInductor directly: a compilation takes less than half the time of `torch.compile`,
+    and a call has no guards to check. Shapes are the key, so they need none.
+    """
+    key = (function, tuple(tuple(tensor.shape) for tensor in inputs), inputs[0].device)
+    if key not in kernels:
+        kernels[key] = torch._inductor.compile(make_fx(function)(*inputs), list(inputs))
+    return kernels[key]
+
+
+@lru_cache(maxsize=64)
+def _whole(program: Program) -> Callable[..., Any]:
+    return partial(program.step, program.rates, program.advance)
+
+
+def _runner(program: Program, method: Method, inputs: Sequence[torch.Tensor], num_drawn: int) -> Callable[..., Any]:
+    """A compiled step: Euler as one kernel, so that nothing is written that is not kept; RK4 around two kernels.
+
+    The four stages of RK4 in one kernel would take four times as long to compile and run no faster.
+    """
+    whole = _whole(program)
+    if method == "euler":
+        return _compiled(whole, inputs)
+    x, m, greatest, tau, *rest = inputs
+    rates = _compiled(program.rates, [x, m, tau, *rest])
+    advance = _compiled(program.advance, [x, m, greatest, *rest[num_drawn:]]) if len(m) else program.advance
+    return partial(program.step, rates, advance)
+
+
+def _stacked(channels: Sequence[Any], like: torch.Tensor) -> torch.Tensor:
+    """Channels as one tensor of the shape of `like`; plain numbers and what is the same for all are spread."""
+    if not channels:
+        return like
+    return torch.stack([torch.as_tensor(channel, dtype=like.dtype).expand(like.shape[1:]) for channel in channels])
+
+
+def _sum(value: Any, count: int) -> Any:
+    """Sum over components (last axis); what is the same for all of them counts as often as there are components."""
+    if not isinstance(value, torch.Tensor):
+        return count * value
+    return value.expand(*value.shape[:-1], count).sum(-1)
+
+
+def run_torch(
+    model: Dynamics,
+    batch: Batch,
+    step: float,
+    num_steps: int,
+    method: Method,
+    every: int,
+    rows: list[int],
+    compiled: bool,
+    device: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
+
+    Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
+    a family of any size needs one compilation and a block stays in the cache.
+    """
+    varying = len(batch.commands) > 1 or len(batch.environment) > 1
+    program = _program(model, method, step, tuple(rows), varying)
+    num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
+    most_components = max((part.shape[2] for part in batch.components), default=1)
+    width = _width(num_samples, num_variants, most_components, compiled, device)
+    padded = -(-num_samples // width) * width
+    place = torch.device(device)
+
+    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, padded S)
+        filled = np.concatenate([array, np.repeat(array[..., -1:], padded - num_samples, axis=-1)], axis=-1)
+        return torch.tensor(filled, dtype=torch.float64, device=place).unsqueeze(-2)
+
+    start, memory = tensor(batch.state), tensor(batch.memory)
+    held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
+    drawn = [tensor(part.swapaxes(1, 2)).movedim(1, -1) for part in batch.components]  # (entries, 1, S, components)
+    values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
+    groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
+    records = torch.empty((num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place)
+    worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
+    with torch.no_grad():
+        first = program.parameters_stage(values)
+        for group in groups:
+            saved = [entries[:, group].contiguous() for entries in first]  # a kernel knows one layout
+            for left in range(0, padded, width):
+                block = slice(left, left + width)
+                commands, environment, tau = (series[..., block].contiguous() for series in held)
+                shape = (-1, saved[0].shape[1], width)
+                x, m = (part[..., block].expand(shape).contiguous() for part in (start, memory))
+                both = torch.cat([x, m])
+                target = records[:, :, group, block]
+                target[0] = both[rows]
+                greatest = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
+                own = [part[:, :, block].contiguous() for part in drawn]
+                known = saved if varying else program.held_stage(commands[0], environment[0], saved)
+                advance = _whole(program)
+                for k in range(num_steps):
+                    if varying:
+                        known = [_at(commands, k), _at(environment, k), *saved]
+                    inputs = [x, m, greatest, _at(tau, k), *own, *known]
+                    if compiled and k == 0:
+                        advance = _runner(program, method, inputs, len(own))
+                    x, m, greatest, record = advance(*inputs)
+                    if (k + 1) % every == 0:
+                        target[(k + 1) // every] = record
+                worst[group, block] = greatest
+    result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
+    return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
+
+
+def _at(series: torch.Tensor, k: int) -> torch.Tensor:
+    """Entry k of a series in time, or the one that is held."""
+    return series[min(k, len(series) - 1)]
+
+
+def _width(num_samples: int, num_variants: int, num_components: int, compiled: bool, device: str) -> int:
+    """Samples of a block: equal blocks that leave little to pad and whose intermediate results stay in the cache."""
+    most = DEVICE_BLOCK if device != "cpu" else COMPILED_BLOCK if compiled else max(256, EAGER_BLOCK // num_variants)
+    grain = GRAIN if compiled else 1
+    if num_components > 1:
+        most, grain = max(most // num_components, 1), min(grain, COMPONENT_GRAIN)
+    blocks = -(-num_samples // most)
+    return -(-num_samples // (blocks * grain)) * grain

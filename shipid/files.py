@@ -1,0 +1,112 @@
+"""Files that appear whole or not at all: text, JSON and tables, and a place to write any other kind."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shipid.errors import DataError, ResultError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+TABLES = (".parquet", ".csv")
+"""Endings of the files that `write_table` writes."""
+
+
+@contextmanager
+def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path with the target's name; on success it replaces the target, on an error it is removed.
+
+    The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, so that a
+    power cut leaves the old file or the new one. Raises OSError where the place cannot be written.
+    """
+    target = Path(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
+        temporary = Path(folder) / target.name
+        yield temporary
+        with temporary.open("rb+") as stream:
+            os.fsync(stream.fileno())
+        os.replace(temporary, target)
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a UTF-8 text file."""
+    with whole(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def check_new(file: Path, kind: str) -> None:
+    """Raise DataError unless a new TOML document of this kind can be written there."""
+    if file.suffix != ".toml":
+        raise DataError(f"a {kind} is a TOML file: let the name end in .toml", file=file)
+    if file.exists():
+        raise DataError("exists already and is not written over: name another with --out", file=file)
+
+
+def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
+    """Write a TOML document whole; one that exists is never written over."""
+    check_new(file, kind)
+    try:
+        write_text(file, text)
+    except OSError as error:
+        raise DataError(f"cannot be written ({error.strerror or error})", file=file) from None
+    return file
+
+
+def write_json(file: Path, content: Any) -> None:
+    """Write plain data as JSON; a number that is not finite becomes null."""
+    write_text(file, json.dumps(_plain(content), indent=1))
+
+
+def read_json(file: Path) -> Any:
+    """Read JSON; ResultError if the file is missing or damaged."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
+    except ValueError:
+        raise ResultError("damaged: run the study again into a new folder", file=file) from None
+
+
+def check_table(file: Path) -> None:
+    """Raise DataError for a file ending that `write_table` does not write; call it before the work for the table."""
+    if file.suffix not in TABLES:
+        raise DataError(f"{file.suffix or 'no ending'}: write to a file ending in {' or '.join(TABLES)}", file=file)
+
+
+def write_table(file: Path, frame: DataFrame) -> None:
+    """Write a frame as Parquet or CSV, by the ending of the file."""
+    check_table(file)
+    with whole(file) as temporary:
+        if file.suffix == ".csv":
+            frame.to_csv(temporary, index=False)
+        else:
+            frame.to_parquet(temporary, index=False)
+
+
+def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:
+    """Write arrays by name as one `.npz` without pickles."""
+    with whole(file) as temporary, temporary.open("wb") as stream:
+        (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
+
+
+def _plain(value: Any) -> Any:
+    """Content of JSON: mappings, lists and scalars of Python."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,195 @@
+"""Tuning by gradients: an Optuna study per model, asked and told in step; equal architectures train as one stack."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+import optuna
+from optuna.trial import Trial, TrialState
+
+from shipid.hybrid.compensator import (
+    Array,
+    Compensator,
+    Index,
+    Network,
+    Normaliser,
+    Tuned,
+    choose_features,
+    feature_table,
+    flatten,
+)
+from shipid.hybrid.recipe import GradientRecipe, seed_of
+from shipid.hybrid.training import Settings, train
+
+Parameters = dict[str, float]
+
+
+def tune_gradient(
+    columns: Mapping[str, Array],
+    commands: Sequence[str],
+    targets: Mapping[str, Array],
+    folds: Sequence[tuple[Index, Index]],
+    recipe: GradientRecipe,
+    seed: int,
+    *,
+    on_trial: Callable[[int, int], None] | None = None,
+    device: str = "cpu",
+) -> dict[str, Tuned]:
+    """Train networks for each model: arguments and result as those of `tune`.
+
+    The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
+    best trial.
+    """
+    table = feature_table(columns, commands)
+    outputs = {key: flatten(paths) for key, paths in targets.items()}
+    data = [_prepare(table, outputs, training, validation) for training, validation in folds]
+    runs = {key: _Run(_study(seed_of(seed, key))) for key in targets}
+
+    for number in range(recipe.trials):
+        trials = {key: run.study.ask() for key, run in runs.items()}
+        asked = {key: _suggest(trial, recipe) for key, trial in trials.items()}
+        for stack in _stacks(asked):
+            start = time.perf_counter()
+            results = [_fit(fold, stack, recipe, (seed, number, i), device) for i, fold in enumerate(data)]
+            seconds = (time.perf_counter() - start) / len(stack)
+            for key, parameters in stack.items():
+                runs[key].record(parameters, [result[key] for result in results], seconds)
+        for key, run in runs.items():
+            run.tell(trials[key])
+        if on_trial is not None:
+            on_trial(number + 1, recipe.trials)
+
+    return {key: run.tuned(tuple(commands)) for key, run in runs.items()}
+
+
+@dataclass(frozen=True)
+class _Data:
+    """One fold as networks see it."""
+
+    features: dict[str, tuple[str, ...]]
+    normaliser: Normaliser
+    inputs: Array
+    outputs: dict[str, Array]
+    train_idx: Index
+    val_idx: Index
+
+
+@dataclass(frozen=True)
+class _Result:
+    """One trained network, its validation loss [m^2], its epochs and its status."""
+
+    network: Network
+    loss: float
+    epochs: int
+    status: str
+
+
+class _Run:
+    """The study of one model: its rows and its best networks so far."""
+
+    def __init__(self, study: optuna.Study) -> None:
+        self.study = study
+        self.rows: list[dict[str, Any]] = []
+        self.seconds = 0.0
+        self.best_value = inf
+        self.best_parameters: Parameters = {}
+        self.best_networks: tuple[Network, ...] = ()
+
+    def record(self, parameters: Parameters, results: Sequence[_Result], seconds: float) -> None:
+        value = float(np.mean([result.loss for result in results]))
+        complete = isfinite(value) and all(result.status == "ok" for result in results)
+        row = {"number": len(self.rows), "params": parameters, "value": value, "seconds": seconds}
+        row |= {"epochs": max(r.epochs for r in results), "state": "complete" if complete else "diverged"}
+        self.rows.append(row)
+        self.seconds += seconds
+        if complete and value < self.best_value:
+            self.best_value, self.best_parameters = value, parameters
+            self.best_networks = tuple(result.network for result in results)
+
+    def tell(self, trial: Trial) -> None:
+        if self.rows[-1]["state"] == "complete":
+            self.study.tell(trial, self.rows[-1]["value"])
+        else:
+            self.study.tell(trial, state=TrialState.FAIL)
+
+    def tuned(self, commands: tuple[str, ...]) -> Tuned:
+        found = Compensator(commands, self.best_networks, self.best_parameters) if self.best_networks else None
+        return Tuned(found, self.rows, self.seconds)
+
+
+def _prepare(table: Mapping[str, Array], outputs: dict[str, Array], training: Index, validation: Index) -> _Data:
+    """Choose and normalise the inputs by the training windows alone."""
+    seen = {name: values[training] for name, values in table.items()}
+    features = choose_features(seen)
+    normaliser = Normaliser.fit(seen, tuple(features))
+    return _Data(features, normaliser, normaliser.apply(table), outputs, training, validation)
+
+
+def _fit(
+    data: _Data, stack: Mapping[str, Parameters], recipe: GradientRecipe, entropy: tuple[int, ...], device: str
+) -> dict[str, _Result]:
+    """Train one network per model of a stack on one fold."""
+    first = next(iter(stack.values()))
+    settings = Settings(
+        layers=int(first["layers"]),
+        units=int(first["units"]),
+        learning_rate=tuple(p["learning_rate"] for p in stack.values()),
+        weight_decay=tuple(p["weight_decay"] for p in stack.values()),
+        input_dropout=tuple(p["input_dropout"] for p in stack.values()),
+        hidden_dropout=tuple(p["hidden_dropout"] for p in stack.values()),
+        epochs=recipe.epochs,
+        batch=recipe.batch,
+        patience=recipe.patience,
+    )
+    outputs = np.stack([data.outputs[key] for key in stack])
+    basis = np.eye(outputs.shape[-1] // 2)
+    trained = train(
+        data.inputs,
+        outputs,
+        data.train_idx,
+        data.val_idx,
+        settings,
+        [seed_of(*entropy, key) for key in stack],
+        order_seed=seed_of(*entropy),
+        device=device,
+    )
+    return {
+        key: _Result(
+            Network(data.features, data.normaliser, basis, trained.layers[k]),
+            float(trained.loss[k]),
+            int(trained.epochs[k]),
+            trained.status[k],
+        )
+        for k, key in enumerate(stack)
+    }
+
+
+def _stacks(asked: Mapping[str, Parameters]) -> list[dict[str, Parameters]]:
+    """Group models by architecture, in the order of their first member."""
+    stacks: dict[tuple[float, ...], dict[str, Parameters]] = {}
+    for key, parameters in asked.items():
+        stacks.setdefault(tuple(parameters[name] for name in GradientRecipe.COUNTS), {})[key] = parameters
+    return list(stacks.values())
+
+
+def _study(seed: int) -> optuna.Study:
+    """Make a study in memory with TPE as the paper's Optuna had it: later defaults differ."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
+    return optuna.create_study(direction="minimize", sampler=sampler)
+
+
+def _suggest(trial: Trial, recipe: GradientRecipe) -> Parameters:
+    """Take each hyperparameter from the trial where the recipe has a range, else from the recipe."""
+    parameters: Parameters = {name: getattr(recipe, name) for name in recipe.SEARCHED}
+    for name, (low, high) in recipe.ranges().items():
+        if name in recipe.COUNTS:
+            parameters[name] = trial.suggest_int(name, int(low), int(high))
+        else:
+            parameters[name] = trial.suggest_float(name, low, high, log=name in recipe.LOGARITHMIC)
+    return parameters

@@ -1,0 +1,300 @@
+"""Tuning in closed form: hidden units are drawn, output weights are a least-squares solution with a ridge.
+
+With the hidden layer fixed, the output weights of all models follow from one decomposition, for every ridge, and so
+does the error on each manoeuvre left out in turn: from the residuals r of the whole and the hat matrix H, that of a
+left-out block is (I - H_bb)^-1 r_b. So a trial is judged by every manoeuvre at the price of one solution.
+
+A ship whose port and starboard sides are alike answers mirrored inputs with the mirrored path. A mirrored trial pairs
+each hidden unit with its mirror image, with equal output weights for x and opposite ones for y: the compensation then
+has this symmetry exactly, and each manoeuvre counts twice.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shipid.hybrid.compensator import (
+    MOTIONS,
+    Array,
+    Compensator,
+    Index,
+    Network,
+    Normaliser,
+    Tuned,
+    choose_features,
+    feature_table,
+)
+from shipid.hybrid.recipe import RidgeRecipe, seed_of
+
+SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
+ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
+ODD = {"v", "r", "v_rw", "alpha", "delta"}  # change sign in the mirror: motions, relative wind, angles of actuators
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """Windows as hidden units see them.
+
+    values : (S, d) normalised. reflection : (d, d) mirror of normalised inputs, image = values @ it; None without one.
+    groups : the group of each input, (d,).
+    """
+
+    features: dict[str, tuple[str, ...]]
+    normaliser: Normaliser
+    values: Tensor
+    reflection: Array | None
+    groups: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One coordinate, x or y: features on the axes of their Gram matrix, and what they have to make.
+
+    rotated : (S, M); eigenvalues : (M,); axes : (M, M); targets : (S, K r) [m]; product = rotated.T @ targets.
+    """
+
+    rotated: Tensor
+    eigenvalues: Tensor
+    axes: Tensor
+    targets: Tensor
+    product: Tensor
+
+
+class _Search:
+    """The rows of one model and the networks of its best trials so far."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.rows: list[dict[str, Any]] = []
+        self.kept: list[tuple[float, dict[str, float], Network]] = []
+
+    def record(self, number: int, params: dict[str, float], value: float, network: Callable[[], Network]) -> None:
+        """Write a row, and solve the network if the trial is among the best."""
+        self.rows.append({"number": number, "params": params, "value": value, "state": "complete"})
+        if len(self.kept) < self.most or value < self.kept[-1][0]:
+            self.kept = sorted([*self.kept, (value, params, network())], key=lambda kept: kept[0])[: self.most]
+
+    def tuned(self, commands: tuple[str, ...]) -> Tuned:
+        """Average the best networks."""
+        compensator = Compensator(commands, tuple(kept[2] for kept in self.kept), self.kept[0][1])
+        return Tuned(compensator, self.rows, sum(row["seconds"] for row in self.rows))
+
+
+def tune_ridge(
+    columns: Mapping[str, Array],
+    commands: Sequence[str],
+    targets: Mapping[str, Array],
+    folds: Sequence[tuple[Index, Index]],
+    recipe: RidgeRecipe,
+    seed: int,
+    *,
+    on_trial: Callable[[int, int], None] | None = None,
+    device: str = "cpu",
+) -> dict[str, Tuned]:
+    """Solve networks for each model: arguments and result as those of `tune`.
+
+    The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
+    predicted by the solution without any window outside its training part. The compensator is the mean of the networks
+    of the best trials, solved with all windows of the folds.
+    """
+    windows = np.unique(np.concatenate([part for fold in folds for part in fold]))
+    table = {name: values[windows] for name, values in feature_table(columns, commands).items()}
+    blocks = _blocks(folds, windows, device)
+    names = [key for key, paths in targets.items() if np.isfinite(paths[:, windows]).all()]
+    basis = smooth_basis(len(next(iter(targets.values()))), recipe.terms)
+    paths = [np.tensordot(basis.T, targets[key][:, windows], 1) for key in names]
+    judged = np.concatenate([validation for _, validation in folds])
+    faster = [_faster(targets[key][:, judged], basis) for key in names]
+    outputs = [_side(paths, axis, len(windows), device) for axis in (0, 1)]
+    plain, mirrored = _inputs(table, device), _mirrored(table, device)
+    searches = {key: _Search(recipe.averaged) for key in names}
+    ridges = recipe.path()
+
+    for number, point in enumerate(recipe.points()):
+        start = time.perf_counter()
+        seen = mirrored if point["mirror"] and mirrored is not None else plain
+        hidden = _draw(seen, point, recipe.units, seed_of(seed, number))
+        parts = _parts(seen, hidden, outputs, device)
+        errors = _left_out(parts, ridges, blocks, basis.shape[1])
+        for k, key in enumerate(names):
+            ridge = ridges[errors[:, k].argmin()]
+            params = {**point, "mirror": float(seen is mirrored), "ridge": ridge}
+            value = float(errors[:, k].min() + faster[k]) / (2 * len(basis) * len(judged))
+            mine = slice(k * basis.shape[1], (k + 1) * basis.shape[1])
+            searches[key].record(number, params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
+        seconds = (time.perf_counter() - start) / max(1, len(names))
+        for search in searches.values():
+            search.rows[-1] |= {"seconds": seconds, "epochs": 0}
+        if on_trial is not None:
+            on_trial(number + 1, recipe.trials)
+    return {key: searches[key].tuned(tuple(commands)) if key in searches else _unsolvable(recipe) for key in targets}
+
+
+def _unsolvable(recipe: RidgeRecipe) -> Tuned:
+    """What is found where targets are not numbers: nothing, in every trial."""
+    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
+    return Tuned(None, [{"number": i, "params": point, **blank} for i, point in enumerate(recipe.points())], 0.0)
+
+
+def smooth_basis(horizon: int, terms: int) -> Array:
+    """Orthonormal polynomials (T, r) of time without a constant: an error starts from 0. r is at most T."""
+    time_ = np.arange(1, horizon + 1) / horizon
+    powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
+    basis: Array = np.linalg.qr(powers)[0]
+    return basis
+
+
+def _faster(paths: Array, basis: Array) -> float:
+    """Sum of squares [m^2] of what the basis cannot follow in paths (T, S, 2)."""
+    return float(np.square(paths - np.tensordot(basis @ basis.T, paths, 1)).sum())
+
+
+def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[tuple[Tensor, Tensor]]:
+    """What each fold leaves out, and which of it is judged: rows of the windows (folds, b), equal sizes together."""
+    pairs: dict[tuple[int, int], list[tuple[Index, Index]]] = {}
+    for training, validation in folds:
+        out = np.flatnonzero(~np.isin(windows, training))
+        judged = np.flatnonzero(np.isin(windows[out], validation))
+        pairs.setdefault((len(out), len(judged)), []).append((out, judged))
+    stacked = [tuple(np.stack(parts) for parts in zip(*same, strict=True)) for same in pairs.values()]
+    return [(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device)) for out, judged in stacked]
+
+
+def _inputs(table: Mapping[str, Array], device: str, reflection: Array | None = None) -> _Inputs:
+    """Choose and normalise the inputs; with a mirror, by the windows and their images."""
+    features = choose_features(table)
+    names = tuple(features)
+    seen = np.stack([table[name] for name in names], axis=1)
+    both = seen if reflection is None else np.concatenate([seen, seen @ reflection])
+    normaliser = Normaliser(names, both.mean(axis=0), both.std(axis=0))
+    groups = tuple("motion" if name in MOTIONS else "wind" if name.endswith("_rw") else "command" for name in names)
+    return _Inputs(features, normaliser, _tensor(normaliser.apply(table), device), reflection, groups)
+
+
+def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
+    """The inputs with their mirror; None where a column has no image in it."""
+    reflection = _reflection(table, choose_features(table))
+    return None if reflection is None else _inputs(table, device, reflection)
+
+
+def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
+    """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image."""
+    standing = {column: name for name, columns in features.items() for column in columns}
+    names = list(features)
+    matrix = np.zeros((len(names), len(names)))
+    for column, values in table.items():
+        component, _, signal = column.rpartition(".")
+        words = re.split("([^a-z]+)", component)
+        if signal == "n" and ACROSS & set(words) and f"{component}.alpha" not in table:
+            return None
+        partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
+        sign = -1.0 if signal in ODD else 1.0
+        if column in standing and partner in standing:
+            matrix[names.index(standing[partner]), names.index(standing[column])] = sign
+        elif column in standing or partner not in table or not np.allclose(values, sign * table[partner]):
+            return None
+    return matrix if (np.abs(matrix).sum(axis=0) == 1).all() and (np.abs(matrix).sum(axis=1) == 1).all() else None
+
+
+def _draw(seen: _Inputs, point: Mapping[str, float], units: int, seed: int) -> tuple[Array, Array]:
+    """Weights (d, M) and offsets (M,) of hidden units, normal with the spreads of the trial."""
+    scales = np.array([point[f"{group}_scale"] for group in seen.groups])
+    generator = np.random.default_rng(seed)
+    normal = generator.standard_normal((units, len(scales) + 1))
+    return (normal[:, :-1] / scales).T, normal[:, -1] * point["offset"]
+
+
+def _parts(seen: _Inputs, hidden: tuple[Array, Array], outputs: Sequence[Tensor], device: str) -> list[_Part]:
+    """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
+    weight, offset = (_tensor(part, device) for part in hidden)
+    features = (seen.values @ weight + offset).tanh() / len(offset) ** 0.5
+    if seen.reflection is None:
+        eigenvalues, axes = _decompose(features)
+        rotated = features @ axes
+        return [_Part(rotated, eigenvalues, axes, side, rotated.T @ side) for side in outputs]
+    image = (seen.values @ (_tensor(seen.reflection, device) @ weight) + offset).tanh() / len(offset) ** 0.5
+    parts = []
+    for sign, side in zip((1.0, -1.0), outputs, strict=True):
+        paired = (features + sign * image) / 2**0.5
+        eigenvalues, axes = _decompose(paired)
+        rotated = paired @ axes
+        parts.append(_Part(rotated, eigenvalues, axes, side, rotated.T @ side))
+    return parts
+
+
+def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
+    """Eigenvalues and axes of the Gram matrix; rounding makes no eigenvalue negative."""
+    eigenvalues, axes = torch.linalg.eigh(features.T @ features)
+    return eigenvalues.clamp(min=0.0), axes
+
+
+def _left_out(
+    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[tuple[Tensor, Tensor]], terms: int
+) -> Array:
+    """Sums of squared errors (ridges, K) [m^2] over judged windows, each block without itself; `terms` is r."""
+    total = parts[0].targets.new_zeros(len(ridges), parts[0].targets.shape[1] // terms)
+    for part in parts:
+        for out, judged in blocks:
+            rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
+            without = _few_rows if rows.shape[1] <= rows.shape[2] else _many_rows
+            errors = without(part, rows, targets)
+            for i, ridge in enumerate(ridges):
+                error = errors(part.eigenvalues + ridge)
+                if judged.shape != out.shape:
+                    error = error.take_along_dim(judged[:, :, None], dim=1)
+                total[i] += error.square().sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
+    found: Array = total.cpu().numpy()
+    return found
+
+
+def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
+    """Errors (folds, b, K r) of blocks without themselves, by their part of the hat matrix, (b, b); of a diagonal."""
+    unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
+
+    def errors(diagonal: Tensor) -> Tensor:
+        weighted = rows / diagonal
+        found: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
+        return found
+
+    return errors
+
+
+def _many_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
+    """The same by solving for the output weights without each block, (M, M)."""
+    own, product = rows.mT @ rows, part.product - rows.mT @ targets
+    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - own, product)
+
+
+def _network(
+    seen: _Inputs, hidden: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
+) -> Network:
+    """The network whose targets are some columns of a trial, solved with all windows."""
+    weight, offset = hidden
+    x, y = (
+        (part.axes @ (part.product[:, columns] / (part.eigenvalues + ridge)[:, None])).cpu().numpy()
+        / len(offset) ** 0.5
+        for part in parts
+    )
+    if seen.reflection is not None:
+        weight, offset = np.concatenate([weight, seen.reflection @ weight], axis=1), np.concatenate([offset, offset])
+        x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
+    output = np.concatenate([x, y], axis=1)
+    return Network(seen.features, seen.normaliser, basis, ((weight, offset), (output, np.zeros(output.shape[1]))))
+
+
+def _side(paths: Sequence[Array], axis: int, num_windows: int, device: str) -> Tensor:
+    """One coordinate of the paths (r, S, 2) of all models, (S, K r)."""
+    return _tensor(np.concatenate([np.zeros((num_windows, 0)), *(path[..., axis].T for path in paths)], axis=1), device)
+
+
+def _tensor(values: Array, device: str) -> Tensor:
+    return torch.as_tensor(values, dtype=torch.float64, device=device)

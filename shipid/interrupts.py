@@ -1,0 +1,32 @@
+"""Ctrl-C during calls into compiled code: held back until the call returns."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
+
+
+@contextmanager
+def uninterrupted() -> Iterator[list[int]]:
+    """Hold back Ctrl-C until the block ends: inside CasADi it would turn into a complaint about arguments.
+
+    Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
+    one holds. Raises KeyboardInterrupt at the end of the block if Ctrl-C was pressed, also where the block failed.
+    """
+    if _holding or threading.current_thread() is not threading.main_thread():
+        yield _holding[0] if _holding else []
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+    _holding.append(held)
+    try:
+        yield held
+    finally:
+        _holding.clear()
+        signal.signal(signal.SIGINT, before)
+        if held:
+            raise KeyboardInterrupt

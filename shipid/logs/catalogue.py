@@ -1,0 +1,70 @@
+"""Public sets: the log behind a bundled mapping, from the data folder or from where it is published."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pooch
+
+from shipid import document
+from shipid.errors import DataError
+from shipid.logs.importing import digest_of
+from shipid.logs.mapping import read_mapping
+
+FOLDER_VARIABLE = "SHIPID_DATA"
+
+
+def available() -> list[str]:
+    """Names of the bundled mappings, each one that `fetch` understands."""
+    return list(document.bundled("studies/mappings"))
+
+
+def fetch(name: str) -> Path:
+    """File of the log behind a mapping, its checksum verified.
+
+    With the environment variable SHIPID_DATA set, the log is looked for in that folder and nothing is downloaded;
+    else it comes from the mapping's url, once, into the cache folder of the user.
+
+    Raises
+    ------
+    DataError : if the log is not there, cannot be downloaded, or is another file than the mapping was written for.
+    """
+    mapping = read_mapping(name)
+    source = mapping.source
+    folder = os.environ.get(FOLDER_VARIABLE)
+    if folder:
+        if source.file is None:
+            raise DataError("the mapping names no file in a data folder", file=name, path="source.file")
+        file = Path(folder) / source.file
+        if not (file.is_file() if source.runs is None else file.is_dir()):
+            message = f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})"
+            raise DataError(message, file=file)
+        if source.sha256 not in (None, digest_of(mapping, file)):
+            message = f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}"
+            raise DataError(message, file=file, path="source.sha256")
+        return file
+    if source.url is None or source.sha256 is None:
+        raise DataError(
+            f"nothing to download: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it",
+            file=name,
+            path="source.url",
+        )
+    if source.runs is not None:
+        message = f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder"
+        raise DataError(message, file=name, path="source.url")
+    return _download(name, source.url, source.sha256, source.file)
+
+
+def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
+    stem = Path(name).stem  # of one's own mapping the name is a path: the cache folder must hold the file anyway
+    cache = Path(pooch.os_cache("shipid"))
+    pooch.get_logger().setLevel("WARNING")
+    try:
+        return Path(pooch.retrieve(url, f"sha256:{sha256}", fname=f"{stem}-{url.rpartition('/')[2]}", path=cache))
+    except ValueError:  # pooch's word for a wrong checksum; it has already removed the download
+        message = f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}"
+        raise DataError(message, file=url, path="source.sha256") from None
+    except OSError as error:  # requests' errors are OSErrors too
+        message = f"cannot be downloaded ({type(error).__name__}): go online, or set {FOLDER_VARIABLE} to a folder "
+        raise DataError(f"{message}that holds {file or 'the log'}", file=url) from None

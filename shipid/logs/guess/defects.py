@@ -1,0 +1,157 @@
+"""Defects of a log whose columns are known: of its rows, and of what position, heading and velocities say together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shipid.data.dataset import Array
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.evidence import Complex
+from shipid.logs.guess.sniff import Sniffed
+from shipid.logs.mapping import to_si
+
+VISITS = 6  # to its largest value, before a signal counts as clipped
+ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
+
+
+def defects_of_rows(state: State, sniffed: Sniffed) -> None:
+    """Rows that repeat, values that stop at a limit, and logs that were interpolated."""
+    sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
+    moving = [name for name in sources if np.ptp(state.columns[name]) > 0]
+    if moving:
+        same = np.all([np.diff(state.columns[name]) == 0 for name in moving], axis=0)
+        if same.mean() > 0.02:
+            state.find(
+                "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
+            )
+        share = float(np.median([evidence.between_rows(state.columns[name]) for name in moving]))
+        if share > 0.2:
+            sentence = (
+                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
+            )
+            state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
+    for column in state.suggestions:
+        if column.name.endswith(".n"):
+            values = state.columns[column.source]
+            top = float(np.mean(values == values.max()))
+            if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS:
+                sentence = f"{100 * top:.0f} % of the rows have exactly the largest value, {values.max():g}"
+                state.find("clipped", (column.source,), 0.7, sentence)
+    steps = np.diff(sniffed.t)
+    holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
+    if holes:
+        sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
+        state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
+    missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
+    if missing and sniffed.form.get("kind") != "nmea":  # no sentence says everything
+        state.find(
+            "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
+        )
+
+
+def defects_of_motion(state: State) -> None:
+    """What position, heading, velocity and yaw rate say about each other."""
+    if state.psi is None:
+        return
+    if state.r is not None:
+        delay, explained = _delay(state, state.psi, evidence.integral(state.t, state.r))
+        if delay:
+            _find_late(state, "heading", "yaw rate", delay, explained)
+            state.psi = np.interp(state.t + delay, state.t, state.psi)  # else what follows finds it once more
+            if state.body is not None and not _is_earth_fixed(state):
+                state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
+    if state.velocity is None or state.position is None or state.body is None:
+        return
+    path = evidence.integral(state.t, state.velocity)
+    _jumps(state, _arm_or_delay(state, path))
+    _heading_offset(state)
+
+
+def _is_earth_fixed(state: State) -> bool:
+    return any(
+        column.name in ("u", "speed") and (column.name == "speed" or column.extra) for column in state.suggestions
+    )
+
+
+def _arm_or_delay(state: State, path: Complex) -> Complex:
+    """A position ahead of its velocities: of another point of the ship, or of another time, whichever explains more.
+
+    Returns the path of the velocities with that put right, so that nothing is found twice.
+    """
+    assert state.position is not None
+    assert state.psi is not None
+    seen = state.chosen.change(state.position)
+    ran = state.chosen.change(path)
+    keep = evidence.robust(seen, ran)
+    turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
+    scale = evidence.fit(seen[keep], ran[keep]).scale
+    off, error, by_arm = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
+    delay, by_delay = _delay(state, state.position, path)
+    if delay and by_delay > by_arm:
+        _find_late(state, "position", "velocity", delay, by_delay)
+        moved = [np.interp(state.t - delay, state.t, part) for part in (path.real, path.imag)]
+        return np.asarray(moved[0] + 1j * moved[1])
+    if abs(off) > max(ARM, 5 * error):
+        sentence = (
+            f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
+        )
+        repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
+        state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
+        return np.asarray(path + off * np.exp(1j * state.psi))
+    if float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
+        far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
+        sentence = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
+        sentence += ": take the path of the velocities"
+        state.find("position jitter", (), 0.8, sentence)
+    return path
+
+
+def _delay(state: State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:
+    """Seconds by which one comes later than the other, 0 if that explains little; and the share that it explains."""
+    usual = float(np.median(np.diff(state.t)))
+    delay, explained = evidence.shift(state.t, seen, integrated, max(3.0, 3 * usual))
+    return (delay, explained) if abs(delay) > max(0.3, 0.75 * usual) and explained > 0.35 else (0.0, 0.0)
+
+
+def _find_late(state: State, what: str, against: str, delay: float, explained: float) -> None:
+    word = "later" if delay > 0 else "earlier"
+    sentence = f"{what} comes {abs(delay):.2g} s {word} than the {against} says ({100 * explained:.0f} % of the misfit)"
+    state.find(f"late {what}", (what,), float(np.clip(explained, 0.2, 0.95)), sentence)
+
+
+def _jumps(state: State, path: Complex) -> None:
+    assert state.position is not None
+    unit = to_si(state.clock_unit, "t")
+    places = evidence.jumps(state.t, state.position, path)
+    stay = [place for place in places if place[2] > 5.0]
+    spikes = [place for place in places if place[2] <= 5.0]
+    repair: dict[str, Any]
+    if stay:
+        words = ", ".join(f"t = {start / unit:.6g} to {end / unit:.6g} ({far:.0f} m)" for start, end, far in stay[:6])
+        repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
+        state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
+    if spikes:
+        words = ", ".join(f"{(start + end) / 2 / unit:.6g}" for start, end, _ in spikes[:6])
+        repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
+        state.find("position spikes", (), 0.8, f"the position leaves and comes back near t = {words}", repair)
+
+
+def _heading_offset(state: State) -> None:
+    """Drift in the straightest runs, where a ship makes none: median of arg(u + i v)."""
+    assert state.body is not None
+    assert state.psi is not None
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
+    rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
+    if rows.mean() < 0.02:
+        return
+    drift = np.angle(state.body[rows])
+    angle = float(np.median(drift))
+    scatter = float(np.median(np.abs(drift - angle)))
+    if abs(angle) > max(OFFSET, 1.5 * scatter):
+        sentence = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
+        sentence += ": heading off, or wind and current"
+        repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
+        state.find("heading offset", ("psi",), 0.6, sentence, repair)

@@ -1,0 +1,152 @@
+"""Draft a mapping document from a guess, with the evidence beside every line, for a person to read and correct."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from shipid.errors import ShipidError
+from shipid.logs.guess.clues import Finding, Suggestion
+from shipid.logs.guess.columns import LIKELY, Guess
+from shipid.logs.importing import import_log, sha256_of
+from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
+from shipid.logs.segments import manoeuvres
+
+ENABLED = 0.8  # a repair less sure than this is drafted switched off
+ORDER = ("wrap_interpolation", "break", "despike", "scale", "heading_offset", "lever_arm")
+NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
+QUESTIONS = (
+    "Which point of the ship do positions and velocities belong to? If not the vessel's origin: a lever_arm.",
+    "Are the commands orders or feedback? Do their names before the dot stand in the vessel document?",
+    "Is the wind true or apparent (relative = true), 'from' or 'towards'?",
+)
+
+
+def draft_mapping(found: Guess) -> str:
+    """Text of a mapping: columns with how sure they are, repairs, and the manoeuvres if it can be imported as it is."""
+    parts = [*_head(found), *_columns(found), *_estimate(found), *_repairs(found)]
+    text = (
+        "\n".join(
+            "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
+            for part in parts
+        )
+        + "\n"
+    )
+    try:
+        segments = segment_log(_read(text), found.file)
+    except ShipidError as error:
+        return text + f"\n# Cannot be imported as it stands: {error.path or ''}: {error.message}\n"
+    return text + segments_text(segments, found.sniffed.clock.get("unit", "s"))
+
+
+def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
+    """Manoeuvres of the whole log of a mapping, whatever segments it has."""
+    whole = mapping.model_copy(update={"segment": (), "resample": None})
+    return manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
+
+
+def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
+    """Segments as TOML, to be corrected by hand; `unit` is that of the log's clock."""
+    blocks = ["\n# Found by helm and heading: correct names, starts and ends, and remove what is no run."]
+    if unit == "date":
+        blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
+    for segment in segments:
+        values = {key: value for key, value in segment.model_dump().items() if value is not None}
+        values |= {end: round(values[end], 3) for end in ("start", "end")}
+        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if unit == "date" else ""
+        blocks.append("\n".join([f"[[segment]]{dates}", *_lines(values)]))
+    return "\n".join(blocks) + "\n"
+
+
+def moment(value: float, unit: str) -> str:
+    """A moment on the log's clock as people read it: the date in UTC, or the number."""
+    if unit == "date":
+        return datetime.fromtimestamp(value, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    return f"{value:.10g}"
+
+
+def _read(text: str) -> Mapping:
+    with tempfile.TemporaryDirectory(prefix="shipid-") as folder:
+        file = Path(folder) / "draft.toml"
+        file.write_text(text, encoding="utf-8")
+        return read_mapping(file)
+
+
+def _lines(values: dict[str, Any]) -> Iterator[str]:
+    for key, value in values.items():
+        yield f"{key} = {tomlkit.item(value).as_string()}"
+
+
+def _head(found: Guess) -> Iterator[str]:
+    yield f"# Drafted from {found.file.name}. Check every line: a percentage says how sure it is, the rest why."
+    yield from (f"# ? {question}" for question in QUESTIONS)
+    yield from _lines({"name": found.file.stem})
+    yield "\n[source]"
+    yield from _lines({"sha256": sha256_of(found.file)})
+    yield "\n[format]"
+    yield from _lines(found.sniffed.form)
+    yield "\n[clock]"
+    yield from _lines(found.sniffed.clock)
+    scattered = found.sniffed.form.get("kind") == "nmea"
+    source = found.columns[0].source
+    steps = np.diff(found.sniffed.t[np.isfinite(found.sniffed.columns[source])] if scattered else found.sniffed.t)
+    usual = float(np.median(steps))
+    if scattered:
+        yield f"step = {usual:g}    # s: every sentence has its own instants; that of the position"
+    if scattered or found.kinds & {"holes in time", "missing values"}:
+        yield f"max_gap = {max(3.0, 5 * usual):g}    # s: shorter gaps are interpolated, longer ones break the run"
+
+
+def _columns(found: Guess) -> Iterator[str]:
+    findings = [finding for finding in found.findings if finding.repair is None]
+    if findings:
+        yield ""
+        yield from (f"# ! {finding.kind} ({_percent(finding.confidence)}): {finding.sentence}" for finding in findings)
+    for column in found.columns:
+        yield f"\n[columns.{_key(column.name)}]    # {_percent(column.confidence)}{_mark(column)}: {column.evidence}"
+        yield from _lines({"from": column.source, "unit": column.unit, **column.extra})
+    unused = [*(f"column {name!r} is not used" for name in found.unused), *found.sniffed.notes]
+    if unused:
+        yield ""
+        yield from (f"# {words}" for words in unused)
+
+
+def _mark(column: Suggestion) -> str:
+    return ", UNSURE" if column.confidence < LIKELY else ""
+
+
+def _percent(confidence: float) -> str:
+    return f"{100 * confidence:.0f} %"
+
+
+def _key(name: str) -> str:
+    return f'"{name}"' if "." in name else name
+
+
+def _estimate(found: Guess) -> Iterator[str]:
+    """A block for what is not in the log, if only velocities are not."""
+    named = {column.name for column in found.columns}
+    lacking = [name for name in ("u", "v", "r") if name not in named]
+    if "speed" in named:
+        lacking = [name for name in lacking if name == "r"]
+    if lacking:
+        yield f"\n[estimate]    # {', '.join(lacking)} not found; noise is assumed: the import says whether it fits"
+        yield from _lines(NOISE)
+
+
+def _repairs(found: Guess) -> Iterator[str]:
+    mendable = [(finding, finding.repair) for finding in found.findings if finding.repair is not None]
+    for finding, repair in sorted(mendable, key=lambda entry: ORDER.index(entry[1]["kind"])):
+        yield "\n[[repair]]"
+        yield from _lines(repair)
+        yield from _lines({"enabled": finding.confidence >= ENABLED, "reason": _reason(finding)})
+
+
+def _reason(finding: Finding) -> str:
+    return f"{finding.kind} ({_percent(finding.confidence)}): {finding.sentence}"

@@ -1,0 +1,450 @@
+"""Import of a log by a declared mapping: its tables to SI columns, repairs, gaps, conversions, runs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import (
+    BREAK,
+    OPTIONAL,
+    REQUIRED,
+    STANDARD_DEVIATIONS,
+    Dataset,
+    clock_slack,
+    is_command,
+    pieces,
+    sample,
+    units_of,
+)
+from shipid.data.kinematics import Noise, smooth
+from shipid.errors import DataError, choices
+from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
+from shipid.logs.readers import Format, TextFormat, read_table, seconds
+from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
+
+__all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
+
+Records = list[dict[str, Any]]
+Channel = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """One log in SI units and the body's frame: what was repaired, how many rows were read, and the origin [deg]."""
+
+    rows: pd.DataFrame
+    records: Records
+    read: int
+    origin: tuple[float, float] | None
+
+
+def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = ()) -> Dataset:
+    """Turn a log into a dataset as its mapping declares; nothing is mended that is not declared.
+
+    Order: units, resampling of channels, repair of wrapping channels, unwrapping, position on the Earth to north and
+    east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the mapping,
+    estimation of u, v, r, apparent to true wind, runs, resampling. `metadata["repairs"]` counts every repair, `flags`
+    marks its rows.
+
+    Parameters
+    ----------
+    mapping : what the columns are, from `read_mapping`.
+    file : the log; with `source.runs`, the folder of its files.
+    without : kinds of repair to leave out.
+
+    Raises
+    ------
+    DataError : with the log, the row or the key of the mapping, and what would be right.
+    """
+    source, off = Path(file), tuple(without)
+    for kind in off:
+        if kind not in REPAIRS:
+            raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)
+    digest = digest_of(mapping, source)
+    if mapping.source.sha256 not in (None, digest):
+        raise DataError(
+            "not the file this mapping was written for (sha256 differs): fetch that file, or copy the mapping, "
+            "check its repairs and segments, and remove [source] sha256",
+            file=source,
+            path="source.sha256",
+        )
+    logs = runs_of(mapping.source, source)
+    parts = [_imported(mapping, log, off) for log in logs.values()]
+    rows = parts[0].rows
+    metadata = {
+        "vessel": mapping.vessel,
+        "source": {**mapping.source.model_dump(exclude_none=True), "log": source.name, "sha256": digest},
+        "mapping": {"name": mapping.name, "digest": mapping.digest},
+        "rows": sum(part.read for part in parts),
+        "clock": "shared" if mapping.source.runs is None else "run",
+        "units": units_of(rows.columns),
+        "flags": list(FLAGS),
+        "repairs": _added([part.records for part in parts]),
+    }
+    if parts[0].origin is not None:
+        metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
+    kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
+    metadata |= {"manoeuvres": kinds} if kinds else {}
+    if mapping.source.runs is None:
+        segments = mapping.segment or (_whole(rows, mapping, source),)
+        frame = _cut(rows, segments, to_si(mapping.clock.unit, "t"), source)
+    else:
+        frame = pd.concat([_named(part.rows, run) for run, part in zip(logs, parts, strict=True)], ignore_index=True)
+    dataset = Dataset(frame, metadata)
+    return _resampled(dataset, mapping.resample.step) if mapping.resample else dataset
+
+
+def runs_of(source: Source, log: Path) -> dict[str, Path]:
+    """Run -> file: of a folder with one run a file every file that fits the pattern, else the log itself."""
+    if source.runs is None:
+        return {log.stem: log}
+    before, _, after = source.runs.partition("*")
+    files = sorted(log.glob(source.runs))
+    if not files:
+        raise DataError(f"no file {source.runs!r} in this folder", file=log, path="source.runs")
+    return {file.name.removeprefix(before).removesuffix(after): file for file in files}
+
+
+def digest_of(mapping: Mapping, log: Path) -> str:
+    """SHA-256 of the log; of several files, of their SHA-256 in hex one after another."""
+    files = [*runs_of(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
+    digests = [sha256_of(file) for file in files]
+    several = mapping.source.runs is not None or mapping.file
+    return hashlib.sha256("".join(digests).encode()).hexdigest() if several else digests[0]
+
+
+def sha256_of(file: Path) -> str:
+    """SHA-256 of a file, in hex; raises DataError if it cannot be read."""
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror})", file=file) from None
+
+
+def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
+    rows, first, read = _columns(mapping, file)
+    wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
+    others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
+    rows, records = apply_repairs(rows, wrapping, off)
+    rows = _unwrapped(rows, mapping.columns)
+    rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
+    rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
+    rows = _in_body(rows, mapping.columns)
+    rows, more = apply_repairs(rows, others, off)
+    rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
+    if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
+        rows = _true_wind(rows)
+    known = [name for name in (*REQUIRED, *OPTIONAL) if name in rows]
+    commands = [str(name) for name in rows.columns if is_command(str(name))]
+    order = [*known, *commands, "flags"] if mapping.resamples or "latitude" in mapping.columns else list(rows.columns)
+    return Imported(rows[order], first + records + gaps + more + estimated, read, origin)
+
+
+def _added(parts: list[Records]) -> Records:
+    """Records of all files, those of one kind and column added up."""
+    if len(parts) == 1:
+        return parts[0]
+    total: dict[tuple[str, str, int], dict[str, Any]] = {}
+    for records in parts:
+        seen: list[tuple[str, str]] = []
+        for record in records:
+            key = (record["kind"], record["column"])
+            found = total.setdefault((*key, seen.count(key)), {**record, "count": 0})
+            found["count"] += record["count"]
+            found["note"] = record["note"] if record["note"] == found["note"] else f"over {len(parts)} files"
+            seen.append(key)
+    return list(total.values())
+
+
+def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
+    """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
+    log = read_table(file, mapping.format, mapping.clock.source)
+    t = _instants(log, mapping.clock, mapping.format, file, "clock")
+    records = _passed_over(log)
+    files = {"": (log, t, mapping.format, file)}
+    for name, entry in mapping.file.items():
+        beside = file.parent / entry.path
+        table = read_table(beside, entry.format, entry.clock.source)
+        times = _instants(table, entry.clock, entry.format, beside, f"file.{name}.clock")
+        files[name] = (table, times, entry.format, beside)
+        records += _passed_over(table)
+    channels = {}
+    for name, column in mapping.columns.items():
+        table, times, form, beside = files[column.file or ""]
+        numbers = _numbers(table, column.source, form, beside, f"columns.{name}.from")
+        channels[name] = (times - column.latency, numbers * (column.sign * column.factor * to_si(column.unit, name)))
+    if mapping.resamples:
+        t = _common_clock(channels, t, mapping.clock.step, file)
+        gap = mapping.clock.max_gap or np.inf
+        how = {name: _interpolation(name, column) for name, column in mapping.columns.items()}
+        columns = {name: _brought(t, *channels[name], how[name], gap) for name in channels}
+        notes = [(name, f"{how[name]}, latency {column.latency:g} s") for name, column in mapping.columns.items()]
+        records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
+    else:
+        columns = {name: values for name, (_, values) in channels.items()}
+    return pd.DataFrame({"t": t, **columns}).assign(flags=np.zeros(len(t), dtype=np.int64)), records, len(log)
+
+
+def _passed_over(table: pd.DataFrame) -> Records:
+    count = int(table.attrs.get("unreadable", 0))
+    note = "no NMEA 0183 sentence, or its checksum fails"
+    return [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
+
+
+def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+    """Time of every row [s]; raises unless it is there and rises."""
+    if clock.unit == "date":
+        t = seconds(_column(log, clock.source, file, f"{path}.from"))
+    else:
+        t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+    wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
+    if len(wrong):
+        row = int(wrong[0]) + 1
+        if not np.isfinite(t[row]):
+            what = "no time here: remove the row"
+        elif t[row] == t[row - 1]:
+            what = f"time {t[row]:g} s stands twice: remove one of the rows"
+        else:
+            what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
+        raise DataError(what, file=file, path=f"row {row + 1}")
+    return t
+
+
+def _common_clock(
+    channels: dict[str, Channel], t: NDArray[np.float64], step: float | None, file: Path
+) -> NDArray[np.float64]:
+    """Instants that every channel covers: `step` [s] apart, or those of the log itself."""
+    spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
+    empty = [name for name, times in spans.items() if not len(times)]
+    if empty:
+        raise DataError("holds no number at all", file=file, path=f"columns.{empty[0]}.from")
+    first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
+    slack = clock_slack(t)
+    if step is not None:
+        count = max(0, int(np.floor((last - first + slack) / step)) + 1)
+        t = np.asarray(first + step * np.arange(count), dtype=np.float64)
+    shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
+    if len(shared) < 2:
+        late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
+        message = f"columns share no time: {late!r} begins at {first:g} s, {early!r} ends at {last:g} s"
+        raise DataError(message, file=file, path=f"columns.{late}")
+    return shared
+
+
+def _interpolation(name: str, column: Column) -> str:
+    """As declared; else orders hold, angles that wrap go the short way, and all else is linear."""
+    return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else "linear")
+
+
+def _brought(
+    t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64], how: str, max_gap: float
+) -> NDArray[np.float64]:
+    """Bring a channel to instants t; NaN between samples further apart than max_gap [s], unless it is held."""
+    known = np.isfinite(values)
+    times, values = times[known], values[known]
+    after = np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1) if len(times) > 1 else np.zeros(len(t))
+    if how == "previous":
+        held = np.searchsorted(times, t + clock_slack(times), side="right") - 1
+        return values[np.clip(held, 0, len(values) - 1)]
+    if len(times) == 1:
+        return np.full(len(t), values[0])
+    found = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
+    index = after.astype(int)
+    on_sample = (t == times[index]) | (t == times[index - 1])
+    return np.where((times[index] - times[index - 1] > max_gap) & ~on_sample, np.nan, found)
+
+
+def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
+    names = [str(name) for name in log.columns]
+    if names.count(source) > 1:
+        raise DataError(f"column {source!r} stands twice in the log: rename one of them", file=file, path=path)
+    if source not in names:
+        alone = f"the header is one column, {names[0]!r}: is the separator right?" if names else "there is none"
+        remedy = alone if len(names) <= 1 else choices(source, names)
+        raise DataError(f"column {source!r} is not in the log: {remedy}", file=file, path=path)
+    return log.iloc[:, names.index(source)]
+
+
+def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+    """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row."""
+    column = _column(log, source, file, path)
+    if pd.api.types.is_numeric_dtype(column.dtype):
+        numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if len(infinite):
+            message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
+            raise DataError(message, file=file, path=f"row {infinite[0] + 1}")
+        return numbers
+    read = form if isinstance(form, TextFormat) else TextFormat()
+    text = column.fillna("").astype(str).str.strip()
+    missing = text.isin(read.missing)
+    plain = text.str.replace(",", ".", regex=False) if read.decimal == "," else text
+    numbers = pd.to_numeric(plain.mask(missing), errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
+    if len(bad):
+        message = (
+            f"{text.iloc[bad[0]]!r} is no number (column {source!r}; {len(bad)} such rows): "
+            "correct it, or list it in [format] missing, or check decimal"
+        )
+        raise DataError(message, file=file, path=f"row {bad[0] + 1}")
+    return numbers
+
+
+def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
+    """Unwrap angles, and turn winds "from" into "towards"."""
+    turned: dict[str, NDArray[np.float64]] = {}
+    for name, column in columns.items():
+        values = rows[name].to_numpy().copy()
+        if column.direction == "from":
+            values += np.pi
+        if column.wrap:
+            known = np.isfinite(values)
+            values[known] = np.unwrap(values[known])
+        turned[name] = values
+    return rows.assign(**turned)
+
+
+def _projected(rows: pd.DataFrame, mapping: Mapping) -> tuple[pd.DataFrame, tuple[float, float]]:
+    """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it."""
+    from pymap3d import geodetic2ned
+
+    latitude, longitude = np.degrees(rows["latitude"].to_numpy()), np.degrees(rows["longitude"].to_numpy())
+    known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    if mapping.origin is not None:
+        origin = mapping.origin.latitude, mapping.origin.longitude
+    else:
+        first = known[0] if len(known) else 0
+        origin = float(latitude[first]), float(longitude[first])
+    north, east, _ = geodetic2ned(latitude, longitude, 0.0, *origin, 0.0)
+    return rows.drop(columns=["latitude", "longitude"]).assign(north=north, east=east), origin
+
+
+def _in_body(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
+    """Speed and course, or earth-fixed velocities, turned by psi into the body."""
+    if "speed" in columns:
+        drift = rows["course"] - rows["psi"]
+        turned = rows.drop(columns=["speed", "course"])
+        return turned.assign(u=rows["speed"] * np.cos(drift), v=rows["speed"] * np.sin(drift))
+    if "u" not in columns or columns["u"].frame == "body":
+        return rows
+    c, s = np.cos(rows["psi"].to_numpy()), np.sin(rows["psi"].to_numpy())
+    north, east = rows["u"].to_numpy(), rows["v"].to_numpy()
+    return rows.assign(u=c * north + s * east, v=c * east - s * north)
+
+
+def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records]:
+    """Fill in u, v, r that the log lacks, stretch by stretch, and their standard deviations."""
+    assert mapping.estimate is not None
+    given = mapping.estimate
+    errors = {"north": given.position, "east": given.position, "psi": np.radians(given.heading_deg)}
+    errors |= {"u": given.velocity, "v": given.velocity, "r": np.radians(given.rate_deg)}
+    noise = Noise(errors, given.acceleration, float(np.radians(given.angular_acceleration_deg)))
+    lacking = [name for name in STANDARD_DEVIATIONS if name not in rows]
+    broken = (rows["flags"].to_numpy() & (1 << FLAGS.index(BREAK))) != 0
+    parts, squares = [], 0.0
+    for _, stretch in rows.groupby(np.cumsum(broken), sort=False):
+        if len(stretch) < 2:
+            at = f"t = {stretch['t'].iloc[0]:g} s"
+            raise DataError(f"a single row between two breaks at {at}: nothing to estimate from", file=file)
+        logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
+        found = smooth(stretch["t"].to_numpy(), logged, noise)
+        squares += found.consistency * len(stretch)
+        columns = {name: found.state(name) for name in lacking}
+        columns |= {STANDARD_DEVIATIONS[name]: found.deviation(name) for name in lacking}
+        parts.append(stretch.assign(**columns))
+    note = f"innovations {np.sqrt(squares / len(rows)):.2f} times as large as the noise declared (1 if it fits)"
+    records = [{"kind": "estimated", "column": ", ".join(lacking), "count": len(rows), "note": note}]
+    return pd.concat(parts, ignore_index=True), records
+
+
+def _true_wind(rows: pd.DataFrame) -> pd.DataFrame:
+    """Wind relative to the bow and the moving ship as wind over ground: its velocity plus the ship's, turned by psi."""
+    ahead = rows["V_w"] * np.cos(rows["beta_w"]) + rows["u"]
+    abeam = rows["V_w"] * np.sin(rows["beta_w"]) + rows["v"]
+    beta_w = np.unwrap(np.arctan2(abeam, ahead) + rows["psi"])
+    return rows.assign(V_w=np.hypot(ahead, abeam), beta_w=beta_w)
+
+
+def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+    """Fill gaps of at most `max_gap` [s] between known values, remove the other rows, and break the run there."""
+    t, flags = rows["t"].to_numpy(), rows["flags"].to_numpy().copy()
+    removed, records, filled = np.zeros(len(t), dtype=bool), [], {}
+    for name in rows.columns.drop(["t", "flags"]):
+        values = rows[name].to_numpy()
+        missing = ~np.isfinite(values)
+        if not missing.any():
+            continue
+        if max_gap is None:
+            message = f"no number in {int(missing.sum())} rows of {name!r}: set max_gap to interpolate short gaps"
+            raise DataError(message, file=file, path=f"row {int(np.argmax(missing)) + 1}, clock.max_gap")
+        before = np.maximum.accumulate(np.where(missing, -np.inf, t))
+        after = np.minimum.accumulate(np.where(missing, np.inf, t)[::-1])[::-1]
+        short = missing & (after - before <= max_gap)
+        held = pd.Series(values).ffill().to_numpy() if is_command(name) else interpolate_at(t, values, missing)
+        filled[name] = np.where(short, held, values)
+        flags |= np.where(short, 1 << FLAGS.index("interpolated"), 0)
+        removed |= missing & ~short
+        note = f"{int((missing & ~short).sum())} rows removed"
+        records.append({"kind": "interpolated", "column": name, "count": int(short.sum()), "note": note})
+    kept = t[~removed]
+    if len(kept) < 2:
+        raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
+    if max_gap is not None and max_gap < np.median(np.diff(t)):
+        message = f"{max_gap:g} s is shorter than the log's own step of {np.median(np.diff(t)):g} s"
+        raise DataError(message, file=file, path="clock.max_gap")
+    broken = np.diff(kept, prepend=kept[0]) > (np.inf if max_gap is None else max_gap)
+    if broken.any():
+        note = f"gaps longer than {max_gap:g} s"
+        records.append({"kind": BREAK, "column": "", "count": int(broken.sum()), "note": note})
+    rows = rows.assign(**filled, flags=flags).loc[~removed].reset_index(drop=True)
+    return rows.assign(flags=rows["flags"] | np.where(broken, 1 << FLAGS.index(BREAK), 0)), records
+
+
+def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
+    unit = to_si(mapping.clock.unit, "t")
+    return Segment(run=file.stem, start=rows["t"].iloc[0] / unit, end=rows["t"].iloc[-1] / unit)
+
+
+def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
+    """Put the runs one after another; rows that belong to two runs stand twice."""
+    t = rows["t"].to_numpy()
+    slack, step = clock_slack(t), float(np.median(np.diff(t)))
+    runs = []
+    for index, segment in enumerate(segments):
+        start, end = segment.start * unit, segment.end * unit
+        inside = (t >= start - slack) & (t <= end + slack)
+        if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
+            message = f"run {segment.run!r}, {start:g} to {end:g} s, is not in the log, {t[0]:g} to {t[-1]:g} s"
+            raise DataError(message, file=file, path=f"segment.{index}")
+        runs.append(_named(rows.loc[inside].reset_index(drop=True), segment.run))
+    return pd.concat(runs, ignore_index=True)
+
+
+def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:
+    named = rows.copy()
+    named.insert(0, "run", pd.Series([run] * len(rows), dtype="str"))
+    return named
+
+
+def _resampled(dataset: Dataset, step: float) -> Dataset:
+    """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
+
+    def resample() -> Iterator[pd.DataFrame]:
+        for run, rows in pieces(dataset):
+            t = rows["t"].to_numpy()
+            instants = t[0] + step * np.arange(int(np.floor((t[-1] - t[0] + clock_slack(t)) / step)) + 1)
+            frame = pd.DataFrame({"t": instants, **sample(rows, instants)})
+            frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
+            # a break that stays flagged while its row is held over several instants would break each of them
+            bit = 1 << FLAGS.index(BREAK)
+            yield frame.assign(flags=frame["flags"] & np.where(np.arange(len(frame)) == 0, -1, ~bit))
+
+    return Dataset(pd.concat(list(resample()), ignore_index=True)[list(dataset.frame.columns)], dataset.metadata)

@@ -1,0 +1,357 @@
+"""A mapping: the declaration, in TOML, of what the columns of a log are and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, SerializeAsAny
+
+from shipid import document
+from shipid.data.dataset import OPTIONAL, REQUIRED, SIGNALS, STANDARD_DEVIATIONS, is_command, unit_of
+from shipid.errors import DocumentError, choices
+from shipid.logs.readers import FORMATS, Format, TextFormat
+from shipid.logs.repairs import (
+    REPAIRS,
+    Break,
+    ColumnRepair,
+    Despike,
+    HeadingOffset,
+    LeverArm,
+    Repair,
+    Strict,
+    WrapInterpolation,
+)
+
+UNITS: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "date": 1.0},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
+    "m/s": {"m/s": 1.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6},
+    "rad": {"rad": 1.0, "deg": 0.017453292519943295},
+    "rad/s": {"rad/s": 1.0, "deg/s": 0.017453292519943295, "deg/min": 0.017453292519943295 / 60.0},
+    "rev/s": {"rev/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.15915494309189535},
+}
+"""SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8).
+
+`date` is read as seconds since 1970 (UTC).
+"""
+INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
+"""Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
+REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
+ESTIMATED = ("u", "v", "r")
+
+
+class Source(Strict):
+    """Where the log is published, and the exact bytes that the mapping was written for.
+
+    With `runs`, a pattern such as `Z_*.dat`, the log is a folder in which every file of that name is one run with a
+    clock of its own, called by what the star stands for.
+    """
+
+    file: str | None = None  # relative to the data folder
+    runs: str | None = Field(default=None, pattern=r"^[^*/]*\*[^*/]*$")
+    url: str | None = None
+    sha256: str | None = Field(default=None, pattern="^[0-9a-f]{64}$")
+    citation: str | None = None
+    licence: str | None = None
+
+
+class Clock(Strict):
+    """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
+
+    With `step` [s] the rows of the dataset are that far apart, and every column comes from its own instants.
+    """
+
+    source: str = Field(alias="from")
+    unit: str = "s"
+    max_gap: float | None = Field(default=None, gt=0)
+    step: float | None = Field(default=None, gt=0)
+
+
+class FileClock(Strict):
+    """The column of time of a further file."""
+
+    source: str = Field(alias="from")
+    unit: str = "s"
+
+
+class File(Strict):
+    """A further file of the log, `path` from the folder of the log on, with its own format and clock."""
+
+    path: str
+    format: SerializeAsAny[Format] = TextFormat()
+    clock: FileClock
+
+
+class Origin(Strict):
+    """Where north and east are zero [deg]."""
+
+    latitude: float = Field(ge=-90, le=90)
+    longitude: float = Field(ge=-180, le=360)
+
+
+class Column(Strict):
+    """One column of the dataset: value = sign * factor * (source column in `unit`), then turned as declared.
+
+    Its samples were true `latency` [s] before their time; `interpolation` says how it is brought to other instants.
+    """
+
+    source: str = Field(alias="from")
+    unit: str
+    file: str | None = None
+    factor: float = 1.0
+    sign: Literal[-1, 1] = 1
+    frame: Literal["body", "earth"] = "body"
+    direction: Literal["towards", "from"] | None = None
+    relative: bool = False
+    wrap: bool = False
+    latency: float = 0.0
+    interpolation: Literal["linear", "previous", "angle"] | None = None
+
+
+class Estimate(Strict):
+    """How u, v, r that the log lacks are estimated: standard deviations of what is logged, and how fast they change.
+
+    `position` [m], `heading_deg`, `velocity` [m/s] and `rate_deg` [deg/s] are errors of one sample; `acceleration`
+    [m/s^2] and `angular_acceleration_deg` [deg/s^2] are what u, v and r change by in one second.
+    """
+
+    position: float = Field(gt=0)
+    heading_deg: float = Field(gt=0)
+    velocity: float = Field(default=0.1, gt=0)
+    rate_deg: float = Field(default=0.1, gt=0)
+    acceleration: float = Field(gt=0)
+    angular_acceleration_deg: float = Field(gt=0)
+
+
+class Segment(Strict):
+    """One run: its unique name, start and end on the log's clock, and what it is."""
+
+    run: str = Field(min_length=1)
+    start: float
+    end: float
+    manoeuvre: Literal["zigzag", "turning", "speed run", "transit"] | None = None
+
+
+class Resample(Strict):
+    """Instants `step` [s] apart from the start of every unbroken stretch."""
+
+    step: float = Field(gt=0)
+
+
+class Mapping(Strict):
+    """A whole mapping; `repair` holds parameters in SI units."""
+
+    name: str
+    vessel: str | None = None
+    source: Source = Source()
+    format: SerializeAsAny[Format] = TextFormat()
+    clock: Clock
+    file: dict[str, File] = Field(default_factory=dict)
+    origin: Origin | None = None
+    columns: dict[str, Column]
+    estimate: Estimate | None = None
+    repair: tuple[SerializeAsAny[Repair], ...] = ()
+    segment: tuple[Segment, ...] = ()
+    resample: Resample | None = None
+    digest: str
+
+    @property
+    def resamples(self) -> bool:
+        """Whether columns come from instants of their own."""
+        return self.clock.step is not None or any(column.file or column.latency for column in self.columns.values())
+
+
+def read_mapping(name: str | Path) -> Mapping:
+    """Read a bundled mapping by name, or one's own by path; raises DocumentError with file, path and remedy."""
+    file = document.find(str(name), "studies/mappings")
+    raw = document.read(file)
+    if "digest" in raw:
+        raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
+    parts: dict[str, Any] = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}
+    parts |= _formats(raw, file)
+    if isinstance(raw.get("columns"), dict):
+        parts["columns"] = {
+            key: document.parse(Column, entry, file, prefix=f"columns.{key}") for key, entry in raw["columns"].items()
+        }
+    mapping: Mapping = document.parse(Mapping, {**raw, **parts}, file)
+    _check_columns(mapping, file)
+    _check_missing(mapping, file)
+    _check_instants(mapping, file)
+    _check_segments(mapping, file)
+    clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
+    for index, repair in enumerate(mapping.repair):
+        for column in repair.columns if isinstance(repair, ColumnRepair) else ():
+            if column not in mapping.columns:
+                raise DocumentError(
+                    f"no column {column!r} to repair: {choices(column, mapping.columns)}",
+                    file=file,
+                    path=f"repair.{index}.columns",
+                )
+            if isinstance(repair, WrapInterpolation) and not mapping.columns[column].wrap:
+                message = f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair"
+                raise DocumentError(message, file=file, path=f"repair.{index}.columns")
+    converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]
+    return mapping.model_copy(update={"repair": tuple(converted)})
+
+
+def to_si(unit: str, name: str) -> float:
+    """Factor from a unit of the log to the SI unit of a column."""
+    return UNITS[str(INPUTS.get(name) or unit_of(name))][unit]
+
+
+def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
+    """[format] and [file.<name>] as models, so that an unknown key is named with the keys of that kind of format."""
+    parts: dict[str, Any] = {}
+    if isinstance(raw.get("format"), dict):
+        parts["format"] = _format(raw["format"], file, "format")
+    if isinstance(raw.get("file"), dict):
+        parts["file"] = {}
+        for key, entry in raw["file"].items():
+            inner = {} if not isinstance(entry, dict) else entry
+            form = _format(inner.get("format", {}), file, f"file.{key}.format")
+            read = {**inner, "format": form} if isinstance(entry, dict) else entry
+            parts["file"][key] = document.parse(File, read, file, prefix=f"file.{key}")
+    return parts
+
+
+def _format(raw: Any, file: Path, path: str) -> Format:
+    kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
+    if kind not in FORMATS:
+        raise DocumentError(f"unknown kind {kind!r}: {choices(kind, FORMATS)}", file=file, path=f"{path}.kind")
+    found: Format = document.parse(FORMATS[kind][0], raw, file, prefix=path)
+    return found
+
+
+def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
+    """Every [[repair]] as the model of its kind, so that an unknown key is named with the keys of that kind."""
+    if not isinstance(raw, list) or not all(isinstance(entry, dict) for entry in raw):
+        raise DocumentError("must be a list of tables: write [[repair]]", file=file, path="repair")
+    for index, entry in enumerate(raw):
+        kind = str(entry.get("kind", ""))
+        if kind not in REPAIRS:
+            raise DocumentError(f"unknown kind {kind!r}: {choices(kind, REPAIRS)}", file=file, path=f"repair.{index}")
+        yield document.parse(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
+
+
+def _check_columns(mapping: Mapping, file: Path) -> None:
+    _factor(mapping.clock.unit, "s", file, "clock.unit")
+    columns = mapping.columns
+    mapped = (*REQUIRED.keys() - {"t"}, *OPTIONAL.keys() - set(STANDARD_DEVIATIONS.values()), *INPUTS)
+    for name, column in columns.items():
+        unit, path = INPUTS.get(name) or unit_of(name), f"columns.{name}"
+        if unit is None or not (name in mapped or is_command(name)):
+            hint = f"or a command, <component>.<signal> with a signal of {', '.join(SIGNALS)}"
+            raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
+        _factor(column.unit, unit, file, f"{path}.unit")
+        if (column.direction is None) == (name == "beta_w"):
+            message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
+            raise DocumentError(message, file=file, path=f"{path}.direction")
+        if column.wrap and unit != "rad":
+            raise DocumentError("only an angle wraps", file=file, path=f"{path}.wrap")
+        if column.relative and name != "beta_w":
+            raise DocumentError("only beta_w can be relative to the bow", file=file, path=f"{path}.relative")
+    for name in sorted(column for column in columns.keys() - {"u", "v"} if columns[column].frame == "earth"):
+        raise DocumentError("only u and v can be earth-fixed", file=file, path=f"columns.{name}.frame")
+    if "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame:
+        raise DocumentError(
+            "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
+        )
+    if ("V_w" in columns) != ("beta_w" in columns):
+        raise DocumentError("wind needs both V_w and beta_w", file=file, path="columns")
+
+
+def _check_missing(mapping: Mapping, file: Path) -> None:
+    """Whether everything a dataset needs is there, converted or estimated."""
+    columns = mapping.columns
+    for name, other in REPLACED.items():
+        if name in columns and other in columns:
+            raise DocumentError(f"{other} becomes {name}: map one of them", file=file, path=f"columns.{name}")
+    for pair in (("latitude", "longitude"), ("speed", "course"), ("u", "v")):
+        missing = set(pair) - columns.keys()
+        if len(missing) == 1 and (pair != ("u", "v") or mapping.estimate is None):
+            message = f"missing: {' and '.join(pair)} belong together"
+            if pair != ("u", "v"):
+                raise DocumentError(message, file=file, path=f"columns.{missing.pop()}")
+    for name in sorted(REQUIRED.keys() - {"t"} - columns.keys()):
+        if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
+            continue
+        remedy = ", or [estimate]" if name in ESTIMATED else ""
+        raise DocumentError(
+            f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}{remedy}", file=file, path=f"columns.{name}"
+        )
+    if mapping.origin is not None and "latitude" not in columns:
+        raise DocumentError("belongs to latitude and longitude, which are not mapped", file=file, path="origin")
+    if mapping.source.runs is not None and "latitude" in columns and mapping.origin is None:
+        raise DocumentError("missing: one origin for the files of all runs", file=file, path="origin")
+    lacking = [name for name in ESTIMATED if name not in columns and REPLACED.get(name) not in columns]
+    if mapping.estimate is not None and not lacking:
+        raise DocumentError("u, v and r are all logged: nothing to estimate", file=file, path="estimate")
+    if "u" in columns and columns["u"].frame == "earth" and "v" not in columns:
+        raise DocumentError("an earth-fixed u needs v", file=file, path="columns.u.frame")
+    for index, repair in enumerate(mapping.repair):
+        moves = isinstance(repair, LeverArm) and repair.moves != "position" and not {"u", "v"} <= set(lacking)
+        if moves and "r" in lacking:
+            message = 'velocities are moved by r, which is estimated afterwards: write moves = "position"'
+            raise DocumentError(message, file=file, path=f"repair.{index}.moves")
+
+
+def _check_instants(mapping: Mapping, file: Path) -> None:
+    """Whether columns that come from other instants can be brought to those of the dataset."""
+    for name, column in mapping.columns.items():
+        path = f"columns.{name}"
+        if column.file is not None and column.file not in mapping.file:
+            message = f"no [file.{column.file}]: {choices(column.file, mapping.file)}"
+            raise DocumentError(message, file=file, path=f"{path}.file")
+        if column.interpolation == "angle" and (INPUTS.get(name) or unit_of(name)) != "rad":
+            raise DocumentError("only an angle is interpolated as one", file=file, path=f"{path}.interpolation")
+        if column.interpolation is not None and not mapping.resamples:
+            message = "nothing is brought to other instants: set [clock] step, a latency or a file"
+            raise DocumentError(message, file=file, path=f"{path}.interpolation")
+    for name, entry in mapping.file.items():
+        _factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
+    if mapping.resamples and mapping.clock.max_gap is None:
+        message = "missing: columns are brought to other instants, so say over how long a gap"
+        raise DocumentError(message, file=file, path="clock.max_gap")
+    if mapping.source.runs is not None and mapping.file:
+        raise DocumentError("one run a file, or several files a run; not both", file=file, path="source.runs")
+    if mapping.source.runs is not None and mapping.segment:
+        raise DocumentError("one run a file: remove the segments or source.runs", file=file, path="segment")
+    for index, repair in enumerate(mapping.repair):
+        if isinstance(repair, WrapInterpolation) and mapping.resamples:
+            message = "cannot see false samples after resampling: import without step, file and latency"
+            raise DocumentError(message, file=file, path=f"repair.{index}.kind")
+
+
+def _check_segments(mapping: Mapping, file: Path) -> None:
+    seen: set[str] = set()
+    for index, segment in enumerate(mapping.segment):
+        path = f"segment.{index}"
+        if segment.run in seen:
+            raise DocumentError(f"a run {segment.run!r} exists: add ' (2)'", file=file, path=f"{path}.run")
+        if not segment.start < segment.end:
+            raise DocumentError(f"start {segment.start:g} must lie before end {segment.end:g}", file=file, path=path)
+        seen.add(segment.run)
+
+
+def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
+    """Give the repair with its parameters in SI units."""
+    match repair:
+        case WrapInterpolation():
+            return repair.model_copy(update={"threshold": repair.threshold * _factor(repair.unit, "rad", file, path)})
+        case HeadingOffset():
+            return repair.model_copy(update={"offset": repair.offset * _factor(repair.unit, "rad", file, path)})
+        case Despike(unit=str(unit)):
+            factors = [_factor(unit, unit_of(name) or "", file, path) for name in repair.columns]
+            return repair.model_copy(update={"threshold": repair.threshold * factors[0]})
+        case Break():
+            intervals = tuple((clock * start, clock * end) for start, end in repair.intervals)
+            return repair.model_copy(update={"intervals": intervals})
+    return repair
+
+
+def _factor(unit: str, si: str, file: Path, path: str) -> float:
+    if unit not in UNITS[si]:
+        raise DocumentError(f"unknown unit {unit!r}: valid here: {', '.join(UNITS[si])}", file=file, path=path)
+    return UNITS[si][unit]

@@ -1,0 +1,308 @@
+"""Readers: a log as a table of columns under their own names, from text, Parquet, MATLAB or NMEA 0183.
+
+A reader is a document (how the file is written) and a function `(file, format, clock) -> table`, where `clock` names
+the column of time. Values come as they are written, text or numbers; units and meaning are the mapping's.
+"""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+import pyarrow
+import pyarrow.parquet
+from pydantic import Field, field_validator
+
+from shipid.data.dataset import Array
+from shipid.errors import DataError
+from shipid.logs.repairs import Strict
+
+DAY, HALF_DAY = 86400.0, 43200.0  # s
+
+
+class Format(Strict):
+    """What every format declares: its kind."""
+
+    kind: str = "text"
+
+
+class TextFormat(Format):
+    """Text with one separator; `names`, or `header = false` and the numbers 1, 2, ..., where it has no header line."""
+
+    separator: str = Field(default=",", min_length=1)  # one character, or "whitespace"
+    decimal: Literal[".", ","] = "."
+    encoding: str = "utf-8"
+    skip_rows: int = Field(default=0, ge=0)
+    comment: str | None = Field(default=None, min_length=1, max_length=1)
+    header: bool = True
+    names: tuple[str, ...] | None = Field(default=None, min_length=1)
+    missing: tuple[str, ...] = ("", "nan", "NaN")
+
+    @field_validator("separator")
+    @classmethod
+    def _single(cls, separator: str) -> str:
+        # pandas would take a longer one for a regular expression
+        if separator != "whitespace" and (len(separator) > 1 or not separator.isascii() or separator in '"\r\n\0'):
+            raise ValueError("must be one ASCII character but a quote or a line's end, or the word 'whitespace'")
+        return separator
+
+    @field_validator("encoding")
+    @classmethod
+    def _known(cls, encoding: str) -> str:
+        try:
+            "a".encode(encoding)  # base64 and the like are codecs, too, but not of text
+            return codecs.lookup(encoding).name
+        except (LookupError, UnicodeError):
+            raise ValueError("no such encoding of text; for example utf-8, cp1252, latin-1, utf-16") from None
+
+
+class ParquetFormat(Format):
+    """A Parquet file; its columns have names and types."""
+
+
+class MatFormat(Format):
+    """A MATLAB file up to version 7: fields of structs are `struct.field`, columns of a matrix `name.1`, `name.2`."""
+
+
+class NmeaFormat(Format):
+    """NMEA 0183 sentences; `time` is of the last fix, or a number or ISO date before each sentence (`"line"`)."""
+
+    time: Literal["fix", "line"] = "fix"
+
+
+def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
+    """Read a log as its format says; `attrs["unreadable"]` counts the lines that were passed over.
+
+    Raises
+    ------
+    DataError : with the log, the key of the format or the row, and what would be right.
+    """
+    try:
+        if file.stat().st_size == 0:
+            raise DataError("the file is empty", file=file)
+        table: pd.DataFrame = FORMATS[form.kind][1](file, form, clock)
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror})", file=file) from None
+    if len(table) < 2:
+        raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
+    return table
+
+
+def seconds(dates: pd.Series[Any]) -> Array:
+    """Dates in ISO 8601 or of pandas as seconds since 1970 (UTC where no zone is said); NaN where there is none."""
+    moments = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
+    since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
+    return np.array(since, dtype=np.float64)
+
+
+def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
+    """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
+    with file.open("rb") as stream:
+        if b"\0" in stream.read(4096) and not form.encoding.startswith(("utf-16", "utf-32")):
+            raise DataError(
+                "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding",
+                file=file,
+                path="format.encoding",
+            )
+    try:
+        table = pd.read_csv(
+            file,
+            sep=r"\s+" if form.separator == "whitespace" else form.separator,
+            encoding=form.encoding,
+            skiprows=form.skip_rows,
+            comment=form.comment,
+            header=None,
+            dtype=str,
+            keep_default_na=False,
+        )
+    except UnicodeDecodeError as error:
+        message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
+        raise DataError(message, file=file, path="format.encoding") from None
+    except pd.errors.EmptyDataError:
+        message = f"nothing is left after {form.skip_rows} skipped lines"
+        raise DataError(message, file=file, path="format.skip_rows") from None
+    except (pd.errors.ParserError, ValueError) as error:
+        message = f"not a table with this separator ({error}): check separator and skip_rows"
+        raise DataError(message, file=file, path="format.separator") from None
+    if form.names is not None and len(form.names) != table.shape[1]:
+        message = f"{len(form.names)} names for the {table.shape[1]} columns of the log"
+        raise DataError(message, file=file, path="format.names")
+    if form.names is not None:
+        table.columns = pd.Index(form.names)
+    elif form.header:
+        table.columns = pd.Index([str(name).strip() for name in table.iloc[0]])
+        table = table.iloc[1:].reset_index(drop=True)
+    else:
+        table.columns = pd.Index([str(number + 1) for number in range(table.shape[1])])
+    return table
+
+
+def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
+    try:
+        table: pd.DataFrame = pyarrow.parquet.read_table(file).to_pandas(ignore_metadata=True)  # an index is a column
+        return table
+    except (pyarrow.ArrowException, ValueError):
+        raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None
+
+
+def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
+    """Vectors of a MATLAB file that are as long as the clock."""
+    from scipy.io import loadmat
+
+    try:
+        vectors = dict(_vectors(loadmat(file, simplify_cells=True)))
+    except NotImplementedError:
+        message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
+        raise DataError(message, file=file, path="format.kind") from None
+    except Exception as error:  # scipy has no error of its own: damaged files end in any of a dozen
+        message = f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind"
+        raise DataError(message, file=file, path="format.kind") from None
+    length = len(vectors.get(clock, max(vectors.values(), key=len, default=np.empty(0))))
+    return pd.DataFrame({name: values for name, values in vectors.items() if len(values) == length})
+
+
+def _vectors(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
+    """Dotted name and values of every numeric vector, structs and matrices opened."""
+    for key, value in variables.items():
+        name = f"{prefix}{key}"
+        if key.startswith("__"):
+            continue
+        if isinstance(value, dict):
+            yield from _vectors(value, f"{name}.")
+        elif isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
+            if value.ndim == 1:
+                yield name, value.astype(float)
+            elif value.ndim == 2:
+                yield from (
+                    (f"{name}.{column + 1}", value[:, column].astype(float)) for column in range(value.shape[1])
+                )
+
+
+def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
+    """Sentences as rows: `time` [s] and what `SENTENCES` names, NaN where a sentence does not say it."""
+    import pynmea2
+
+    rows: list[dict[str, float]] = []
+    unreadable, clock = 0, _Clock()
+    for number, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
+        stamp, dollar, body = line.partition("$")
+        if not line.strip():
+            continue
+        try:
+            sentence = pynmea2.parse(dollar + body.strip(), check=True) if dollar else None
+            found = _said(sentence)
+        except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError):
+            sentence = None
+        if sentence is None:
+            unreadable += 1
+            continue
+        if form.time == "line":
+            rows.append({"time": _stamp(stamp, file, number), **found})
+            continue
+        clock.read(getattr(sentence, "timestamp", None))
+        if clock.now is not None:  # before the first fix nobody knows the time
+            rows.append({"time": clock.now, **found})
+    if not rows:
+        message = f"no NMEA 0183 sentence with a time in {unreadable} unreadable lines: set [format] kind or time"
+        raise DataError(message, file=file, path="format.kind")
+    table = pd.DataFrame(rows).reindex(columns=["time", *NMEA_COLUMNS])
+    again = table["time"].ne(table["time"].shift()).cumsum()  # sentences of one instant are one row
+    table = table.groupby(again).first().reset_index(drop=True)
+    table.attrs["unreadable"] = unreadable
+    return table
+
+
+class _Clock:
+    """Seconds since the midnight before the first fix, over further midnights."""
+
+    def __init__(self) -> None:
+        self.now: float | None = None
+
+    def read(self, fix: Any) -> None:
+        if not hasattr(fix, "hour"):
+            return
+        seconds = 3600.0 * fix.hour + 60.0 * fix.minute + fix.second + 1e-6 * fix.microsecond
+        if self.now is None:
+            self.now = seconds
+            return
+        midnight = DAY * (self.now // DAY)
+        if seconds + midnight < self.now - HALF_DAY:
+            midnight += DAY
+        self.now = midnight + seconds
+
+
+def _stamp(text: str, file: Path, row: int) -> float:
+    """Time before a sentence: a number, or a date in ISO 8601 as seconds since 1970."""
+    words = text.strip().rstrip(",;")
+    try:
+        return float(words)
+    except ValueError:
+        try:
+            moment = pd.Timestamp(words)
+            moment = moment if moment.tzinfo else moment.tz_localize("UTC")
+            return moment.timestamp()
+        except (ValueError, AttributeError):
+            message = f"no number and no date before the sentence ({words[:30]!r}): set [format] time = 'fix'"
+            raise DataError(message, file=file, path=f"row {row}") from None
+
+
+def _said(sentence: Any) -> dict[str, float]:
+    """What a sentence says, by name of column; an invalid fix (RMC, GLL: V; GGA: quality 0) says nothing."""
+    kind = getattr(sentence, "sentence_type", "")
+    if getattr(sentence, "status", "A") == "V" or str(getattr(sentence, "gps_qual", 1)) == "0":
+        return {}
+    values = {name: read(sentence) for name, read in SENTENCES.get(kind, {}).items()}
+    return {name: float(value) for name, value in values.items() if value not in (None, "")}
+
+
+def _position(name: str) -> Callable[[Any], Any]:
+    """Decimal degrees; nothing where the field is empty (the parser would say 0)."""
+    return lambda sentence: getattr(sentence, name) if getattr(sentence, name[:3]) else None
+
+
+def _apparent(name: str) -> Callable[[Any], Any]:
+    return lambda sentence: getattr(sentence, name) if sentence.reference == "R" else None
+
+
+def _engine(*numbers: str) -> Callable[[Any], Any]:
+    return lambda sentence: sentence.speed if sentence.engine_no in numbers else None
+
+
+def _speed(sentence: Any) -> Any:
+    """Apparent wind speed [m/s] from N (knots), K (km/h) or M (m/s)."""
+    if sentence.reference != "R" or not sentence.wind_speed:
+        return None
+    factor = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
+    return None if factor is None else float(sentence.wind_speed) * factor
+
+
+SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
+    "GGA": {"latitude": _position("latitude"), "longitude": _position("longitude")},
+    "GLL": {"latitude": _position("latitude"), "longitude": _position("longitude")},
+    "RMC": {
+        "latitude": _position("latitude"),
+        "longitude": _position("longitude"),
+        "sog": lambda s: s.spd_over_grnd,
+        "cog": lambda s: s.true_course,
+    },
+    "VTG": {"sog": lambda s: s.spd_over_grnd_kts, "cog": lambda s: s.true_track},
+    "HDT": {"heading": lambda s: s.heading},
+    "ROT": {"rot": lambda s: s.rate_of_turn},
+    "RSA": {"rudder": lambda s: s.rsa_starboard, "rudder_port": lambda s: s.rsa_port},
+    "RPM": {"rpm": _engine("0", "1"), "rpm_2": _engine("2")},
+    "MWV": {"apparent_angle": _apparent("wind_angle"), "apparent_speed": _speed},
+    "MWD": {"wind_from": lambda s: s.direction_true, "wind_speed": lambda s: s.wind_speed_meters},
+}
+"""Sentence -> column -> how it is read: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
+NMEA_COLUMNS = tuple(dict.fromkeys(name for columns in SENTENCES.values() for name in columns))
+
+FORMATS: dict[str, tuple[type[Format], Callable[[Path, Any, str], pd.DataFrame]]] = {
+    "text": (TextFormat, _text),
+    "parquet": (ParquetFormat, _parquet),
+    "mat": (MatFormat, _mat),
+    "nmea": (NmeaFormat, _nmea),
+}

@@ -1,0 +1,140 @@
+"""Cut a recording into manoeuvres: zigzags, turnings, speed runs and transits, by helm, heading and shaft speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Array, Dataset, is_command, pieces
+from shipid.logs.mapping import Segment
+
+HELM = np.radians(3.0)  # rad: less is steering a course
+TURN = np.radians(120.0)  # rad of heading over one helm: a turning, not a leg of a zigzag
+LEAD, FEWEST_LEGS = 10.0, 3  # s before the first order; legs of a zigzag
+SHORT, LONGEST_PAUSE = 4.0, 0.6  # s; of the leg before: helm amidships for longer ends a zigzag
+STRAIGHT = 60.0  # s
+CHANGE = 0.12  # of the shaft speed: a speed run
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Rows first to last with the helm on one side: 1, -1, or 0 amidships."""
+
+    side: int
+    first: int
+    last: int
+
+
+def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
+    """Manoeuvres of every run in the order of time, with names that are unique; a draft for a person to correct.
+
+    Parameters
+    ----------
+    dataset : whole recordings; one run a manoeuvre gives that manoeuvre.
+    unit : of the log's clock [s], in which starts and ends are given.
+    """
+    found = []
+    for _, rows in pieces(dataset):
+        t = rows["t"].to_numpy() / unit
+        found += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
+    counts: dict[str, int] = {}
+    segments = []
+    for kind, start, end in found:
+        counts[kind] = counts.get(kind, 0) + 1
+        segments.append(Segment(run=f"{kind} {counts[kind]}", start=start, end=end, manoeuvre=kind))  # type: ignore[arg-type]
+    return segments
+
+
+def kind_of(rows: pd.DataFrame) -> str:
+    """What a whole run mostly is."""
+    t = rows["t"].to_numpy()
+    spans: dict[str, float] = {}
+    for kind, (first, last) in _of_stretch(rows):
+        spans[kind] = spans.get(kind, 0.0) + float(t[last] - t[first])
+    return max(spans, key=lambda kind: spans[kind], default="transit")
+
+
+def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
+    """Kind, and first and last row, of every manoeuvre in one unbroken stretch."""
+    t, psi = rows["t"].to_numpy(), np.unwrap(rows["psi"].to_numpy())
+    if len(t) < 3:
+        return
+    legs = _legs(_helm(rows), t)
+    index, start = 0, 0
+    while index < len(legs):
+        leg = legs[index]
+        size = _zigzag(legs[index:], psi, t)
+        if size:
+            kind, last = "zigzag", legs[index + size - 1].last
+            index += size
+        elif leg.side and abs(psi[leg.last] - psi[leg.first]) >= TURN:
+            kind, last = "turning", leg.last
+            index += 1
+        else:
+            index += 1
+            continue
+        first = max(start, int(np.searchsorted(t, t[leg.first] - LEAD)))
+        yield from _straight(rows, start, first)
+        yield kind, (first, last)
+        start = last
+    yield from _straight(rows, start, len(t) - 1)
+
+
+def _helm(rows: pd.DataFrame) -> Array:
+    """Mean steering angle [rad], about its median in the straightest rows; yaw rate in its place if none is logged."""
+    names = [name for name in map(str, rows.columns) if is_command(name) and not name.endswith(".n")]
+    if not names:
+        r = rows["r"].to_numpy()
+        return np.asarray(r / max(float(np.percentile(np.abs(r), 95)), 1e-9) * 4 * HELM)
+    helm = rows[names].to_numpy().mean(axis=1)
+    small = helm[np.abs(helm) < HELM]
+    return np.asarray(helm - (np.median(small) if len(small) else 0.0))
+
+
+def _legs(helm: Array, t: Array) -> list[Leg]:
+    """Stretches with the helm on one side; those shorter than a few seconds join what is before them."""
+    side = np.where(np.abs(helm) >= HELM, np.sign(helm), 0.0).astype(int)
+    short = min(SHORT, (t[-1] - t[0]) / 50)
+    legs: list[Leg] = []
+    edges = [0, *(np.flatnonzero(np.diff(side)) + 1), len(side)]
+    for first, end in pairwise(edges):
+        last = min(end, len(t) - 1)
+        if legs and (t[last] - t[first] < short or legs[-1].side == side[first]):
+            legs[-1] = Leg(legs[-1].side, legs[-1].first, last)
+        else:
+            legs.append(Leg(int(side[first]), int(first), int(last)))
+    return legs
+
+
+def _zigzag(legs: list[Leg], psi: Array, t: Array) -> int:
+    """How many legs from here on are one zigzag: helm from side to side, amidships but briefly; 0 if it is none."""
+    sides: list[Leg] = []
+    size = 0
+    for index, leg in enumerate(legs):
+        long = t[leg.last] - t[leg.first]
+        if leg.side == 0:
+            if not sides or long > LONGEST_PAUSE * (t[sides[-1].last] - t[sides[-1].first]):
+                break
+            continue
+        if abs(psi[leg.last] - psi[leg.first]) >= TURN or (sides and leg.side == sides[-1].side):
+            break
+        sides.append(leg)
+        size = index + 1
+    return size if len(sides) >= FEWEST_LEGS else 0
+
+
+def _straight(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, tuple[int, int]]]:
+    """What lies between manoeuvres: a speed run if the shaft changes speed, a transit if not; nothing if short."""
+    t = rows["t"].to_numpy()
+    if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
+        return
+    part = rows.iloc[first : last + 1]
+    shafts = [name for name in map(str, rows.columns) if is_command(name) and name.endswith(".n")]
+    watched = part[shafts or ["u"]]  # the ship's own speed changes after every turn, too
+    change = watched.quantile(0.98) - watched.quantile(0.02)
+    moved = bool((change > CHANGE * watched.abs().median().clip(lower=1e-9)).any())
+    yield ("speed run" if moved else "transit"), (first, last)

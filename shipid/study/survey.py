@@ -1,0 +1,129 @@
+"""What a dataset holds, run by run, and which of its runs are typical: what a study of it is chosen from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.checks import check_dataset
+from shipid.data.dataset import Dataset, cumulative_integral, pieces
+from shipid.logs.segments import kind_of
+
+KINDS = ("zigzag", "turning")
+OF_A_KIND = 3  # runs of a kind from which one may be set aside
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the choices are made from.
+
+    runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind`, `speed` [m/s], `rate` [rad/s]
+        (RMS of r), `helm` [rad] (spread of the angles), `whole`, `sound` (passes its checks, `path` apart), `straying`
+        (fails `path`).
+    step : usual time between rows [s].
+    factor : positions over integrated velocities, the best complex factor; its angle is a turn.
+    """
+
+    runs: pd.DataFrame
+    step: float
+    factor: complex
+
+    @property
+    def speed(self) -> float:
+        """Median of the runs' mean speeds [m/s]."""
+        return float(self.runs["speed"].median())
+
+
+def survey(dataset: Dataset) -> Survey:
+    """Look at every run of a dataset: how long, how fast, what manoeuvre, in which order."""
+    stretches: dict[str, list[pd.DataFrame]] = {}
+    for run, rows in pieces(dataset):
+        stretches.setdefault(run, []).append(rows)
+    checks = check_dataset(dataset)
+    failed = checks[~checks["ok"].astype(bool)]
+    straying = set(failed.loc[failed["check"] == "path", "run"])
+    unsound = set(failed.loc[failed["check"] != "path", "run"])
+    declared = dataset.metadata.get("manoeuvres", {})
+    found = {}
+    for run, parts in stretches.items():
+        longest = max(parts, key=lambda part: part["t"].iloc[-1] - part["t"].iloc[0])
+        t = longest["t"].to_numpy()
+        angles = longest[[name for name in dataset.commands if not name.endswith(".n")]]
+        found[run] = {
+            "duration": float(t[-1] - t[0]),
+            "kind": declared.get(run) or kind_of(longest),
+            "speed": float(np.hypot(longest["u"], longest["v"]).mean()),
+            "rate": float(np.sqrt((longest["r"] ** 2).mean())),
+            "helm": float(angles.std(ddof=0).mean()) if angles.shape[1] else 0.0,
+            "whole": len(parts) == 1,
+            "sound": run not in unsound,
+            "straying": run in straying,
+        }
+    steps = np.concatenate([np.diff(part["t"]) for parts in stretches.values() for part in parts])
+    step = float(np.median(steps)) if len(steps) else 1.0
+    return Survey(pd.DataFrame(list(found.values()), index=list(found)), step, _factor(dataset))
+
+
+def _factor(dataset: Dataset) -> complex:
+    """Least-squares factor from what u, v, psi say was run in each second or row, to what positions say."""
+    run, seen = [], []
+    for _, rows in pieces(dataset):
+        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
+        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
+        position = rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
+        run.append((velocity[1:] + velocity[:-1]) / 2 * np.diff(t))
+        seen.append(np.diff(position))
+    ran, was = np.concatenate(run), np.concatenate(seen)
+    size = float(np.vdot(ran, ran).real)
+    return complex(np.vdot(ran, was) / size) if size > 0 else 1.0 + 0.0j
+
+
+def separation(dataset: Dataset, lag: float) -> float:
+    """RMS distance [m] by which positions and integrated velocities part within a lag [s]; 0 where no run is so long.
+
+    Jitter of the positions does not grow with the lag, errors of the velocities do.
+    """
+    parted = []
+    for _, rows in pieces(dataset):
+        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
+        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
+        run = cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag)
+        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - run
+        early = t <= t[-1] - lag
+        parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
+    every = np.abs(np.concatenate(parted))
+    return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
+
+
+def helm_sense(dataset: Dataset) -> dict[str, float]:
+    """Correlation of every angle command that moves with the yaw acceleration that follows: > 0 turns to starboard."""
+    found: dict[str, float] = {}
+    for name in (name for name in dataset.commands if not name.endswith(".n")):
+        pairs = [(rows[name].to_numpy()[:-1], np.diff(rows["r"])) for _, rows in pieces(dataset)]
+        angle, change = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        size = float(np.linalg.norm(angle) * np.linalg.norm(change))
+        if size > 0:
+            found[name] = float(angle @ change) / size
+    return found
+
+
+def typical_runs(runs: pd.DataFrame) -> list[str]:
+    """Typical runs: from each kind that turns the ship and has three runs or more, the one in the middle.
+
+    In the middle: of speed, yaw rate and helm over the runs of the kind; neither broken, suspicious nor the longest.
+    """
+    groups = [group for kind in KINDS if len(group := runs[runs["kind"] == kind]) >= OF_A_KIND]
+    return [_middle(group) for group in groups if len(groups) == 1 or len(runs) > 2 * OF_A_KIND] or [_middle(runs)]
+
+
+def _middle(runs: pd.DataFrame) -> str:
+    allowed = runs
+    for mask in (runs["sound"], runs["whole"], runs["duration"] < runs["duration"].max()):
+        left = allowed[mask.reindex(allowed.index)]
+        allowed = left if len(left) else allowed
+    looked_at = ["speed", "rate", "helm"]
+    middle = runs[looked_at].median()
+    spread = (runs[looked_at] - middle).abs().median().clip(lower=1e-9 + 0.05 * middle.abs())
+    return str((((allowed[looked_at] - middle) / spread) ** 2).sum(axis=1).idxmin())

@@ -1,0 +1,12 @@
+"""Factors from a unit that people read to SI: multiply by one to enter SI, divide by it to leave."""
+
+import math
+
+RPM = 1.0 / 60.0
+"""Revolutions per second in one revolution per minute."""
+DEGREE = math.pi / 180.0
+"""Radians in one degree; also rad/s in one deg/s."""
+KNOT = 1852.0 / 3600.0
+"""Metres per second in one knot (the international nautical mile is 1,852 m)."""
+MINUTE = 60.0
+"""Seconds in one minute."""

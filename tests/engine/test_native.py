@@ -1,0 +1,196 @@
+"""The native engine: operations, groups and remainders, its cache, and what it says where it cannot work."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.engine import native
+from shipid.engine.integrate import Batch
+from shipid.engine.native import Target, compiler, run_native, target
+from shipid.engine.rollout import distances, rollout
+from shipid.errors import ShipidError
+from shipid.metrics import position_error, tally
+from shipid.vessel import dynamics as module
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from tests.engine.operations import operations
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+SHIP = load_vessel("gunnerus-28.9")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    native._library.cache_clear()
+    yield tmp_path / "cache" / "shipid"
+    native._library.cache_clear()
+
+
+@pytest.mark.parametrize("wanted", ["here", "one lane at a time"])
+def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step of 1 s from rates that are the operations; with vector functions, and without."""
+    if wanted != "here":
+        monkeypatch.setattr(native, "target", lambda: Target(2, (), ""))
+    x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
+    values, model = operations(x[0], x[1], p[0] / 4e5), dynamics(SHIP)
+    sizes = [("memory", 0), ("commands", 4), ("environment", 2)]
+    middle = [ca.SX.sym(name, size) for name, size in sizes]
+    tau = ca.SX.sym("tau_extra", 3)
+    names = [*module.INPUTS, "tau_extra"]
+    rng = np.random.default_rng(0)
+    start = rng.uniform(-2, 2, (6, 21))
+    start[0, :2] = start[1, :2]
+    parameters = np.array([list(SHIP.parameters.values())])
+    batch = Batch(
+        start, np.zeros((0, 21)), np.zeros((1, 4, 21)), np.zeros((1, 2, 21)), np.zeros((1, 3, 21)), parameters
+    )
+    for first in range(0, len(values), 6):
+        part = ca.vertcat(*(values[first : first + 6] + [ca.SX(0)] * 6)[:6])
+        rates = ca.Function("rates", [x, *middle, p, tau], [ca.densify(part)], names, ["rates"])
+        found, _ = run_native(replace(model, rates=rates), batch, 1.0, 1, "euler", 1, list(range(6)))
+        expected = np.hstack(
+            [np.array(rates(start[:, k], [], [0] * 4, [0] * 2, parameters[0], [0] * 3)) for k in range(21)]
+        )
+        np.testing.assert_allclose(found[1, 0].T - start, expected, rtol=1e-12, atol=1e-13, err_msg=str(first))
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
+def test_groups_and_remainders(count: int, draw_inputs: Callable[..., Any]) -> None:
+    """A sample's numbers do not depend on who shares its vector or its thread."""
+    given = draw_inputs(SHIP, 70)
+    options: dict[str, Any] = {"step": 1.0, "num_steps": 5, "engine": "native"}
+    whole = rollout(SHIP, **given, **options).states
+    part = {group: {name: values[:count] for name, values in columns.items()} for group, columns in given.items()}
+    np.testing.assert_array_equal(rollout(SHIP, **part, **options).states, whole[:, :, :count])
+
+
+def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]) -> None:
+    """Another variant, size or number of steps needs no compilation; another step or method does."""
+
+    def run(step: float, method: Any, count: int) -> None:
+        rollout(SHIP, **draw_inputs(SHIP, count), step=step, num_steps=4, method=method, engine="native")
+        native._library.cache_clear()  # as a new process would find it
+
+    run(1.0, "euler", 3)
+    (made,) = own_cache.iterdir()
+    before = made.stat().st_mtime_ns
+    run(1.0, "euler", 30)
+    assert [entry.stat().st_mtime_ns for entry in own_cache.iterdir()] == [before]
+    run(0.5, "euler", 3)
+    run(1.0, "rk4", 3)
+    assert len(list(own_cache.iterdir())) == 3
+
+
+def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
+    monkeypatch.setattr(native, "compiler", lambda: None)
+    with pytest.raises(ShipidError, match="install gcc, or use 'torch'"):
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
+
+
+def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
+    monkeypatch.setattr(native, "target", lambda: replace(target(), flags=("-mno-such-processor",)))
+    with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
+    assert "\n" not in str(caught.value)
+
+
+def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
+    with pytest.raises(ShipidError, match="runs on the CPU"):
+        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native", device="cuda")
+
+
+def test_a_broken_library_is_made_anew(
+    own_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    """What a full disk left behind, found by a later process: here another cache, as a loaded file stays loaded."""
+
+    def run() -> np.ndarray:
+        native._library.cache_clear()
+        return rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").states
+
+    sound = run()
+    (library,) = own_cache.iterdir()
+    broken = tmp_path / "other" / "shipid" / library.name
+    broken.parent.mkdir(parents=True)
+    broken.write_bytes(b"")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
+    np.testing.assert_array_equal(run(), sound)
+    assert broken.stat().st_size > 0
+
+
+def test_threads_may_make_the_same_library_at_once(own_cache: Path) -> None:
+    """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
+    model = dynamics(SHIP)
+    with ThreadPoolExecutor(3) as pool:
+        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler") for _ in range(3)]:
+            future.result()
+    assert len(list(own_cache.iterdir())) == 1
+
+
+def test_a_cache_that_cannot_be_written_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert not rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").diverged.any()
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
+@pytest.mark.parametrize("num_variants", [1, 3])
+def test_distances_are_those_of_the_paths(count: int, num_variants: int, draw_inputs: Callable[..., Any]) -> None:
+    """Summed and tallied on the way, in vectors with filling that must not be counted."""
+    given = draw_inputs(SHIP, count)
+    rng = np.random.default_rng(0)
+    goal = rng.uniform(-9, 9, (5, count, 2))
+    parameters = np.array(list(SHIP.parameters.values())) * rng.uniform(0.9, 1.1, (num_variants, 1))
+    options: dict[str, Any] = {"step": 1.0, "parameters": parameters}
+    paths = rollout(SHIP, **given, num_steps=5, keep=("north", "east"), engine="casadi", **options)
+    expected = [position_error(paths.states[1:, own], goal) for own in range(num_variants)]
+    for engine in ("native", "casadi"):
+        found = distances(SHIP, goal=goal, **given, engine=engine, **options)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found.total, [own.sum(axis=0) for own in expected], rtol=1e-12)
+        np.testing.assert_array_equal(found.tally, [tally(own) for own in expected])
+        assert not found.diverged.any()
+
+
+def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any]) -> None:
+    given = draw_inputs(SHIP, 11)
+    goal = np.zeros((5, 11, 2))
+    sound = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
+    given["start"]["u"] = np.where(np.arange(11) == 4, np.nan, given["start"]["u"])
+    harmed = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
+    others = np.arange(11) != 4
+    assert (harmed.diverged[0] == ~others).all()
+    np.testing.assert_array_equal(harmed.total[:, others], sound.total[:, others])
+    assert harmed.tally.sum() == sound.tally.sum() == 55
+
+
+def test_an_interrupt_leaves_no_thread_at_work(
+    monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+) -> None:
+    """What another thread has begun it ends; nothing new is begun."""
+    run = native._library(dynamics(SHIP), 1.0, "euler")
+    calls: list[int] = []
+
+    def interrupted(*arguments: Any) -> None:
+        calls.append(1)
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        run(*arguments)
+
+    parameters = np.tile(list(SHIP.parameters.values()), (5000, 1))
+    with monkeypatch.context() as patch:
+        patch.setattr(native, "_library", lambda *_: interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            rollout(SHIP, **draw_inputs(SHIP, 8), step=1.0, num_steps=2, parameters=parameters, engine="native")
+    assert len(calls) < 5000

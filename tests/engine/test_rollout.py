@@ -1,0 +1,297 @@
+"""Rollouts of every vessel: laws of the path, order of the integrators, what comes in and what is refused."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.engine.casadi import memory_along
+from shipid.engine.integrate import Method
+from shipid.engine.rollout import rollout
+from shipid.errors import DataError, ShipidError
+from shipid.interrupts import uninterrupted
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import Family, members
+from tests.conftest import pace
+
+Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
+LAG = {"kind": "first_order", "T": 2.0, "rate": 1e3}
+
+
+def zeros(names: tuple[str, ...], num_samples: int = 1) -> dict[str, np.ndarray]:
+    return {name: np.zeros(num_samples) for name in names}
+
+
+def test_turning_the_chart_turns_the_path(vessel: Vessel, draw_inputs: Draw) -> None:
+    """Frame invariance: heading, start, wind and current turned by an angle give the same path, turned."""
+    angle, given = 1.234, draw_inputs(vessel, 4)
+    turned = {group: dict(values) for group, values in given.items()}
+    north, east = given["start"]["north"], given["start"]["east"]
+    turned["start"]["north"] = north * np.cos(angle) - east * np.sin(angle)
+    turned["start"]["east"] = north * np.sin(angle) + east * np.cos(angle)
+    turned["start"]["psi"] = given["start"]["psi"] + angle
+    for name in ("beta_w", "beta_c"):
+        if name in turned["environment"]:
+            turned["environment"][name] = given["environment"][name] + angle
+    first, second = (rollout(vessel, **inputs, step=0.5, num_steps=20) for inputs in (given, turned))
+    north, east = first["north"], first["east"]
+    np.testing.assert_allclose(second["north"], north * np.cos(angle) - east * np.sin(angle), atol=1e-8)
+    np.testing.assert_allclose(second["east"], north * np.sin(angle) + east * np.cos(angle), atol=1e-8)
+    np.testing.assert_allclose(second["psi"], first["psi"] + angle, atol=1e-10)
+    for name in ("u", "v", "r"):
+        np.testing.assert_allclose(second[name], first[name], atol=1e-10)
+    assert not first.diverged.any()
+
+
+def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> None:
+    """Of a ship whose screw, if there is but one, works alike on both sides."""
+    values = bundled_vessel.parameters
+    alike = {path: values[path.removesuffix("_minus") + "_plus"] for path in values if path.endswith("_minus")}
+    vessel = bundled_vessel.with_values(alike)
+    model = dynamics(vessel)
+    start = zeros(model.state, 2) | {"u": np.full(2, 4.0)}
+    angle = np.array([0.5, -0.5])
+    commands = {name: np.full(2, 2.5) if name.endswith(".n") else angle for name in model.commands}
+    weather = {"V_w": np.full(2, 6.0), "beta_w": np.array([0.8, -0.8])}
+    environment = {name: weather[name] for name in model.environment}
+    found = rollout(vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
+    for name, sign in (("north", 1), ("east", -1), ("psi", -1), ("u", 1), ("v", -1), ("r", -1)):
+        np.testing.assert_allclose(found[name][..., 1], sign * found[name][..., 0], rtol=1e-9, atol=1e-9)
+    to_starboard = 1 if "rudder.delta" in commands else -1  # delta > 0 turns there, alpha > 0 to port
+    assert to_starboard * found["psi"][-1, 0, 0] > 0.5
+
+
+def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
+    """From anywhere in the envelope with u >= 0, shafts stopped, no wind: no start gains, all fade within 10 minutes.
+
+    Not from step to step: once a ship has come to drift astern, a polynomial hull may gain a little for a while.
+    """
+    if "abkowitz" in bundled_vessel.document["hull"]:
+        pytest.skip("a polynomial about one speed says nothing of a ship that stops")
+    u, v, r = (x.ravel() for x in np.meshgrid([0.5, 3.0, 6.0], [-1.0, 0.2, 1.0], [-0.13, 0.02, 0.13]))
+    model = dynamics(bundled_vessel)
+    start = zeros(model.state, len(u)) | {"u": u, "v": v, "r": r}
+    held = zeros(model.commands, len(u)), zeros(model.environment, len(u))
+    found = rollout(bundled_vessel, start, *held, step=0.5, num_steps=1200, every=120, method="rk4")
+    energy = 0.5 * (found["u"] ** 2 + found["v"] ** 2 + 70 * found["r"] ** 2)[:, 0]  # r_66^2 = 70 m^2
+    assert not found.diverged.any()
+    assert (energy <= energy[0]).all()
+    assert (energy[-1] < 0.35 * energy[0]).all()
+    assert np.hypot(found["u"], found["v"])[-1].max() < 0.7
+
+
+def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, seed: int = 7) -> np.ndarray:
+    """State after 8 s of the ordinary ship: smooth, one side of every kink (rates and drift keep their sign)."""
+    given, slow = draw_inputs(vessel, 3, seed), pace(vessel)
+    given["start"] |= {"u": np.full(3, 3.0 * slow), "v": np.full(3, 0.4 * slow), "r": np.full(3, -0.05)}
+    commands = {name: np.full(3, 0.7 if name.endswith("alpha") else 2.0) for name in given["commands"]}
+    environment = {name: np.zeros(3) for name in given["environment"]}
+    memory = {name: np.full(3, 0.6 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
+    found = rollout(
+        vessel,
+        given["start"],
+        commands,
+        environment,
+        step=step * slow,
+        num_steps=round(8 / step),
+        method=method,
+        memory=memory,
+    )
+    return found.states[-1, 0, :, : 2 * len(vessel.axes)]
+
+
+def smooth(vessel: Vessel) -> Vessel:
+    """The lag without its rate limit, a kink that no order survives, and not shorter than a step resolves."""
+    lags = {path: value for path, value in vessel.parameters.items() if ".actuator." in path}
+    limits = {path: 1e3 if path.endswith(".rate") else max(value, 1.0) for path, value in lags.items()}
+    calm = {"wind.off": True} if "wind" in vessel.document else {}
+    return vessel.with_values({**calm, **limits})
+
+
+@pytest.mark.parametrize(("method", "order", "step"), [("euler", 1, 0.25), ("rk4", 4, 1.0)])
+def test_order_of_the_integrator(vessel: Vessel, draw_inputs: Draw, method: Method, order: int, step: float) -> None:
+    """Halving the step divides the error by 2^order, also with lagged actuators and held commands."""
+    calm = smooth(vessel)
+    exact = last_state(calm, draw_inputs, "rk4", 1 / 32)
+    errors = [np.abs(last_state(calm, draw_inputs, method, step / 2**k) - exact).max(axis=1) for k in range(3)]
+    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink of its own
+    assert np.abs(orders - order).min() < 0.35
+    assert orders[-1] == pytest.approx(order, abs=0.5)
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+@pytest.mark.parametrize("method", ["euler", "rk4"])
+def test_repeated_arrays_are_held_ones(vessel: Vessel, draw_inputs: Draw, engine: Any, method: Method) -> None:
+    given = draw_inputs(vessel, 3)
+    options: dict[str, Any] = {"step": 0.5, "num_steps": 8, "engine": engine, "method": method}
+    held = rollout(vessel, **given, **options)
+    repeated = {
+        "start": given["start"],
+        "commands": {name: np.tile(value, (8, 1)) for name, value in given["commands"].items()},
+        "environment": {name: np.tile(value, (8, 1)) for name, value in given["environment"].items()},
+    }
+    np.testing.assert_array_equal(rollout(vessel, **repeated, **options).states, held.states)
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+def test_commands_act_from_step_to_step(draw_inputs: Draw, engine: Any) -> None:
+    """A horizon in one piece equals two pieces joined by hand, commands changing in between."""
+    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
+    first, second = draw_inputs(vessel, 3, seed=1), draw_inputs(vessel, 3, seed=2)
+    options: dict[str, Any] = {"step": 0.5, "engine": engine}
+    one = rollout(vessel, **first, num_steps=6, **options)
+    joined = {name: one[name][-1, 0] for name in dynamics(vessel).state}
+    two = rollout(
+        vessel,
+        joined,
+        second["commands"],
+        first["environment"],
+        memory={"port.n": one["actual.port.n"][-1, 0]},
+        num_steps=4,
+        **options,
+    )
+    changing = {
+        n: np.vstack([np.tile(first["commands"][n], (6, 1)), np.tile(second["commands"][n], (4, 1))])
+        for n in first["commands"]
+    }
+    whole = rollout(vessel, first["start"], changing, first["environment"], num_steps=10, **options)
+    np.testing.assert_allclose(whole.states[6:], two.states, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(whole.states[:7], one.states, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+def test_every_thins_out_records(vessel: Vessel, draw_inputs: Draw, engine: Any) -> None:
+    given = draw_inputs(vessel, 2)
+    dense = rollout(vessel, **given, step=0.5, num_steps=12, engine=engine)
+    thin = rollout(vessel, **given, step=0.5, num_steps=12, every=4, keep=["u", "north"], engine=engine)
+    np.testing.assert_array_equal(thin["u"], dense["u"][::4])
+    np.testing.assert_array_equal(thin["north"], dense["north"][::4])
+    assert (thin.interval, thin.names, thin.states.shape) == (2.0, ("u", "north"), (4, 1, 2, 2))
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+@pytest.mark.parametrize("shape", ["sample", "held", "steps"])
+def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
+    """At rest one small Euler step gives tau / M dt: surge mass 410,931.81 + 79,320.5895 kg."""
+    vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True})
+    tau = {"sample": np.array([5e3, 0, 0]), "held": np.tile([5e3, 0, 0], (2, 1)), "steps": np.zeros((3, 2, 3))}[shape]
+    if shape == "steps":
+        tau[1, :, 0] = 5e3
+    model = dynamics(vessel)
+    start, commands = zeros(model.state, 2), zeros(model.commands, 2)
+    found = rollout(vessel, start, commands, step=1e-3, num_steps=3, tau_extra=tau, engine=engine)
+    gained = 5e3 / (410931.81 + 79320.5895) * 1e-3
+    expected = {"steps": [0, 0, 1, 1]}.get(shape, [0, 1, 2, 3])
+    np.testing.assert_allclose(found["u"][:, 0, 1], gained * np.array(expected), rtol=1e-3, atol=1e-9)
+
+
+def test_lag_follows_its_analytic_solution(draw_inputs: Draw) -> None:
+    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
+    given = draw_inputs(vessel, 2)
+    order = given["commands"]["port.n"]
+    found = rollout(vessel, **given, memory={"port.n": np.zeros(2)}, step=1.0, num_steps=10)["actual.port.n"][:, 0]
+    np.testing.assert_allclose(found, order * (1 - np.exp(-np.arange(11)[:, None] / 2.0)), rtol=1e-12)
+    reached = rollout(vessel, **given, step=1.0, num_steps=3)["actual.port.n"][:, 0]
+    np.testing.assert_allclose(reached, np.tile(order, (4, 1)), rtol=1e-14)
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+def test_explicit_euler_uses_what_the_actuator_has_reached(engine: Any) -> None:
+    """From rest with the shafts at rest, the first step gives no thrust, the second that of the lagged shaft."""
+    lag = {f"thruster.{side}.actuator.n": LAG for side in ("port", "starboard")}
+    vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True, **lag})
+    model = dynamics(vessel)
+    commands = {name: np.full(1, 2.0 if name.endswith(".n") else 0.0) for name in model.commands}
+    still = {"port.n": np.zeros(1), "starboard.n": np.zeros(1)}
+    found = rollout(vessel, zeros(model.state), commands, step=1.0, num_steps=2, memory=still, engine=engine)
+    n = 2.0 * (1 - np.exp(-0.5))
+    gained = 2 * 0.8208 * 1025 * n**2 * 1.9**4 / (410931.81 + 79320.5895)
+    np.testing.assert_allclose(found["u"][:, 0, 0], [0.0, 0.0, gained], rtol=1e-6, atol=1e-6)
+
+
+def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
+    """Uneven rows: first order reached, then an exponential from row to row, each order held until the next."""
+    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
+    t, order = np.array([0.0, 1.0, 1.5, 4.0]), np.array([1.0, 2.0, 2.0, 3.0])
+    others = {name: np.zeros(4) for name in dynamics(vessel).commands}
+    found = memory_along(vessel, {**others, "port.n": order}, t)
+    expected = [1.0, 1.0]
+    for dt, held in ((0.5, 2.0), (2.5, 2.0)):
+        expected.append(held + (expected[-1] - held) * np.exp(-dt / 2.0))
+    assert found is not None
+    np.testing.assert_allclose(found["port.n"], expected, rtol=1e-12)
+    assert memory_along(load_vessel("gunnerus-28.9"), others, t) is None
+
+
+@pytest.mark.parametrize("group", ["start", "commands", "environment"])
+def test_a_missing_channel_is_named(bundled_vessel: Vessel, draw_inputs: Draw, group: str) -> None:
+    given = draw_inputs(bundled_vessel, 2)
+    if not given[group]:
+        pytest.skip("needs none")
+    name = {"start": "psi", "commands": list(given["commands"])[-1], "environment": "beta_w"}[group]
+    given[group][name + "_"] = given[group].pop(name)
+    with pytest.raises(DataError, match=f"{name!r} is needed .* did you mean '{name}_'") as caught:
+        rollout(bundled_vessel, **given, step=1.0, num_steps=2)
+    assert "\n" not in str(caught.value)
+    assert bundled_vessel.name in str(caught.value)
+
+
+def test_wind_that_is_off_is_not_asked_for(draw_inputs: Draw) -> None:
+    base = load_vessel("gunnerus-28.9")
+    given = draw_inputs(base, 2)
+    given["environment"]["V_w"] = np.full(2, 10.0)
+    off = base.with_values({"wind.off": True})
+    without = rollout(off, given["start"], given["commands"], step=1.0, num_steps=5)
+    ignored = rollout(off, **given, step=1.0, num_steps=5)
+    np.testing.assert_array_equal(ignored.states, without.states)
+    assert np.abs(rollout(base, **given, step=1.0, num_steps=5).states - without.states).max() > 0.01
+
+
+def test_wrong_shapes_are_refused(draw_inputs: Draw) -> None:
+    vessel = load_vessel("gunnerus-28.9")
+    given = draw_inputs(vessel, 3)
+    with pytest.raises(ShipidError, match=r"'port\.n' must be"):
+        rollout(
+            vessel,
+            given["start"],
+            given["commands"] | {"port.n": np.zeros((4, 3))},
+            given["environment"],
+            step=1.0,
+            num_steps=5,
+        )
+    with pytest.raises(ShipidError, match="parameters must be"):
+        rollout(vessel, **given, step=1.0, num_steps=5, parameters=np.zeros((2, 3)))
+    with pytest.raises(ShipidError, match="multiple of every"):
+        rollout(vessel, **given, step=1.0, num_steps=5, every=2)
+
+
+def test_a_family_is_its_members_one_by_one(draw_inputs: Draw) -> None:
+    base = load_vessel("gunnerus-28.9")
+    family = Family(name="f", members=3, perturb=[{"parameters": ["hull.*", "inertia.m"], "factor": (0.6, 1.4)}])
+    variants, given = members(family, base), draw_inputs(base, 5)
+    together = rollout(base, **given, step=1.0, num_steps=10, parameters=np.array([v.parameters for v in variants]))
+    for row, variant in enumerate(variants):
+        alone = rollout(base.with_values(variant.values), **given, step=1.0, num_steps=10)
+        np.testing.assert_allclose(together.states[:, row], alone.states[:, 0], rtol=1e-12)
+
+
+def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
+    reached = False
+    before = signal.getsignal(signal.SIGINT)
+
+    def work() -> None:
+        nonlocal reached
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            reached = True
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert reached
+    assert signal.getsignal(signal.SIGINT) is before

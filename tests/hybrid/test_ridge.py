@@ -1,0 +1,422 @@
+"""The recipe in closed form: what it says of itself is what refitting says; port and starboard are alike."""
+
+import numpy as np
+import pytest
+import torch
+
+from shipid.hybrid.compensator import Compensator, choose_features
+from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.ridge import _blocks, _decompose, _left_out, _Part, _reflection, smooth_basis
+from shipid.hybrid.tuning import tune
+
+torch.set_num_threads(1)
+TWINS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
+RUDDER = ("engine.n", "rudder.delta")
+SMALL = Recipe.preset("fast", trials=6, units=24, terms=4)
+STEPS, LENGTHS = 9, (18, 25, 18, 30, 11, 18)  # windows of the runs
+ALL = np.arange(sum(LENGTHS))
+ENDS = np.cumsum(LENGTHS)
+RUNS = [np.arange(end - length, end) for length, end in zip(LENGTHS, ENDS, strict=True)]
+FOLDS = [(np.setdiff1d(ALL, run), run) for run in RUNS]
+
+
+def recipe(**changes):
+    return SMALL.model_copy(update=changes)
+
+
+def drawn(commands=TWINS, seed=0, count=120):
+    """Columns that are mirrored nowhere, all different."""
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.normal(0.5, 1.0, count) for name in ("psi", "u", "v", "r", "beta_w", *commands)}
+    return columns | {"V_w": rng.uniform(1.0, 9.0, count)}
+
+
+def mirrored(columns):
+    """The ship and the wind as a mirror shows them."""
+    sides = {"port": "starboard", "starboard": "port"}
+    found = {}
+    for name, values in columns.items():
+        component, _, signal = name.rpartition(".")
+        odd = signal in ("psi", "v", "r", "beta_w", "alpha", "delta")
+        found[f"{sides.get(component, component)}.{signal}" if component else name] = -values if odd else values
+    return found
+
+
+@pytest.fixture
+def columns():
+    return drawn()
+
+
+@pytest.fixture
+def targets(columns):
+    """What two models miss (T, S, 2) [m]: one smooth in time, the other with something faster than any basis."""
+    return {"smooth": missed(columns), "rough": missed(columns) + np.random.default_rng(1).normal(size=(STEPS, 120, 2))}
+
+
+def missed(columns):
+    t = np.arange(1.0, STEPS + 1)[:, None] / STEPS
+    x = t * columns["u"] + 2.0 * t**2 * np.tanh(columns["port.n"])
+    y = t * columns["v"] - 1.5 * t**2 * columns["r"]
+    return np.stack([x, y], axis=-1)
+
+
+def tuned(columns, targets, setup, *, commands=TWINS, folds=FOLDS, seed=3):
+    return tune(columns, commands, targets, folds, setup, seed)
+
+
+def predicted(found, columns):
+    return {key: one.compensator.predict(columns) for key, one in found.items()}
+
+
+# What is left out.
+
+
+def part_of(features, targets):
+    """A coordinate as the search holds it."""
+    features, targets = torch.tensor(features), torch.tensor(targets)
+    eigenvalues, axes = _decompose(features)
+    rotated = features @ axes
+    return _Part(rotated, eigenvalues, axes, targets, rotated.T @ targets)
+
+
+@pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
+@pytest.mark.parametrize("ridge", [1e-3, 5.0])
+@pytest.mark.parametrize("kind", ["runs", "more left out than judged", "one pair"])
+def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind):
+    rng = np.random.default_rng(0)
+    folds = FOLDS
+    if kind == "more left out than judged":  # neighbours that share a moment are in neither part
+        folds = [(np.setdiff1d(ALL, np.arange(run[0] - 4, run[-1] + 3)), run[: len(run) // 2]) for run in RUNS]
+    elif kind == "one pair":
+        folds = [(np.arange(30, 120), np.arange(30))]
+    features = [rng.normal(size=(len(ALL), units)) / units**0.5 for _ in range(2)]
+    wanted = [rng.normal(size=(len(ALL), 6)) for _ in range(2)]  # 3 models with 2 shapes each
+    expected = np.zeros(3)
+    for seen, made in zip(features, wanted, strict=True):
+        for training, judged in folds:
+            gram = seen[training].T @ seen[training] + ridge * np.eye(units)
+            weights = np.linalg.solve(gram, seen[training].T @ made[training])
+            expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
+    parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
+    found = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)[0]
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
+def refitted(network, mirror, ridge, columns, paths, folds):
+    """Mean squared error of the windows judged, each predicted by the output weights that the others ask for.
+
+    The hidden units of the network stay; those of a mirrored trial come in pairs, even in x and odd in y.
+    """
+    (weight, offset), _ = network.layers
+    table = columns | wind(columns)
+    hidden = np.tanh(network.normaliser.apply(table) @ weight + offset)
+    if mirror:
+        first, image = np.split(hidden, 2, axis=1)
+        features = [(first + image) / (2 * first.shape[1]) ** 0.5, (first - image) / (2 * first.shape[1]) ** 0.5]
+    else:
+        features = [hidden / hidden.shape[1] ** 0.5] * 2
+    errors = []
+    for axis, seen in enumerate(features):
+        for training, judged in folds:
+            made = paths[:, training, axis].T @ network.basis
+            gram = seen[training].T @ seen[training] + ridge * np.eye(seen.shape[1])
+            weights = np.linalg.solve(gram, seen[training].T @ made)
+            errors.append((seen[judged] @ weights @ network.basis.T - paths[:, judged, axis].T).ravel())
+    return float(np.square(np.concatenate(errors)).mean())
+
+
+def wind(columns):
+    angle = columns["beta_w"] - columns["psi"]
+    return {
+        "u_rw": columns["u"] - columns["V_w"] * np.cos(angle),
+        "v_rw": columns["v"] - columns["V_w"] * np.sin(angle),
+    }
+
+
+@pytest.mark.parametrize("mirror", [0.0, 1.0])
+@pytest.mark.parametrize("pairs", [FOLDS, FOLDS[:1]])
+def test_the_value_of_a_trial_is_the_error_on_windows_it_did_not_see(columns, targets, mirror, pairs):
+    setup = recipe(trials=1, mirror=mirror, ridge=0.01)
+    for key, one in tuned(columns, targets, setup, folds=pairs).items():
+        (row,), (network,) = one.trials, one.compensator.networks
+        assert row["params"]["mirror"] == mirror
+        expected = refitted(network, mirror, 0.01, columns, targets[key], pairs)
+        assert row["value"] == pytest.approx(expected, rel=1e-8)
+
+
+def test_the_ridge_of_a_trial_is_the_best_of_all(columns, targets):
+    setup = recipe(trials=1, ridge=(1e-4, 1e2))
+    for key, one in tuned(columns, targets, setup).items():
+        values = [tuned(columns, targets, recipe(trials=1, ridge=r))[key].trials[0]["value"] for r in setup.path()]
+        assert one.trials[0]["value"] == pytest.approx(min(values), rel=1e-9)
+        assert one.trials[0]["params"]["ridge"] == setup.path()[int(np.argmin(values))]
+
+
+def test_the_compensator_is_the_mean_of_the_best_trials(columns, targets):
+    one = tuned(columns, targets, recipe(averaged=4))["rough"]
+    assert [row["number"] for row in one.trials] == list(range(6))
+    assert {row["state"] for row in one.trials} == {"complete"}
+    assert all(set(row["params"]) == {*SMALL.SEARCHED, "mirror"} for row in one.trials)
+    assert all(row["epochs"] == 0 and row["seconds"] > 0 for row in one.trials)
+    best = sorted(one.trials, key=lambda row: row["value"])
+    assert one.compensator.hyperparameters == best[0]["params"]
+    assert len(one.compensator.networks) == 4
+    for network, row in zip(one.compensator.networks, best, strict=False):
+        mirror, ridge = row["params"]["mirror"], row["params"]["ridge"]
+        assert refitted(network, mirror, ridge, columns, targets["rough"], FOLDS) == pytest.approx(row["value"])
+    apart = [Compensator(TWINS, (network,), {}).predict(columns) for network in one.compensator.networks]
+    np.testing.assert_allclose(one.compensator.predict(columns), np.mean(apart, axis=0), atol=1e-12)
+    assert len(tuned(columns, targets, recipe(averaged=9))["rough"].compensator.networks) == 6
+
+
+# Port and starboard.
+
+
+@pytest.mark.parametrize("commands", [TWINS, RUDDER])
+def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
+    seen, new = drawn(commands), drawn(commands, seed=9)
+    paths = np.random.default_rng(2).normal(size=(STEPS, len(ALL), 2))
+    one = tuned(seen, {"any": paths}, recipe(mirror=1.0), commands=commands)["any"]
+    assert {row["params"]["mirror"] for row in one.trials} == {1.0}
+    here, there = one.compensator.predict(new), one.compensator.predict(mirrored(new))
+    assert np.abs(here).max() > 0.01
+    np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-12)
+    plain = tuned(seen, {"any": paths}, recipe(mirror=0.0), commands=commands)["any"].compensator
+    assert np.abs(plain.predict(mirrored(new)) - plain.predict(new) * [1.0, -1.0]).max() > 0.01
+
+
+def as_one(columns):
+    for signal in ("n", "alpha"):
+        columns[f"starboard.{signal}"] = columns[f"port.{signal}"]
+    return ["port.n", "port.alpha"]
+
+
+def at_one_speed(columns):
+    columns["starboard.n"] = columns["port.n"]
+    return ["port.n", "port.alpha", "starboard.alpha"]
+
+
+def toe_in(columns):
+    """Fixed a little inwards, each to its side: the mirror image is the ship itself."""
+    columns["port.alpha"], columns["starboard.alpha"] = np.full(120, 0.1), np.full(120, -0.1)
+    return ["port.n", "starboard.n"]
+
+
+@pytest.mark.parametrize("act", [as_one, at_one_speed, toe_in])
+def test_inputs_that_were_merged_or_dropped_are_mirrored_too(columns, act):
+    kept = act(columns)
+    paths = np.random.default_rng(2).normal(size=(STEPS, len(ALL), 2))
+    one = tuned(columns, {"any": paths}, recipe(mirror=1.0))["any"].compensator
+    assert list(one.networks[0].features) == ["u", "v", "r", *kept, "u_rw", "v_rw"]
+    assert one.hyperparameters["mirror"] == 1.0
+    np.testing.assert_allclose(one.predict(mirrored(columns)), one.predict(columns) * [1.0, -1.0], atol=1e-12)
+
+
+def test_a_mirrored_log_teaches_a_mirrored_trial_the_same(columns, targets):
+    image = {key: paths * [1.0, -1.0] for key, paths in targets.items()}
+    here, there = tuned(columns, targets, recipe(mirror=1.0)), tuned(mirrored(columns), image, recipe(mirror=1.0))
+    for key in targets:
+        values = [[row["value"] for row in found[key].trials] for found in (here, there)]
+        np.testing.assert_allclose(*values, rtol=1e-9)
+        np.testing.assert_allclose(predicted(there, columns)[key], predicted(here, columns)[key], atol=1e-8)
+    plain = [tuned(*log, recipe(mirror=0.0))["rough"] for log in ((columns, targets), (mirrored(columns), image))]
+    assert plain[0].trials[0]["value"] != pytest.approx(plain[1].trials[0]["value"], rel=1e-3)
+
+
+def turned(columns):
+    columns["starboard.n"] = np.full(len(ALL), 2.0)
+    return TWINS
+
+
+def gone(columns):
+    del columns["starboard.n"], columns["starboard.alpha"]
+    return TWINS[:2]
+
+
+def one_sided(columns):
+    columns["v"] = np.full(len(ALL), 0.3)
+    return TWINS
+
+
+@pytest.mark.parametrize("spoil", [turned, gone, one_sided])
+def test_a_column_without_an_image_leaves_no_mirror(columns, targets, spoil):
+    commands = spoil(columns)
+    one = tuned(columns, targets, recipe(mirror=1.0), commands=commands)["rough"]
+    assert {row["params"]["mirror"] for row in one.trials} == {0.0}
+    assert all(network.layers[0][0].shape[1] == 24 for network in one.compensator.networks)
+
+
+def test_a_ship_that_is_alike_is_learned_from_one_side(columns):
+    """Only turns to one side are seen; the mirror knows the other."""
+    paths = missed(columns)
+    side = np.flatnonzero((columns["r"] > 0.3) & (columns["v"] > 0.0))
+    folds = [(np.setdiff1d(side, side[k::4]), side[k::4]) for k in range(4)]
+    other = mirrored({name: values[side] for name, values in columns.items()})
+    expected = paths[:, side] * [1.0, -1.0]
+    left = []
+    for share in (0.0, 1.0):
+        setup = recipe(mirror=share, units=64)
+        compensator = tuned(columns, {"any": paths}, setup, folds=folds)["any"].compensator
+        left.append(np.square(compensator.predict(other) - expected).mean())
+    assert left[1] < 0.5 * left[0]
+
+
+# Company, order, luck.
+
+
+def test_a_model_does_not_notice_its_company(columns, targets):
+    together = tuned(columns, targets, SMALL)
+    alone = tuned(columns, {"rough": targets["rough"]}, SMALL)
+    assert [row["params"] for row in alone["rough"].trials] == [row["params"] for row in together["rough"].trials]
+    np.testing.assert_allclose(
+        predicted(alone, columns)["rough"], predicted(together, columns)["rough"], rtol=1e-6, atol=1e-6
+    )
+
+
+def test_nor_the_order_of_runs_windows_or_columns(columns, targets):
+    here = tuned(columns, targets, SMALL)
+    order = np.random.default_rng(5).permutation(ALL)
+    place = np.argsort(order)  # of each window in the new order
+    shuffled = {name: values[order] for name, values in reversed(columns.items())}
+    folds = [(place[training], place[judged]) for training, judged in reversed(FOLDS)]
+    there = tuned(shuffled, {key: paths[:, order] for key, paths in targets.items()}, SMALL, folds=folds)
+    for key in targets:
+        values = [[row["value"] for row in found[key].trials] for found in (here, there)]
+        np.testing.assert_allclose(*values, rtol=1e-8)
+        np.testing.assert_allclose(predicted(there, columns)[key], predicted(here, columns)[key], rtol=1e-6, atol=1e-6)
+
+
+def test_the_seed_decides(columns, targets):
+    first, again, other = (tuned(columns, targets, SMALL, seed=seed) for seed in (3, 3, 4))
+    for key in targets:
+        np.testing.assert_array_equal(predicted(first, columns)[key], predicted(again, columns)[key])
+        assert np.abs(predicted(other, columns)[key] - predicted(first, columns)[key]).max() > 1e-4
+
+
+def test_windows_outside_the_folds_are_not_seen(columns, targets):
+    folds = [(np.setdiff1d(training, RUNS[5]), judged) for training, judged in FOLDS[:5]]
+    before = predicted(tuned(columns, targets, SMALL, folds=folds), drawn(seed=8))
+    for values in columns.values():
+        values[RUNS[5]] = 1e6
+    for paths in targets.values():
+        paths[:, RUNS[5]] = np.nan
+    after = predicted(tuned(columns, targets, SMALL, folds=folds), drawn(seed=8))
+    for key in targets:
+        np.testing.assert_array_equal(before[key], after[key])
+
+
+# What is learned.
+
+
+def test_what_can_be_solved_is_learned(columns):
+    """A compensation of the same kind, of the same hidden units, is found again where nothing was seen."""
+    new = drawn(seed=7)
+    setup = recipe(mirror=0.0, trials=1, ridge=1e-9)
+    first = tuned(columns, {"any": missed(columns)}, setup)["any"].compensator
+    second = tuned(columns, {"any": first.predict(columns)}, setup)["any"]
+    assert second.trials[0]["value"] < 1e-10 * np.square(missed(columns)).mean()
+    np.testing.assert_allclose(second.compensator.predict(new), first.predict(new), atol=1e-3)
+
+
+def test_a_smooth_function_is_learned(columns, targets):
+    new = drawn(seed=7)
+    left = predicted(tuned(columns, targets, recipe(units=128, trials=20)), new)["smooth"] - missed(new)
+    assert np.square(left).mean() < 0.1 * np.square(missed(new)).mean()
+
+
+def test_a_model_that_misses_nothing_gets_nothing(columns, targets):
+    one = tuned(columns, targets | {"exact": np.zeros_like(targets["rough"])}, SMALL)["exact"]
+    assert (one.compensator.predict(drawn(seed=7)) == 0.0).all()
+    assert {row["value"] for row in one.trials} == {0.0}
+
+
+def test_targets_in_other_units_scale_all(columns, targets):
+    one = tuned(columns, {"any": targets["rough"]}, SMALL)["any"]
+    ten = tuned(columns, {"any": 10.0 * targets["rough"]}, SMALL)["any"]
+    assert [row["params"] for row in one.trials] == [row["params"] for row in ten.trials]
+    np.testing.assert_allclose(ten.compensator.predict(columns), 10.0 * one.compensator.predict(columns), rtol=1e-7)
+
+
+def test_a_model_without_numbers_is_a_value_and_harms_nobody(columns, targets):
+    good = tuned(columns, targets, SMALL)
+    one = {**targets, "rough": targets["rough"].copy()}
+    one["rough"][2, 40, 1] = np.nan
+    bad = tuned(columns, one, SMALL)
+    assert bad["rough"].compensator is None
+    assert [row["state"] for row in bad["rough"].trials] == ["diverged"] * 6
+    assert np.isnan([row["value"] for row in bad["rough"].trials]).all()
+    np.testing.assert_allclose(
+        predicted({"smooth": bad["smooth"]}, columns)["smooth"], predicted(good, columns)["smooth"], atol=1e-6
+    )
+    calls = []
+    lost = {"any": np.full_like(targets["rough"], np.inf)}
+    none = tune(columns, TWINS, lost, FOLDS, SMALL, 3, on_trial=lambda *done: calls.append(done))
+    assert none["any"].compensator is None
+    assert [set(row) for row in none["any"].trials] == [set(row) for row in good["rough"].trials]
+    assert calls[-1] == (6, 6)
+
+
+# Time.
+
+
+@pytest.mark.parametrize(("horizon", "terms"), [(30, 8), (15, 1), (50, 12), (2, 8), (1, 8)])
+def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
+    basis = smooth_basis(horizon, terms)
+    assert basis.shape == (horizon, min(terms, horizon))
+    np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-12)
+    t = np.arange(1, horizon + 1) / horizon
+    powers = t[:, None] ** np.arange(1, basis.shape[1] + 1)
+    np.testing.assert_allclose(basis @ (basis.T @ powers), powers, atol=1e-12)
+    if terms < horizon - 1:
+        above = t ** (terms + 1)
+        assert np.abs(basis @ (basis.T @ above) - above).max() > 1e-10
+        assert np.abs(basis @ (basis.T @ np.ones(horizon)) - 1.0).max() > 1e-3  # an error starts from 0
+
+
+def test_two_steps_are_enough(columns, targets):
+    two = {key: paths[[3, 8]] for key, paths in targets.items()}
+    for key, one in tuned(columns, two, recipe(units=96)).items():
+        assert one.compensator.predict(columns).shape == (2, 120, 2)
+        assert one.trials[0]["value"] < np.square(two[key]).mean()
+
+
+# Odd data.
+
+
+def test_duplicates_constants_and_no_wind(columns, targets):
+    columns["starboard.n"] = columns["port.n"].copy()
+    columns["starboard.alpha"] = np.zeros(120)
+    columns["port.alpha"] = np.zeros(120)
+    del columns["V_w"]
+    one = tuned(columns, targets, recipe(mirror=1.0))["smooth"]
+    assert list(one.compensator.networks[0].features) == ["u", "v", "r", "port.n"]
+    assert one.compensator.networks[0].features["port.n"] == ("port.n", "starboard.n")
+    assert {row["params"]["mirror"] for row in one.trials} == {1.0}
+    assert one.compensator.predict(columns).shape == (STEPS, 120, 2)
+
+
+def test_two_runs_are_enough(columns, targets):
+    folds = [(RUNS[1], RUNS[2]), (RUNS[2], RUNS[1])]
+    for key, one in tuned(columns, targets, SMALL, folds=folds).items():
+        best = min(row["value"] for row in one.trials)
+        assert np.isfinite(best)
+        seen = np.concatenate(RUNS[1:3])
+        assert best < 1.5 * np.square(targets[key][:, seen]).mean()
+        assert np.isfinite(one.compensator.predict(columns)).all()
+
+
+@pytest.mark.parametrize(
+    ("names", "mirrored"),
+    [
+        (("port_2.n", "starboard_2.n", "port_2.alpha", "starboard_2.alpha"), True),
+        (("left.n", "right.n"), True),
+        (("port_2.n", "port_2.alpha"), False),  # the other side is not recorded
+        (("bow.n",), False),  # a tunnel's shaft may drive sideways
+        (("bow.n", "bow.alpha"), True),
+        (("propeller.n", "rudder.delta"), True),
+    ],
+)
+def test_sides_are_told_from_names(names, mirrored):
+    rng = np.random.default_rng(2)
+    table = {name: rng.normal(size=60) for name in ("u", "v", "r", *names)}
+    assert (_reflection(table, choose_features(table)) is not None) == mirrored

@@ -1,0 +1,170 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+
+from shipid.hybrid import training
+from shipid.hybrid.training import Settings, train
+
+torch.set_num_threads(1)
+TRAIN, VAL = np.arange(96), np.arange(96, 128)
+
+
+def settings(num_members=1, **changes):
+    """Plain full-batch Adam, one set of hyperparameters for all members."""
+    common = {"learning_rate": 1e-2, "weight_decay": 0.0, "input_dropout": 0.0, "hidden_dropout": 0.0}
+    shared = {"layers": 2, "units": 8, "epochs": 30}
+    for name, value in changes.items():
+        (common if name in common else shared)[name] = value
+    wide = {k: v if isinstance(v, tuple) else (v,) * num_members for k, v in common.items()}
+    return Settings(**shared, **wide)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(128, 5))
+    y = np.stack([np.tanh(x @ rng.normal(size=(5, 6))) + 0.1 * rng.normal(size=(128, 6)) for _ in range(3)])
+    return x, y
+
+
+def torch_network(seed, widths):
+    torch.manual_seed(seed)
+    parts = []
+    for i, o in pairwise(widths):
+        parts += [torch.nn.Linear(i, o), torch.nn.Tanh()]
+    return torch.nn.Sequential(*parts[:-1])
+
+
+def assert_same_weights(layers, network, tolerance):
+    linear = [module for module in network if isinstance(module, torch.nn.Linear)]
+    for (weight, bias), module in zip(layers, linear, strict=True):
+        np.testing.assert_allclose(weight, module.weight.detach().numpy().T, atol=tolerance)
+        np.testing.assert_allclose(bias, module.bias.detach().numpy(), atol=tolerance)
+
+
+def test_networks_start_as_those_of_pytorch():
+    widths = [5, 16, 16, 4]
+    flat = training.initial_weights(widths, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)])
+    for k, seed in enumerate((11, 12)):
+        layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._views(flat, widths)]
+        assert_same_weights(layers, torch_network(seed, widths), 1e-7)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.3])
+def test_the_loop_is_that_of_torch_optim(problem, decay):
+    x, y = problem
+    epochs = 40
+    trained = train(x, y[:1], TRAIN, TRAIN, settings(weight_decay=decay, epochs=epochs), [7])
+    network = torch_network(7, [5, 8, 8, 6])
+    if decay:
+        optimiser = torch.optim.AdamW(network.parameters(), lr=1e-2, weight_decay=decay)
+    else:
+        optimiser = torch.optim.Adam(network.parameters(), lr=1e-2)
+    inputs, targets = torch.tensor(x[TRAIN], dtype=torch.float32), torch.tensor(y[0, TRAIN], dtype=torch.float32)
+    for _ in range(epochs):
+        optimiser.zero_grad()
+        torch.nn.functional.mse_loss(network(inputs), targets).backward()
+        optimiser.step()
+    assert_same_weights(trained.layers[0], network, 2e-5)
+
+
+def test_a_member_does_not_notice_its_company(problem):
+    x, y = problem
+    wide = {
+        "learning_rate": (1e-2, 3e-3, 2e-2),
+        "weight_decay": (0.0, 0.1, 0.5),
+        "input_dropout": (0.0, 0.2, 0.0),
+        "hidden_dropout": (0.1, 0.0, 0.0),
+    }
+    shared = {"batch": 20, "epochs": 25, "patience": 4}
+    together = train(x, y, TRAIN, VAL, settings(**wide, **shared), [1, 2, 3], order_seed=5)
+    for k in range(3):
+        alone = {name: value[k] for name, value in wide.items()}
+        one = train(x, y[k : k + 1], TRAIN, VAL, settings(**alone, **shared), [k + 1], order_seed=5)
+        assert one.epochs[0] == together.epochs[k]
+        assert one.loss[0] == pytest.approx(together.loss[k], rel=1e-4)
+        for mine, theirs in zip(one.layers[0], together.layers[k], strict=True):
+            np.testing.assert_allclose(mine[0], theirs[0], atol=2e-4)
+
+
+def test_a_tiny_linear_problem_is_learned_to_almost_nothing():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1, 1, size=(96, 3))
+    y = (x @ rng.normal(size=(3, 4)) + 2.0)[None]
+    trained = train(x, y, TRAIN, TRAIN, settings(units=32, layers=1, learning_rate=0.01, batch=16, epochs=300), [0])
+    assert trained.loss[0] < 1e-3 * y.var()
+
+
+def test_the_validation_loss_is_in_metres_and_of_the_weights_kept(problem):
+    x, y = problem
+    trained = train(x, 100.0 * y[:1], TRAIN, VAL, settings(epochs=50), [0])
+    (w1, b1), (w2, b2), (w3, b3) = trained.layers[0]
+    predicted = np.tanh(np.tanh(x[VAL] @ w1 + b1) @ w2 + b2) @ w3 + b3
+    assert trained.loss[0] == pytest.approx(np.mean((predicted - 100.0 * y[0, VAL]) ** 2), rel=1e-4)
+
+
+def test_early_stopping_keeps_the_best_epoch(problem):
+    x, y = problem
+    y = np.random.default_rng(1).normal(size=y.shape)  # nothing to learn: the validation loss soon rises
+    run = {"learning_rate": 3e-2, "units": 64}
+    losses = [train(x, y[:1], TRAIN, VAL, settings(**run, epochs=n), [4]).loss[0] for n in range(1, 40)]
+    best = int(np.argmin(losses)) + 1
+    stopped = train(x, y[:1], TRAIN, VAL, settings(**run, epochs=500, patience=12), [4])
+    assert best < 25
+    assert stopped.epochs[0] == best + 12
+    assert stopped.loss[0] == losses[best - 1]
+    kept = train(x, y[:1], TRAIN, VAL, settings(**run, epochs=best), [4])
+    np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
+
+
+def test_the_seed_decides(problem):
+    x, y = problem
+    config = settings(2, batch=32, hidden_dropout=0.3, epochs=5)
+    first, again = (train(x, y[:2], TRAIN, VAL, config, [1, 2], order_seed=9) for _ in range(2))
+    np.testing.assert_array_equal(first.loss, again.loss)
+    np.testing.assert_array_equal(first.layers[1][2][0], again.layers[1][2][0])
+    assert train(x, y[:2], TRAIN, VAL, config, [3, 2], order_seed=9).loss[0] != first.loss[0]
+    assert train(x, y[:2], TRAIN, VAL, config, [1, 2], order_seed=8).loss[0] != first.loss[0]
+
+
+@pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
+def test_drop_out_keeps_the_expectation(rate):
+    mask = training.dropout((0.0, rate), (400, 500), [torch.Generator().manual_seed(k) for k in (0, 1)])
+    assert (mask[0] == 1).all()
+    share = (mask[1] == 0).double().mean().item()
+    assert share == pytest.approx(rate, abs=0.005)
+    assert mask[1].double().mean().item() == pytest.approx(1.0, abs=5 * (rate / (1 - rate) / 2e5) ** 0.5)
+
+
+def test_drop_out_of_one_leaves_a_mean_and_no_nan(problem):
+    x, y = problem
+    y = y[:1] + 3.0
+    trained = train(x, y, TRAIN, VAL, settings(hidden_dropout=1.0, input_dropout=1.0, epochs=1500), [0])
+    assert trained.status == ("ok",)
+    np.testing.assert_allclose(trained.layers[0][-1][1], y[0, TRAIN].mean(axis=0), atol=0.3)
+    assert np.isfinite(trained.loss).all()
+
+
+def test_a_diverged_member_harms_nobody(problem):
+    x, y = problem
+    broken = y.copy()
+    broken[1, 3, 2] = np.nan
+    config = settings(3, epochs=10, batch=32)
+    good, bad = (train(x, targets, TRAIN, VAL, config, [1, 2, 3]) for targets in (y, broken))
+    assert bad.status == ("ok", "diverged", "ok")
+    assert np.isnan(bad.loss[1])
+    np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
+    assert all(np.isfinite(weight).all() for layers in bad.layers for pair in layers for weight in pair)
+
+
+def test_who_has_stopped_does_not_start_again():
+    weights = torch.zeros(2, 3)
+    watch = training._Watch(weights, patience=2)
+    for epoch, losses in enumerate([[3.0, 9.0], [4.0, 8.0], [5.0, 7.0], [1.0, 6.0]], start=1):
+        weights.fill_(epoch)
+        watch.compare(torch.zeros(2), torch.tensor(losses))
+    assert watch.best.tolist() == [3.0, 6.0]
+    assert watch.kept[:, 0].tolist() == [1.0, 4.0]
+    assert watch.epochs.tolist() == [3, 4]

@@ -1,0 +1,71 @@
+"""Logs of a simulated trial, clean or with a defect put into them, as a bridge might write them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pandas as pd
+
+from shipid.engine.rollout import rollout
+from shipid.vessel.load import load_vessel
+
+KNOT = 1852 / 3600
+FINE = 0.1  # s
+Change = Callable[[pd.DataFrame], pd.DataFrame]
+
+SCHEDULE = [  # seconds, rpm, azimuth [deg]
+    *((120, 170, 0), (20, 170, -20), (40, 170, 20), (40, 170, -20), (40, 170, 20), (40, 170, -20), (20, 170, 20)),
+    *((90, 170, 0), (240, 170, 25), (90, 170, 0), (240, 170, -25), (90, 140, 0), (150, 110, 0), (150, 190, 0)),
+]
+"""Straight, a zigzag, straight, a turning circle to port, straight, one to starboard, and a speed run."""
+
+
+@cache
+def motion() -> pd.DataFrame:
+    """Motion of the Gunnerus in SI units every 0.1 s, without noise, in a light wind."""
+    orders = np.repeat([row[1:] for row in SCHEDULE], [round(row[0] / FINE) for row in SCHEDULE], axis=0)
+    alpha = _rate_limited(np.radians(orders[:, 1]), np.radians(5.0) * FINE)
+    n = _rate_limited(orders[:, 0] / 60.0, 0.1 * FINE)
+    commands = {
+        f"{side}.{name}": x[:, None] for side in ("port", "starboard") for name, x in (("n", n), ("alpha", alpha))
+    }
+    start = {name: np.zeros(1) for name in ("north", "east", "v", "r")} | {"psi": np.full(1, 5.9), "u": np.full(1, 4.5)}
+    wind = {"V_w": np.full((len(n), 1), 3.0), "beta_w": np.full((len(n), 1), 0.5)}
+    path = rollout(load_vessel("gunnerus-33.9"), start, commands, wind, step=FINE, num_steps=len(n), method="rk4")
+    frame = pd.DataFrame({name: path[name][:-1, 0, 0] for name in ("north", "east", "psi", "u", "v", "r")})
+    return frame.assign(t=FINE * np.arange(len(frame)), n=n, alpha=alpha)
+
+
+def _rate_limited(orders: np.ndarray, most: float) -> np.ndarray:
+    result, now = np.empty(len(orders)), orders[0]
+    for index, order in enumerate(orders):
+        now += np.clip(order - now, -most, most)
+        result[index] = now
+    return result
+
+
+def si_log(seed: int = 0, every: int = 5) -> pd.DataFrame:
+    """The motion every 0.5 s with the noise of good sensors, SI units."""
+    random = np.random.default_rng(seed)
+    frame = motion().iloc[::every].reset_index(drop=True)
+    noise = {"north": 0.15, "east": 0.15, "psi": 1e-3, "u": 0.01, "v": 0.01, "r": 2e-4}
+    return frame.assign(**{name: frame[name] + random.normal(0, std, len(frame)) for name, std in noise.items()})
+
+
+def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
+    """Write as a log: degrees 0..360, deg/s, rpm; u, v in m/s."""
+    return pd.DataFrame(
+        {
+            "time": frame["t"].round(3),
+            "N": frame["north"],
+            "E": frame["east"],
+            "psi": np.degrees(frame["psi"]) % 360.0,
+            "u": frame["u"],
+            "v": frame["v"],
+            "r": np.degrees(frame["r"]),
+            "rpm": frame["n"] * 60.0,
+            "rudder": -np.degrees(frame["alpha"]),  # > 0 to starboard
+        }
+    )

@@ -1,0 +1,101 @@
+"""Public sets: from the data folder with their checksum, or one line that says what to do. Nothing is downloaded."""
+
+import hashlib
+from pathlib import Path
+
+import pooch
+import pytest
+import requests
+
+from shipid.errors import DataError, DocumentError
+from shipid.logs.catalogue import available, fetch
+from shipid.logs.importing import read_mapping
+from tests.logs.conftest import PLAIN
+
+NAME = "gunnerus-2022"
+
+
+def test_from_the_data_folder(data_folder: Path, gunnerus_log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHIPID_DATA", str(data_folder))
+    assert fetch(NAME) == gunnerus_log
+
+
+def test_every_bundled_mapping_names_its_bytes() -> None:
+    assert NAME in available()
+    for name in available():
+        source = read_mapping(name).source
+        assert None not in (source.url, source.sha256, source.file, source.citation, source.licence)
+
+
+def test_absent_and_changed_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHIPID_DATA", str(tmp_path))
+    with pytest.raises(DataError, match="unset SHIPID_DATA to download"):
+        fetch(NAME)
+    file = tmp_path / str(read_mapping(NAME).source.file)
+    file.parent.mkdir()
+    file.write_text("tvec\n")
+    with pytest.raises(DataError, match="sha256 differs") as caught:
+        fetch(NAME)
+    assert caught.value.file == str(file)
+
+
+@pytest.mark.parametrize(
+    ("failure", "remedy"),
+    [
+        (requests.ConnectionError("no route"), "go online"),
+        (requests.HTTPError("404"), "set SHIPID_DATA"),
+        (ValueError("SHA256 hash of downloaded file does not match"), "is not the published file"),
+    ],
+)
+def test_failed_downloads(failure: Exception, remedy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise failure
+
+    monkeypatch.delenv("SHIPID_DATA", raising=False)
+    monkeypatch.setattr(pooch, "retrieve", refuse)
+    with pytest.raises(DataError, match=remedy) as caught:
+        fetch(NAME)
+    assert "\n" not in str(caught.value)
+
+
+def test_download_keeps_the_checksum(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another file behind the url is refused by pooch itself: it is served here from the disk."""
+    monkeypatch.delenv("SHIPID_DATA", raising=False)
+    monkeypatch.setattr(pooch, "os_cache", lambda _: tmp_path)
+
+    class FromDisk:
+        def __call__(self, _url: str, output_file: str, _pooch: object, **__: object) -> None:
+            Path(output_file).write_text("tvec\n")
+
+    monkeypatch.setattr(pooch.core, "choose_downloader", lambda *_, **__: FromDisk())
+    with pytest.raises(DataError, match="is not the published file"):
+        fetch(NAME)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("absolute", [True, False])
+def test_download_of_an_own_mapping_stays_in_the_cache(
+    absolute: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, cache, folder = b"tvec\n", tmp_path / "cache", tmp_path / "mine"
+    monkeypatch.delenv("SHIPID_DATA", raising=False)
+    monkeypatch.setattr(pooch, "os_cache", lambda _: cache)
+
+    class FromDisk:
+        def __call__(self, _url: str, output_file: str, _pooch: object, **__: object) -> None:
+            Path(output_file).write_bytes(log)
+
+    monkeypatch.setattr(pooch.core, "choose_downloader", lambda *_, **__: FromDisk())
+    folder.mkdir()
+    mapping = folder / "own.toml"
+    source = f'[source]\nurl = "https://example.org/log.csv"\nsha256 = "{hashlib.sha256(log).hexdigest()}"\n'
+    mapping.write_text(PLAIN.read_text() + source)
+    monkeypatch.chdir(folder)
+    file = fetch(str(mapping) if absolute else "../mine/own.toml")
+    assert file == cache / "own-log.csv"
+    assert file.read_bytes() == log
+
+
+def test_unknown_name() -> None:
+    with pytest.raises(DocumentError, match="did you mean 'gunnerus-2022'"):
+        fetch("gunnerus-2021")

@@ -1,0 +1,244 @@
+"""Channels with clocks, delays and frames of their own become one dataset, equal to the motion that made them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.checks import check_dataset
+from shipid.data.dataset import pieces
+from shipid.errors import DataError, DocumentError
+from shipid.logs.importing import digest_of, import_log, read_mapping
+from tests.logs.conftest import PLAIN, as_log, turning
+
+Write = Callable[..., Path]
+T = np.arange(0.0, 120.0, 0.5)
+STATES = ["north", "east", "psi", "u", "v", "r"]
+
+
+def logged(frame: pd.DataFrame, folder: Path) -> Path:
+    return as_log(frame, folder / "log.csv")
+
+
+def changed(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = PLAIN.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "mapping.toml").write_text(text)
+    return folder / "mapping.toml"
+
+
+def without(columns: set[str], more: str, folder: Path) -> Path:
+    """The plain mapping without some columns and with more TOML behind it."""
+    head, *blocks = PLAIN.read_text().split("[columns.")
+    kept = [f"[columns.{block}" for block in blocks if block.partition("]")[0] not in columns]
+    (folder / "mapping.toml").write_text(head + "".join(kept) + "\n" + more)
+    return folder / "mapping.toml"
+
+
+GAP = ('from = "time"', 'from = "time"\nmax_gap = 3.0')
+
+
+def test_irregular_clocks_and_latencies(tmp_path: Path) -> None:
+    """GPS of 1 s and compass of 0.3 to 0.7 s in files of their own, each late by its own delay."""
+    random = np.random.default_rng(0)
+    dense = turning(np.arange(0.0, 125.0, 0.01))
+    gps = dense.iloc[::100]
+    compass = dense.iloc[np.cumsum(random.integers(30, 70, 240))]
+    late = {"gps": 0.8, "compass": 0.25}
+    pd.DataFrame({"ms": (gps["t"] + late["gps"]) * 1e3, "x": gps["north"], "y": gps["east"]}).to_csv(
+        tmp_path / "gps.txt", sep=";", index=False
+    )
+    heading = np.degrees(compass["psi"]) % 360.0
+    pd.DataFrame({"t": compass["t"] + late["compass"], "hdg": heading}).to_parquet(tmp_path / "compass.parquet")
+    blocks = f"""
+[file.gps]
+path = "gps.txt"
+clock = {{ from = "ms", unit = "ms" }}
+format = {{ separator = ";" }}
+[file.compass]
+path = "compass.parquet"
+clock = {{ from = "t" }}
+format = {{ kind = "parquet" }}
+[columns.north]
+file = "gps"
+from = "x"
+unit = "m"
+latency = {late["gps"]}
+[columns.east]
+file = "gps"
+from = "y"
+unit = "m"
+latency = {late["gps"]}
+[columns.psi]
+file = "compass"
+from = "hdg"
+unit = "deg"
+wrap = true
+latency = {late["compass"]}
+"""
+    mapping = without({"north", "east", "psi"}, blocks, tmp_path)
+    mapping.write_text(mapping.read_text().replace(*GAP))
+    log = logged(turning(T), tmp_path)
+    dataset = import_log(read_mapping(mapping), log)
+    truth = turning(dataset.frame["t"].to_numpy())
+    assert len(dataset.frame) > 200
+    sag = 4.03 * 0.05 / 8.0  # a chord of 1 s leaves the arc by U r dt^2 / 8
+    for name in STATES:
+        tolerance = 1.1 * sag if name in ("north", "east") else 1e-9
+        np.testing.assert_allclose(dataset.frame[name], truth[name], atol=tolerance, err_msg=name)
+    np.testing.assert_array_equal(dataset.frame["propeller.n"], truth["port.n"])
+    one = digest_of(read_mapping(mapping), log)
+    (tmp_path / "gps.txt").write_text((tmp_path / "gps.txt").read_text() + "\n")
+    assert digest_of(read_mapping(mapping), log) != one  # the digest covers every file
+
+
+def test_own_step_holds_orders_and_passes_north(tmp_path: Path) -> None:
+    mapping = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.2'))
+    frame = import_log(read_mapping(mapping), logged(turning(T), tmp_path)).frame
+    np.testing.assert_allclose(np.diff(frame["t"]), 0.2)
+    np.testing.assert_allclose(frame["psi"], turning(frame["t"].to_numpy())["psi"], atol=1e-9)
+    assert set(frame["propeller.n"]) <= set(turning(T)["port.n"])
+
+
+def test_a_hole_longer_than_max_gap_breaks_the_run(tmp_path: Path) -> None:
+    mapping = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.5'))
+    motion = turning(T)
+    motion.loc[motion["t"].between(40.0, 60.0), "psi"] = np.nan
+    dataset = import_log(read_mapping(mapping), logged(motion, tmp_path))
+    spans = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)]
+    assert spans == [(0.0, 39.5), (60.5, 119.5)]
+
+
+def test_channels_that_share_no_time(tmp_path: Path) -> None:
+    mapping = changed(tmp_path, GAP, ('from = "rpm"', 'from = "rpm"\nlatency = 1000.0'))
+    with pytest.raises(DataError, match="share no time"):
+        import_log(read_mapping(mapping), logged(turning(T), tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("change", "path", "remedy"),
+    [
+        (('from = "N"', 'from = "N"\nlatency = 1.0'), "clock.max_gap", "over how long a gap"),
+        (('from = "N"', 'from = "N"\nfile = "gps"'), "columns.north.file", "nothing is defined there"),
+        (('from = "N"', 'from = "N"\ninterpolation = "linear"'), "columns.north.interpolation", "set .clock. step"),
+        (('from = "N"', 'from = "N"\nrelative = true'), "columns.north.relative", "only beta_w"),
+        (('from = "N"', 'from = "N"\ninterpolation = "angle"'), "columns.north.interpolation", "only an angle"),
+        (("[columns.v]", "[columns.speed]"), "columns.u", "map one of them"),
+        (('v]\nfrom = "v"\nunit = "m/s"', 'latitude]\nfrom = "v"\nunit = "deg"'), "columns.north", "map one of them"),
+        (("[columns.v]", "[columns.std_v]"), "columns.std_v", "unknown column"),
+        (('[columns.v]\nfrom = "v"\nunit = "m/s"', ""), "columns.v", "or .estimate."),
+        (("[columns.r]", "[columns.q]"), "columns.r", "or .estimate."),
+    ],
+)
+def test_mistakes_in_a_mapping(change: tuple[str, str], path: str, remedy: str, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        read_mapping(changed(tmp_path, change))
+    assert caught.value.path == path
+
+
+def test_one_run_a_file(tmp_path: Path) -> None:
+    mapping = changed(tmp_path, ('name = "plain"', 'name = "plain"\n[source]\nruns = "Z_*.csv"'))
+    for run, rate in (("10_10", 0.05), ("20_20", -0.03)):
+        as_log(turning(T, r=rate), tmp_path / f"Z_{run}.csv")
+    dataset = import_log(read_mapping(mapping), tmp_path)
+    assert dataset.runs == ["10_10", "20_20"]
+    assert dataset.metadata["clock"] == "run"
+    assert dataset.metadata["rows"] == 2 * len(T)
+    with pytest.raises(DataError, match="no file 'Z_"):
+        import_log(read_mapping(mapping), tmp_path / "elsewhere")
+
+
+def test_lever_arm_moves_position_and_velocity(tmp_path: Path) -> None:
+    """A sensor 8 m forward and 3 m to starboard: rigid-body motion, analytically; the track of the origin is back."""
+    x, y, motion = 8.0, 3.0, turning(T)
+    c, s = np.cos(motion["psi"]), np.sin(motion["psi"])
+    sensed = motion.assign(
+        north=motion["north"] + x * c - y * s,
+        east=motion["east"] + x * s + y * c,
+        u=motion["u"] - y * motion["r"],
+        v=motion["v"] + x * motion["r"],
+    )
+    repair = f'[[repair]]\nkind = "lever_arm"\nx = {x}\ny = {y}\nreason = "plan"\n'
+    frame = import_log(read_mapping(without(set(), repair, tmp_path)), logged(sensed, tmp_path)).frame
+    for name in STATES:
+        np.testing.assert_allclose(frame[name], motion[name], atol=1e-9, err_msg=name)
+    half = repair.replace("reason", 'moves = "position"\nreason')
+    frame = import_log(read_mapping(without(set(), half, tmp_path)), logged(sensed, tmp_path)).frame
+    np.testing.assert_allclose(frame["north"], motion["north"], atol=1e-9)
+    np.testing.assert_allclose(frame["v"], sensed["v"], atol=1e-9)
+
+
+def test_missing_velocities_are_estimated(tmp_path: Path) -> None:
+    estimate = "[estimate]\nposition = 0.02\nheading_deg = 0.01\nacceleration = 0.02\nangular_acceleration_deg = 0.05\n"
+    mapping = without({"u", "v", "r"}, estimate, tmp_path)
+    dataset = import_log(read_mapping(mapping), logged(turning(T), tmp_path))
+    inside = dataset.frame.iloc[10:-10]
+    for name, value in {"u": 4.0, "v": -0.5, "r": 0.05}.items():
+        np.testing.assert_allclose(inside[name], value, atol=0.01)
+        assert inside[f"std_{name}"].between(1e-6, 0.1).all()
+    assert dataset.metadata["repairs"][-1]["column"] == "u, v, r"
+    assert check_dataset(dataset)["ok"].all()
+
+
+class TestHsva:
+    """Facts of the published files, from the description that comes with them."""
+
+    @pytest.fixture
+    def folder(self, data_folder: Path) -> Path:
+        folder = data_folder / "kvlcc2_hsva"
+        if not folder.is_dir():
+            pytest.skip(f"no {folder.name} in the data folder")
+        return folder
+
+    def test_every_zigzag_passes_the_checks(self, folder: Path) -> None:
+        dataset = import_log(read_mapping("kvlcc2-hsva"), folder)
+        assert len(dataset.runs) == 13
+        assert len(dataset.frame) == 42413
+        assert check_dataset(dataset)["ok"].all()
+        assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.3  # positive to starboard
+        first = dataset.frame.groupby("run")["u"].first()
+        assert first.between(1.15, 1.20).all()  # U0 = 1.179 m/s
+        overshoots = {"10_10_P": (9.73, 17.77), "10_10_S": (9.69, 20.54)}
+        for run, expected in overshoots.items():
+            psi = np.degrees(dataset.frame.loc[dataset.frame["run"] == run, "psi"])
+            found = sorted([-psi.min() - 10.0, psi.max() - 10.0])
+            np.testing.assert_allclose(found, sorted(expected), atol=0.05)
+
+    def test_velocities_left_out_are_estimated(self, folder: Path, tmp_path: Path) -> None:
+        """From position and heading alone: within 1 % of what each varies by, and no further off than it says."""
+        text = (Path(__file__).parents[2] / "studies" / "mappings" / "kvlcc2-hsva.toml").read_text()
+        head, *blocks = text.replace("Z_*.dat", "Z_20_10_*.dat").split("[columns.")
+        head = "\n".join(line for line in head.splitlines() if not line.startswith("sha256"))
+        kept = [f"[columns.{block}" for block in blocks if block.partition("]")[0] not in ("u", "v", "r")]
+        noise = "position = 0.001\nheading_deg = 0.02\nacceleration = 0.01\nangular_acceleration_deg = 0.3\n"
+        (tmp_path / "m.toml").write_text(f"{head}\n{''.join(kept)}\n[estimate]\n{noise}")
+        found = import_log(read_mapping(tmp_path / "m.toml"), folder).frame
+        whole = import_log(read_mapping("kvlcc2-hsva"), folder).frame
+        logged = whole[whole["run"].str.startswith("20_10")].reset_index(drop=True)
+        for name in ("u", "v", "r"):
+            error = found[name] - logged[name]
+            assert np.sqrt((error**2).mean()) < 0.01 * logged[name].std()
+            assert (error.abs() < 3 * found[f"std_{name}"]).mean() > 0.99
+
+    def test_the_names_of_the_publication_fail_them(self, folder: Path, tmp_path: Path) -> None:
+        """Before the repairs of names: u, v taken as body velocities, and the roll angle as the yaw rate."""
+        text = (Path(__file__).parents[2] / "studies" / "mappings" / "kvlcc2-hsva.toml").read_text()
+        swapped = {
+            'from = "yaw_rate"': 'from = "?"',
+            'from = "roll"': 'from = "yaw_rate"',
+            'from = "?"': 'from = "roll"',
+        }
+        for old, new in {'frame = "earth"\n': "", **swapped}.items():
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "m.toml").write_text(text)
+        checks = check_dataset(import_log(read_mapping(tmp_path / "m.toml"), folder))
+        failed = checks[~checks["ok"].astype(bool)]
+        assert set(failed["check"]) == {"heading rate", "heading scale", "heading error", "path"}
+        counts = failed.groupby("check")["run"].nunique()
+        assert counts["heading rate"] == counts["heading scale"] == 13
+        assert counts["path"] == 10  # heading stays within a few degrees in the other three

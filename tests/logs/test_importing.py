@@ -1,0 +1,204 @@
+"""The real log is imported to known facts; defects put into synthetic logs are found and healed."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
+from shipid.errors import DataError
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import as_log, turning
+
+Write = Callable[..., Path]
+T = np.arange(0.0, 120.0, 0.5)
+
+
+@pytest.fixture(scope="module")
+def gunnerus(gunnerus_log: Path) -> Dataset:
+    return import_log(read_mapping("gunnerus-2022"), gunnerus_log)
+
+
+def counts(dataset: Dataset) -> dict[str, int]:
+    return {record["kind"]: record["count"] for record in dataset.metadata["repairs"]}
+
+
+def imported(frame: pd.DataFrame, mapping: Path, tmp_path: Path, **options: object) -> Dataset:
+    return import_log(read_mapping(mapping), as_log(frame, tmp_path / "log.csv"), **options)  # type: ignore[arg-type]
+
+
+class TestGunnerus:
+    """Facts of the published log, from the description that comes with it."""
+
+    def test_counts(self, gunnerus: Dataset) -> None:
+        assert gunnerus.metadata["rows"] == 17701
+        assert counts(gunnerus)["wrap_interpolation"] == 77
+        assert len(gunnerus.runs) == 23
+
+    def test_runs_are_the_tests_of_the_trial(self, gunnerus: Dataset, gunnerus_log: Path) -> None:
+        with (gunnerus_log.parent / "test_segments.csv").open() as stream:
+            tests = [(row["name"], float(row["t0"]), float(row["t1"])) for row in csv.DictReader(stream)]
+        times = gunnerus.frame.groupby("run", sort=False)["t"].agg(["min", "max"])
+        found = [(run.partition(" (")[0], start, end) for run, start, end in times.itertuples()]
+        assert found == tests
+
+    def test_ranges(self, gunnerus_log: Path) -> None:
+        raw = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("scale", "heading_offset", "lever_arm"))
+        assert raw.frame["u"].agg(["min", "max"]).round(1).tolist() == [1.2, 6.1]
+        assert raw.frame["v"].abs().max() == pytest.approx(0.9, abs=0.01)
+        assert np.degrees(raw.frame["r"].abs().max()) == pytest.approx(5.0, abs=0.01)
+        assert raw.frame["port.n"].max() * 60 == pytest.approx(205.0)
+
+    def test_positive_azimuth_turns_to_port(self, gunnerus: Dataset) -> None:
+        assert np.corrcoef(gunnerus.frame["port.alpha"], gunnerus.frame["r"])[0, 1] < -0.8
+        pd.testing.assert_series_equal(gunnerus.frame["port.n"], gunnerus.frame["starboard.n"], check_names=False)
+
+    def test_straight_runs_do_not_drift_after_the_repairs(self, gunnerus: Dataset, gunnerus_log: Path) -> None:
+        raw = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("heading_offset", "lever_arm"))
+        for dataset, drift in ((raw, 0.040), (gunnerus, 0.0)):
+            rows = dataset.frame[dataset.frame["run"].str.startswith("Speed")]
+            assert np.median(rows["v"] / rows["u"]) == pytest.approx(drift, abs=0.01)
+
+    def test_heading_agrees_with_its_rate_only_without_the_breaks(self, gunnerus: Dataset, gunnerus_log: Path) -> None:
+        whole = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("break",))
+        for dataset, worst in ((whole, 40.0), (gunnerus, 10.0)):
+            errors = [
+                np.abs(np.unwrap(rows["psi"])[6:] - np.unwrap(rows["psi"])[:-6] - 0.5 * rows["r"].rolling(6).sum()[6:])
+                for _, rows in pieces(dataset)
+            ]
+            largest = np.degrees(max(error.max() for error in errors))  # over 3 s
+            assert largest > worst if dataset is whole else largest < worst
+
+    def test_breaks_lie_where_a_minute_is_missing(self, gunnerus: Dataset) -> None:
+        broken = gunnerus.frame["flags"] & flag_bit(gunnerus.metadata, "break") != 0
+        assert gunnerus.frame.loc[broken, ["run", "t"]].to_numpy().tolist() == [
+            ["ZZ 5/10", 2702.0],
+            ["ZZ 20/20", 4215.0],
+        ]
+
+    def test_round_trip(self, gunnerus: Dataset, tmp_path: Path) -> None:
+        back = read_dataset(write_dataset(gunnerus, tmp_path / "g.parquet"))
+        pd.testing.assert_frame_equal(back.frame, gunnerus.frame)
+        assert back.metadata == gunnerus.metadata
+
+    def test_a_changed_log_is_refused(self, gunnerus_log: Path, tmp_path: Path) -> None:
+        other = tmp_path / "log.csv"
+        other.write_bytes(gunnerus_log.read_bytes()[:-1])
+        with pytest.raises(DataError, match="sha256 differs"):
+            import_log(read_mapping("gunnerus-2022"), other)
+
+
+def test_kvlcc2_earth_velocities_become_body_velocities(data_folder: Path, plain_mapping: Write) -> None:
+    """HSVA free-model zigzag 20/10: the body velocities by central differences of the recorded positions."""
+    log = data_folder / "kvlcc2_hsva" / "HSVA_CPMC_KVLCC2_Z_20_10_P.dat"
+    if not log.is_file():
+        pytest.skip(f"no {log.name} in the data folder")
+    columns = {"north": "x0 m", "east": "y0 m", "psi": "psi deg", "u": "dx0 m/s", "v": "dy0 m/s", "r": "r deg/s"}
+    columns |= {"phi": "phi deg", "rudder.delta": "delta deg", "propeller.n": "n rev/s"}
+    text = 'name = "HSVA"\n[format]\nseparator = "whitespace"\nencoding = "cp1252"\nskip_rows = 4\n'
+    text += 'names = ["t", "x0", "y0", "psi", "dx0", "dy0", "r", "phi", "delta", "n", "thrust", "torque"]\n'
+    text += '[clock]\nfrom = "t"\n'
+    for name, (source, unit) in ((name, value.split()) for name, value in columns.items()):
+        frame = 'frame = "earth"\n' if name in "uv" else ""
+        text += f'[columns."{name}"]\nfrom = "{source}"\nunit = "{unit}"\n{frame}'
+    file = plain_mapping()
+    file.write_text(text)
+    rows = import_log(read_mapping(file), log).frame
+    psi, north, east = (rows[name].to_numpy() for name in ("psi", "north", "east"))
+    dn, de = np.gradient(north, rows["t"]), np.gradient(east, rows["t"])
+    error = np.hypot(dn * np.cos(psi) + de * np.sin(psi) - rows["u"], de * np.cos(psi) - dn * np.sin(psi) - rows["v"])
+    assert np.sqrt(np.mean(error**2)) < 1e-3
+    assert rows["u"].iloc[0] == pytest.approx(1.179, abs=0.02)
+    overshoots = np.degrees(rows["psi"].max()) - 10.0, -np.degrees(rows["psi"].min()) - 10.0
+    assert min(abs(np.subtract.outer(overshoots, [11.97, 13.87, 13.16])).min(axis=1)) < 0.05
+    assert np.degrees(np.std(np.gradient(psi, rows["t"]) - rows["r"])) < 0.05
+
+
+def test_units_wrapping_and_names(plain_mapping: Write, tmp_path: Path) -> None:
+    """A clean log comes back exactly as the motion that made it; psi passes 360 deg at once."""
+    motion = turning(T)
+    dataset = imported(motion, plain_mapping(), tmp_path)
+    for name in ("t", "north", "east", "psi", "u", "v", "r"):
+        np.testing.assert_allclose(dataset.frame[name], motion[name], atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(dataset.frame["propeller.n"], motion["port.n"], atol=1e-12)
+    assert dataset.frame["flags"].eq(0).all()
+    assert dataset.metadata["repairs"] == []
+
+
+def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
+    more = '\n[[segment]]\nrun = "a"\nstart = 10\nend = 20\n[[segment]]\nrun = "b"\nstart = 15\nend = 30\n'
+    frame = imported(turning(T), plain_mapping(more), tmp_path).frame
+    assert frame.groupby("run")["t"].agg(["min", "max", "size"]).to_numpy().tolist() == [[10, 20, 21], [15, 30, 31]]
+
+
+def test_segments_at_unix_time(plain_mapping: Write, tmp_path: Path) -> None:
+    """A run may begin one step of the log before it, not more, however large the clock is."""
+    motion = turning(T).assign(t=1.7e9 + T)
+    segment = '\n[[segment]]\nrun = "a"\nstart = {}\nend = 1700000010.0\n'
+    frame = imported(motion, plain_mapping(segment.format(1699999999.5)), tmp_path).frame
+    assert frame["t"].iloc[[0, -1]].tolist() == [1.7e9, 1.7e9 + 10.0]
+    with pytest.raises(DataError, match="is not in the log"):
+        imported(motion, plain_mapping(segment.format(1699999999.0)), tmp_path)
+
+
+def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
+    more = '\n[[segment]]\nrun = "a"\nstart = 0.5\nend = 1.0\n'
+    mapping = plain_mapping(more, ('from = "time"', 'from = "time"\nunit = "min"'))
+    motion = turning(T)
+    dataset = import_log(read_mapping(mapping), as_log(motion.assign(t=motion["t"] / 60.0), tmp_path / "log.csv"))
+    assert dataset.frame["t"].iloc[[0, -1]].tolist() == [30.0, 60.0]
+
+
+def test_wind_from_becomes_towards(plain_mapping: Write, tmp_path: Path) -> None:
+    more = '[columns.V_w]\nfrom = "u"\nunit = "kn"\n[columns.beta_w]\nfrom = "heading"\nunit = "deg"\n'
+    mapping = plain_mapping(more + 'direction = "from"\nwrap = true\n')
+    frame = imported(turning(T), mapping, tmp_path).frame
+    np.testing.assert_allclose(np.cos(frame["beta_w"]), -np.cos(frame["psi"]), atol=1e-12)
+    np.testing.assert_allclose(frame["V_w"], frame["u"] * 1852 / 3600)
+
+
+def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_path: Path) -> None:
+    motion = turning(T)
+    holes = motion.assign(
+        u=motion["u"].where(~motion["t"].between(10.0, 10.5)),  # 1.5 s between known values: filled
+        v=motion["v"].where(~motion["t"].between(50.0, 60.0)),  # too long: the rows go
+    )
+    holes = holes[~holes["t"].between(80.0, 90.0)]  # no rows at all: a break, too
+    mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 2.0'))
+    dataset = imported(holes, mapping, tmp_path)
+    assert [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)] == [
+        (0.0, 49.5),
+        (60.5, 79.5),
+        (90.5, 119.5),
+    ]
+    filled = dataset.frame["flags"] & flag_bit(dataset.metadata, "interpolated") != 0
+    assert dataset.frame.loc[filled, "t"].tolist() == [10.0, 10.5]
+    np.testing.assert_allclose(dataset.frame["u"], 4.0)
+    assert counts(dataset) == {"interpolated": 0, "break": 2}  # of v none, of u two: the last record wins
+    assert [record["count"] for record in dataset.metadata["repairs"]] == [2, 0, 2]
+
+
+def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> None:
+    frame = imported(turning(T), plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
+    assert np.unique(np.diff(frame["t"])).tolist() == [1.0]
+    every_other = turning(T).iloc[::2].reset_index(drop=True)
+    np.testing.assert_allclose(frame["north"], every_other["north"], atol=1e-9)
+    np.testing.assert_allclose(frame["propeller.n"], every_other["port.n"], atol=1e-12)
+    unix = turning(T).assign(t=1.7e9 + T)
+    moved = imported(unix, plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
+    np.testing.assert_array_equal(moved["propeller.n"], frame["propeller.n"])
+
+
+def test_unknown_repair_to_leave_out(plain_mapping: Write, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="did you mean 'heading_offset'"):
+        imported(turning(T), plain_mapping(), tmp_path, without=("heading-offset",))
+
+
+def test_mapping_is_frozen_and_digested(plain_mapping: Write) -> None:
+    first, second = read_mapping(plain_mapping()), read_mapping(plain_mapping("\n[resample]\nstep = 1.0\n"))
+    assert first.digest != second.digest
+    with pytest.raises(ValueError, match="frozen"):
+        first.name = "other"

@@ -1,0 +1,219 @@
+"""One motion, written in every format a log may have, comes back as the same dataset."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from shipid.errors import DataError, DocumentError
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import PLAIN, as_log, turning
+
+Write = Callable[..., Path]
+T = np.arange(0.0, 60.0, 0.5)
+STATES = ["t", "north", "east", "psi", "u", "v", "r", "propeller.n"]
+NAMES = ["time", "N", "E", "heading", "u", "v", "rot", "rpm"]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> pd.DataFrame:
+    return pd.read_csv(as_log(turning(T), tmp_path / "plain.csv"))
+
+
+def mapping_with(tmp_path: Path, form: str, *changes: tuple[str, str]) -> Path:
+    text = PLAIN.read_text().replace("[clock]", f"[format]\n{form}\n[clock]")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = tmp_path / "mapping.toml"
+    file.write_text(text)
+    return file
+
+
+def assert_is_the_motion(mapping: Path, file: Path) -> None:
+    frame = import_log(read_mapping(mapping), file).frame
+    motion = turning(T).rename(columns={"port.n": "propeller.n"})
+    for name in STATES:
+        np.testing.assert_allclose(frame[name], motion[name], atol=1e-6, err_msg=name)
+
+
+TEXTS: dict[str, tuple[str, Callable[[pd.DataFrame, Path], object]]] = {
+    "tabs": ('separator = "\\t"', lambda f, p: f.to_csv(p, sep="\t", index=False)),
+    "semicolons and decimal commas": (
+        'separator = ";"\ndecimal = ","',
+        lambda f, p: f.to_csv(p, sep=";", decimal=",", index=False),
+    ),
+    "blanks": ('separator = "whitespace"', lambda f, p: p.write_text(f.to_string(index=False))),
+    "utf-16": ('encoding = "utf-16"', lambda f, p: f.to_csv(p, encoding="utf-16", index=False)),
+    "lines before the header": (
+        "skip_rows = 2",
+        lambda f, p: p.write_text("R/V Ferry\n27 October\n" + f.to_csv(index=False)),
+    ),
+    "names in the mapping": (f"names = {NAMES}", lambda f, p: f.to_csv(p, index=False, header=False)),
+    "parquet": ('kind = "parquet"', lambda f, p: f.to_parquet(p)),
+    "matlab": ('kind = "mat"', lambda f, p: savemat(p, {name: f[name].to_numpy() for name in f}, appendmat=False)),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_format(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    form, write = TEXTS[name]
+    write(log, tmp_path / "log")
+    assert_is_the_motion(mapping_with(tmp_path, form), tmp_path / "log")
+
+
+def test_column_numbers(log: pd.DataFrame, tmp_path: Path) -> None:
+    log.to_csv(tmp_path / "log", index=False, header=False)
+    changes = [(f'from = "{name}"', f'from = "{number}"') for number, name in enumerate(NAMES, start=1)]
+    assert_is_the_motion(mapping_with(tmp_path, "header = false", *changes), tmp_path / "log")
+
+
+def test_matlab_structs_and_matrices(log: pd.DataFrame, tmp_path: Path) -> None:
+    log_struct = {"t": log["time"].to_numpy(), "xy": log[["N", "E"]].to_numpy(), "note": "sea state 2", "scale": 3.0}
+    others = {name: log[name].to_numpy() for name in NAMES[3:]}
+    savemat(tmp_path / "log.mat", {"log": log_struct, "gps": np.arange(7.0), **others})
+    changes = [('"time"', '"log.t"'), ('"N"', '"log.xy.1"'), ('"E"', '"log.xy.2"')]
+    assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"', *changes), tmp_path / "log.mat")
+
+
+def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
+    since = pd.Timestamp("2022-10-27T08:00:00Z")
+    log.assign(time=[(since + pd.Timedelta(seconds=t)).isoformat() for t in log["time"]]).to_csv(tmp_path / "log")
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
+    np.testing.assert_allclose(frame["t"] - 1666857600.0, T, atol=1e-5)  # date -u -d 2022-10-27T08:00 +%s
+
+
+@pytest.mark.parametrize(("kind", "remedy"), [("parquet", "not a Parquet file"), ("mat", "not a MATLAB file")])
+def test_another_format_than_declared(kind: str, remedy: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    log.to_csv(tmp_path / "log")
+    with pytest.raises(DataError, match=remedy):
+        import_log(read_mapping(mapping_with(tmp_path, f'kind = "{kind}"')), tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("form", "path", "remedy"),
+    [
+        ('kind = "nmae"', "format.kind", "did you mean 'nmea'"),
+        ('kind = "parquet"\nseparator = ";"', "format.separator", "unknown key: valid: kind"),
+        ('kind = "nmea"\ntime = "utc"', "format.time", "'fix' or 'line'"),
+    ],
+)
+def test_keys_of_a_format(form: str, path: str, remedy: str, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        read_mapping(mapping_with(tmp_path, form))
+    assert caught.value.path == path
+
+
+def sentence(body: str) -> str:
+    """NMEA 0183: $body*checksum, the exclusive or of all characters of the body."""
+    check = 0
+    for character in body:
+        check ^= ord(character)
+    return f"${body}*{check:02X}"
+
+
+def degrees_minutes(value: float, width: int) -> str:
+    degrees = int(abs(value))
+    return f"{degrees:0{width}d}{60 * (abs(value) - degrees):011.8f}"
+
+
+NMEA = """
+name = "bridge"
+[format]
+kind = "nmea"
+[clock]
+from = "time"
+max_gap = 5.0
+step = 0.5
+[origin]
+latitude = 63.45
+longitude = 10.4
+[columns.latitude]
+from = "latitude"
+unit = "deg"
+[columns.longitude]
+from = "longitude"
+unit = "deg"
+[columns.psi]
+from = "heading"
+unit = "deg"
+wrap = true
+[columns.speed]
+from = "sog"
+unit = "kn"
+[columns.course]
+from = "cog"
+unit = "deg"
+wrap = true
+[columns.r]
+from = "rot"
+unit = "deg/min"
+[columns.V_w]
+from = "apparent_speed"
+unit = "m/s"
+[columns.beta_w]
+from = "apparent_angle"
+unit = "deg"
+direction = "from"
+relative = true
+wrap = true
+[columns."rudder.delta"]
+from = "rudder"
+unit = "deg"
+"""
+
+
+def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, pd.DataFrame]:
+    """Sentences of a ship in a steady turn in a wind of 8 m/s towards the east; 2 of them are damaged."""
+    radius = 6378137.0  # m; close enough to the ellipsoid's for a check to 1 %
+    lines = ["!AIVDM,1,1,,A,14eG;o@034o8sd<L9i:a;WF>062D,0*7D", "$GPRMC,noise"]
+    course = np.degrees(motion["psi"] + np.arctan2(motion["v"], motion["u"])) % 360
+    speed = np.hypot(motion["u"], motion["v"]) * 3600 / 1852
+    for row in motion.itertuples():
+        index = row.Index
+        clock = (midnight + row.t) % 86400
+        stamp = f"{int(clock // 3600):02d}{int(clock % 3600 // 60):02d}{clock % 60:05.2f}"
+        latitude = 63.45 + np.degrees(row.north / radius)
+        longitude = 10.4 + np.degrees(row.east / radius / np.cos(np.radians(63.45)))
+        where = f"{degrees_minutes(latitude, 2)},N,{degrees_minutes(longitude, 3)},E"
+        psi = np.degrees(row.psi) % 360
+        ahead, abeam = 8 * np.sin(row.psi) - row.u, 8 * np.cos(row.psi) - row.v
+        comes_from = (np.degrees(np.arctan2(abeam, ahead)) + 180) % 360
+        said = [
+            f"GPRMC,{stamp},A,{where},{speed[index]:.6f},{course[index]:.5f},271022,,,A",
+            f"HEHDT,{psi:.5f},T",
+            f"TIROT,{np.degrees(row.r) * 60:.5f},A",
+            f"WIMWV,{comes_from:.4f},R,{np.hypot(ahead, abeam):.5f},M,A",
+            "AGRSA,10.0,A,,",
+        ]
+        before = f"{row.t:.1f} " if time == "line" else ""
+        lines += [before + sentence(body) for body in said]
+    return "\r\n".join(lines) + "\r\n", motion
+
+
+@pytest.mark.parametrize(("time", "midnight"), [("fix", 0.0), ("fix", 86400.0 - 30.0), ("line", 0.0)])
+def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
+    text, motion = bridge_log(time, midnight, turning(T))
+    if time == "line":
+        text = "\n".join(text.splitlines()[2:])
+    (tmp_path / "bridge.nmea").write_text(text)
+    (tmp_path / "mapping.toml").write_text(NMEA.replace('"nmea"', f'"nmea"\ntime = "{time}"'))
+    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "bridge.nmea")
+    frame = dataset.frame
+    assert len(frame) == len(T)
+    np.testing.assert_allclose(frame["t"], T + midnight, atol=1e-6)
+    for name, tolerance in {"psi": 1e-6, "u": 1e-5, "v": 1e-5, "r": 1e-6}.items():
+        np.testing.assert_allclose(frame[name], motion[name], atol=tolerance, err_msg=name)
+    extent = np.ptp(motion["north"])
+    for name in ("north", "east"):
+        np.testing.assert_allclose(frame[name], motion[name], atol=0.01 * extent, err_msg=name)
+    np.testing.assert_allclose(frame["V_w"], 8.0, atol=1e-3)
+    np.testing.assert_allclose(np.sin(frame["beta_w"]), 1.0, atol=1e-3)
+    np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), 10.0)
+    counted = [record["count"] for record in dataset.metadata["repairs"] if record["kind"] == "unreadable"]
+    assert counted == ([2] if time == "fix" else [])
+    assert dataset.metadata["origin"] == {"latitude": 63.45, "longitude": 10.4}

@@ -1,0 +1,124 @@
+"""A defect is put into an exact motion; its repair finds it, heals it, flags it, and can be switched off."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset, flag_bit, pieces
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import as_log, turning
+
+T = np.arange(0.0, 240.0, 0.5)
+MOTION = turning(T)
+
+
+def lever(frame: pd.DataFrame, x: float) -> pd.DataFrame:
+    """What a sensor at x forward of the origin measures on a rigid body."""
+    return frame.assign(
+        north=frame["north"] + x * np.cos(frame["psi"]),
+        east=frame["east"] + x * np.sin(frame["psi"]),
+        v=frame["v"] + x * frame["r"],
+    )
+
+
+def low_heading(frame: pd.DataFrame, offset: float) -> pd.DataFrame:
+    """What is logged when the compass reads low and ground velocity is resolved along its heading."""
+    psi = frame["psi"] - offset
+    north = frame["u"] * np.cos(frame["psi"]) - frame["v"] * np.sin(frame["psi"])
+    east = frame["u"] * np.sin(frame["psi"]) + frame["v"] * np.cos(frame["psi"])
+    return frame.assign(psi=psi, u=north * np.cos(psi) + east * np.sin(psi), v=east * np.cos(psi) - north * np.sin(psi))
+
+
+def spiked(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.assign(north=frame["north"] + np.where(np.isin(frame["t"], [60.0, 60.5, 150.0]), 40.0, 0.0))
+
+
+CASES = {
+    "scale": (
+        'columns = ["u", "v"]\nfactor = 1.0204',
+        lambda f: f.assign(u=f["u"] / 1.0204, v=f["v"] / 1.0204),
+        480,
+        1e-9,
+    ),
+    "heading_offset": ('offset = 2.3\nunit = "deg"', lambda f: low_heading(f, np.radians(2.3)), 480, 1e-9),
+    "lever_arm": ("x = 2.1", lambda f: lever(f, 2.1), 480, 1e-9),
+    "despike": ('columns = ["north"]\nwindow = 6\nthreshold = 10\nunit = "m"', spiked, 3, 0.15),
+}
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_defect_is_healed(kind: str, plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    parameters, spoil, count, tolerance = CASES[kind]
+    mapping = read_mapping(plain_mapping(f'\n[[repair]]\nkind = "{kind}"\nreason = "a test"\n{parameters}\n'))
+    log = as_log(spoil(MOTION), tmp_path / "log.csv")
+    healed, left = import_log(mapping, log), import_log(mapping, log, without=(kind,))
+    names = ["north", "east", "psi", "u", "v", "r"]
+    difference = (healed.frame[names] - MOTION[names]).abs()
+    assert difference.max().max() < tolerance
+    assert (left.frame[names] - MOTION[names]).abs().max().max() > 0.03
+    assert healed.metadata["repairs"][0]["count"] == count
+    assert flagged(healed, kind).sum() == count
+    assert (left.metadata["repairs"][0]["count"], left.metadata["repairs"][0]["note"]) == (0, "switched off")
+    assert not flagged(left, kind).any()
+
+
+def flagged(dataset: Dataset, kind: str) -> pd.Series:
+    return dataset.frame["flags"] & flag_bit(dataset.metadata, kind) != 0
+
+
+def wrapped_and_interpolated(tmp_path: Path, early: float) -> tuple[Path, int]:
+    """A log whose 0..360 heading was interpolated linearly to 0.5 s from every 1.5 s, and how often it wraps."""
+    coarse = np.arange(0.0, 240.0, 1.5) - early
+    heading = np.degrees(np.interp(coarse, T, MOTION["psi"])) % 360.0
+    wraps = int((np.abs(np.diff(heading)) > 180).sum())
+    log = as_log(MOTION, tmp_path / "log.csv")
+    frame = pd.read_csv(log)
+    frame["heading"] = np.interp(T, coarse, heading)
+    frame.to_csv(log, index=False)
+    return log, wraps
+
+
+@pytest.mark.parametrize("early", [-0.02, 0.0, 0.02])  # 0.02 s: an outer false sample is only 5 deg wrong
+def test_interpolated_wraps_are_found_and_healed(
+    early: float, plain_mapping: Callable[..., Path], tmp_path: Path
+) -> None:
+    log, wraps = wrapped_and_interpolated(tmp_path, early)
+    repair = '\n[[repair]]\nkind = "wrap_interpolation"\ncolumns = ["psi"]\nthreshold = 20.0\nunit = "deg"\n'
+    mapping = read_mapping(plain_mapping(repair + 'reason = "a test"\n'))
+    dataset = import_log(mapping, log)
+    inside = (T >= 1.5) & (T < 238.0)  # where the coarse clock brackets the fine one
+    assert dataset.metadata["repairs"][0]["count"] == 3 * wraps > 0  # three steps of 0.5 s over each
+    np.testing.assert_allclose(dataset.frame["psi"][inside], MOTION["psi"][inside], atol=1e-9)
+    spoiled = import_log(mapping, log, without=("wrap_interpolation",))
+    assert np.abs(spoiled.frame["psi"] - MOTION["psi"])[inside].max() > 0.5
+
+
+def test_disabled_in_the_file(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    repair = '\n[[repair]]\nkind = "scale"\ncolumns = ["u"]\nfactor = 2.0\nreason = "a test"\nenabled = false\n'
+    dataset = import_log(read_mapping(plain_mapping(repair)), as_log(MOTION, tmp_path / "log.csv"))
+    np.testing.assert_allclose(dataset.frame["u"], MOTION["u"])
+
+
+def test_heading_offset_keeps_the_path(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    """Velocity over ground, R(psi) (u, v), is the same with and without."""
+    repair = '\n[[repair]]\nkind = "heading_offset"\noffset = 0.3\nreason = "a test"\n'
+    frame = import_log(read_mapping(plain_mapping(repair)), as_log(MOTION, tmp_path / "log.csv")).frame
+    for f in (frame, MOTION):
+        np.testing.assert_allclose(np.hypot(f["u"], f["v"]), np.hypot(4.0, 0.5))
+    course = [np.unwrap(f["psi"] + np.arctan2(f["v"], f["u"])) for f in (frame, MOTION)]
+    np.testing.assert_allclose(course[0], course[1], atol=1e-9)
+
+
+def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
+    plain_mapping: Callable[..., Path], tmp_path: Path
+) -> None:
+    jumped = MOTION.assign(north=MOTION["north"] + np.where(T >= 100.0, 300.0, 0.0))
+    repairs = '\n[[repair]]\nkind = "break"\nintervals = [[99.0, 101.0]]\nreason = "a test"\n'
+    repairs += '[[repair]]\nkind = "despike"\ncolumns = ["north"]\nwindow = 6\nthreshold = 10\nreason = "a test"\n'
+    dataset = import_log(read_mapping(plain_mapping(repairs)), as_log(jumped, tmp_path / "log.csv"))
+    ends = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)]
+    assert ends == [(0.0, 99.0), (101.0, 239.5)]
+    assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
