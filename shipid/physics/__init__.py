@@ -52,7 +52,6 @@ GIVEN = ("wash",)
 """What a term may ask for that another component gives: the one that its block says it is `behind`."""
 
 
-
 class _Commands:
     """Commands and their units, for what does not ask `signals.SIGNALS` yet."""
 

@@ -155,7 +155,7 @@ def controllable_wash(
     C_2_plus: Annotated[SX | float, "-"] = 1.0,
     C_2_minus: Annotated[SX | float, "-"] = 1.0,
 ) -> SX:
-    """Flow at a rudder behind a controllable-pitch propeller, (3): inflow [m/s], speed far down the race [m/s], D_p [m].
+    """Flow at a rudder behind a controllable-pitch propeller, (3): inflow, speed far down the race [m/s], D_p [m].
 
     u_race^2 = u_P^2 + 8 T / (pi rho D_p^2) by momentum theory; no race where the propeller drives astern.
     """

@@ -26,7 +26,8 @@ class Signal:
     shown : unit in which sailors read it; None is `unit`.
     factor : SI units in one `shown` unit.
     angle : whether it is an angle, interpolated across its wrap.
-    drives : of a command: `shaft`, a speed of revolutions; `helm`, an angle that turns the ship; `none`, anything else.
+    shaft : whether it is a speed of revolutions.
+    turns : of an angle that steers: sign of the yaw rate that a positive one gives, aft of the origin; 0: steers not.
     mirror : its sign in the port-starboard mirror.
     column : whether datasets need it, may have it, or have it under no name. A command may always stand.
     names : regular expression of how logs call it, in lower case and without the unit; empty where logs have it not.
@@ -45,7 +46,8 @@ class Signal:
     shown: str | None = None
     factor: float = 1.0
     angle: bool = False
-    drives: Literal["shaft", "helm", "none"] = "none"
+    shaft: bool = False
+    turns: Literal[-1, 0, 1] = 0
     mirror: Literal[-1, 1] = 1
     column: Literal["required", "optional", "none"] = "none"
     names: str = ""
@@ -190,7 +192,7 @@ SIGNALS: dict[str, Signal] = {
         "shaft",
         shown="rpm",
         factor=RPM,
-        drives="shaft",
+        shaft=True,
         names=r"n_?(port|stbd|starboard|stern|bow)?|rpm\w*|rev\w*|rps\w*|shaft\w*|\w+_(rpm|shaft|rev)|n_p|n_s",
         plausible=40.0,
         read_as_SI=25.0,
@@ -205,7 +207,7 @@ SIGNALS: dict[str, Signal] = {
         shown="deg",
         factor=DEGREE,
         angle=True,
-        drives="helm",
+        turns=-1,
         mirror=-1,
         names=r"alpha\w*|azi\w*|\w+_(azi\w*|alpha)",
         plausible=12.6,
@@ -220,7 +222,7 @@ SIGNALS: dict[str, Signal] = {
         shown="deg",
         factor=DEGREE,
         angle=True,
-        drives="helm",
+        turns=1,
         mirror=-1,
         names=r"delta\w*|rud\w*|\w+_(rud\w*|delta)",
         plausible=1.6,
@@ -269,13 +271,13 @@ def is_command(name: str) -> bool:
 def is_shaft(command: str) -> bool:
     """Whether a command is a speed of revolutions, such as `port.n`."""
     row = row_of(command)
-    return row is not None and row.drives == "shaft"
+    return row is not None and row.shaft
 
 
 def steers(command: str) -> bool:
     """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
     row = row_of(command)
-    return row is not None and row.drives == "helm"
+    return row is not None and row.turns != 0
 
 
 def neutral(command: str) -> float:
