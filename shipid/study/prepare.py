@@ -294,7 +294,7 @@ def _redraw(plan: Plan, model: Model, family: Family, share: float) -> Model:
     assert model.variant is not None
     assert model.vessel is not None
     counter = model.variant.counter + 1
-    if counter > MOST_REDRAWS or not any(isinstance(block.factor, tuple) for block in family.perturb):
+    if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
         raise DocumentError(
             f"{model.name} diverges on {share:.1%} of the training windows{tries}: "
