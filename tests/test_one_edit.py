@@ -76,7 +76,7 @@ def with_flap() -> Vessel:
     """A tanker model with a flap behind her rudder, which follows its order with a lag."""
     lag = {"flap": {"kind": "first_order", "T": 0.5, "rate": 0.2}}
     document = load_vessel("kvlcc2-l7").document
-    block = {"kind": "flap", "x": -3.5, "k": 2.0, "actuator": lag}
+    block = {"kind": "flap", "x": -3.5, "k": 50.0, "actuator": lag}
     return check_vessel({**document, "thruster": {**document["thruster"], "tail": block}}, "with a flap")
 
 
