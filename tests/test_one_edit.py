@@ -16,7 +16,7 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.compensator import choose_features
+from shipid.hybrid.features import choose_features
 from shipid.hybrid.ridge import _reflection
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess

@@ -186,6 +186,8 @@ SIGNALS: dict[str, Signal] = {
     ),
     "u_rw": Signal("derived", "m/s", "speed ahead through the wind"),
     "v_rw": Signal("derived", "m/s", "speed to starboard through the wind", mirror=-1),
+    "x": Signal("derived", "m", "way ahead"),
+    "y": Signal("derived", "m", "way to starboard", mirror=-1),
     "n": Signal(
         "command",
         "rev/s",
@@ -278,6 +280,12 @@ def steers(command: str) -> bool:
     """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
     row = row_of(command)
     return row is not None and row.turns != 0
+
+
+def orders_thrust(name: str) -> bool:
+    """Whether a name ends in a command that does not steer: a shaft speed, a pitch; whatever it says of when."""
+    row = row_of(name)
+    return row is not None and row.role == "command" and row.turns == 0
 
 
 def neutral(command: str) -> float:

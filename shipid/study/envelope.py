@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.windows import Windows
-from shipid.hybrid.compensator import choose_features, feature_table
+from shipid.hybrid.features import choose_features, feature_table
 from shipid.physics.signals import read_unit, signal_of
 from shipid.study.plan import Plan, Published, published_keys
 from shipid.study.prepare import nested
