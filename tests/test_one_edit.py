@@ -25,7 +25,7 @@ from shipid.physics import TERMS, Term, signals
 from shipid.physics.frames import force_at
 from shipid.physics.signals import Signal
 from shipid.study.envelope import envelope_table
-from shipid.study.plan import Plan, Published, build_plan
+from shipid.study.plan import Published, build_plan
 from shipid.units import DEGREE
 from shipid.vessel import perturb, schema
 from shipid.vessel.dynamics import dynamics
@@ -33,7 +33,6 @@ from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
 from tests.logs.conftest import PLAIN, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
-from tests.study.tiny import tiny_plan
 
 FLAP = Signal(
     "command",
@@ -211,24 +210,38 @@ SHIFT = Rule(
 )
 
 
-def shifted(folder: Path, block: Mapping[str, Any]) -> Plan:
-    document = tiny_plan(folder).document
-    document["family"][1]["perturb"] = [{"parameters": ["inertia.x_G"], **block}]
-    return build_plan(document, folder / "tiny.toml")
+def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
+    """Shift of x_G [m] of each member of a study's family that says so."""
+    document = {
+        "question": "What if the centre of gravity is elsewhere?",
+        "truth": {"vessel": "gunnerus-28.9", "manoeuvres": 8, "duration": 20.0},
+        "split": {"test": 2},
+        "prediction": {"ahead": 5.0},
+        "grid": {"N_D": [4]},
+        "family": [
+            {
+                "name": "wrong",
+                "base": "gunnerus-28.9",
+                "members": 2,
+                "perturb": [{"parameters": ["inertia.x_G"], **block}],
+            }
+        ],
+    }
+    base = load_vessel("gunnerus-28.9").parameters["inertia.x_G"]
+    variants = [one.variant for one in build_plan(document, folder / "study.toml").foundations]
+    return [variant.values["inertia.x_G"] - base for variant in variants if variant and variant.family == "wrong"]
 
 
 def test_without_the_rule_a_study_names_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"unknown key: .*factor") as caught:
         shifted(tmp_path, {"shift": 0.5})
-    assert caught.value.path == "family.1.perturb.0.shift"
+    assert caught.value.path == "family.0.perturb.0.shift"
 
 
 def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
-    base = load_vessel("gunnerus-28.9").parameters["inertia.x_G"]
-    for block, least, most in (({"shift": 0.5}, 0.5, 0.5), ({"shift": (0.1, 0.4)}, 0.1, 0.4)):
-        models = [model for model in shifted(tmp_path, block).models if model.family == "wrong"]
-        shifts = [model.variant.values["inertia.x_G"] - base for model in models if model.variant]
+    for block, least, most in (({"shift": 0.5}, 0.5, 0.5), ({"shift": [0.1, 0.4]}, 0.1, 0.4)):
+        shifts = shifted(tmp_path, block)
         assert len(shifts) == 2
         assert all(least - 1e-12 <= shift <= most + 1e-12 for shift in shifts)
         assert (shifts[0] == shifts[1]) == (least == most)
@@ -238,4 +251,4 @@ def test_a_rule_refuses_a_value_at_its_own_key(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
     with pytest.raises(DocumentError) as caught:
         shifted(tmp_path, {"shift": "far"})
-    assert str(caught.value.path).startswith("family.1.perturb.0.shift")
+    assert str(caught.value.path).startswith("family.0.perturb.0.shift")
