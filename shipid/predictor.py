@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from shipid.data.windows import Commands, from_frame, planned_means, to_frame
-from shipid.engine.rollout import Distances, Engine, distances, rollout
+from shipid.engine.rollout import Distances, distances, rollout
 from shipid.errors import DataError, ResultError
 from shipid.files import write_arrays
 from shipid.hybrid.compensator import Compensator
@@ -196,7 +196,7 @@ def physics_distances(
     parameters: Array | None = None,
     memory: Mapping[str, Array] | None = None,
     planned: Mapping[str, Array] | None = None,
-    engine: Engine = "auto",
+    engine: str = "auto",
     device: str = "cpu",
 ) -> Distances:
     """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11) of S instants.
