@@ -45,6 +45,7 @@ class Alone(Method):
     """H = A: the prediction is the path of the physics. It has no settings and does not meet `none`."""
 
     compensates: ClassVar[bool] = False
+    meets_none: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = Unchanged
 
     def fit(self, task: Task) -> dict[str, Fitted]:

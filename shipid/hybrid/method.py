@@ -120,13 +120,15 @@ class Method(BaseModel):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
-    compensates : whether anything is learned from data; it then also works without physics.
+    compensates : whether anything is learned from data.
+    meets_none : whether it works without physics.
     corrector : the class that a saved predictor is rebuilt with.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     validation: ClassVar[str] = "share"
     compensates: ClassVar[bool] = True
+    meets_none: ClassVar[bool] = True
     corrector: ClassVar[type[Any]]
 
     @property

@@ -8,12 +8,14 @@ from typing import Any
 from shipid.document import parse
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.alone import Alone
+from shipid.hybrid.learned_force import LearnedForce
 from shipid.hybrid.method import Method
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,
+    "learned-force": LearnedForce,
     "path-drawn": PathDrawn,
     "path-trained": PathTrained,
 }

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.windows import Instants, from_frame, to_frame
+from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, distances, rollout
 from shipid.errors import DataError
@@ -68,6 +69,36 @@ class Physics:
             x, y = to_frame(found["north"][1:, 0], found["east"][1:, 0], *origin)
         return {"x": x, "y": y, **{name: found[name][1:, 0] for name in MOTION}}
 
+    def gradient(
+        self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None
+    ) -> tuple[float, Array]:
+        """Mean squared position error [m^2] over windows and steps, and its slope by the parameters `names`, (K,).
+
+        future : true paths (T, S, 2) [m] in the frame (11). parameters : (P,) numbers instead of the vessel's.
+        Windows on which the rollout diverges are left out; the error is infinite where all do.
+        """
+        assert self.vessel is not None
+        found = rollout_gradient(
+            self.vessel,
+            *self._inputs(instants),
+            squared_distance(self._north_east(instants, future)),
+            step=self.step,
+            num_steps=self.horizon,
+            method=self.integrator,
+            names=names,
+            parameters=parameters,
+            memory=instants.hidden,
+        )
+        sound = ~found.diverged
+        if not sound.any():
+            return float("inf"), np.zeros(len(names))
+        return float(found.loss[sound].mean()), np.asarray(found.parameters[sound].mean(axis=0))
+
+    def _north_east(self, instants: Instants, future: Array) -> Array:
+        """Paths (T, S, 2) [m] in the frame (11) as north and east."""
+        origin = (instants.columns.get(name, np.zeros(len(instants))) for name in ("north", "east", "psi"))
+        return np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1)
+
     def distances(
         self,
         instants: Instants,
@@ -79,11 +110,10 @@ class Physics:
     ) -> Distances:
         """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11), without keeping paths."""
         assert self.vessel is not None
-        origin = (instants.columns.get(name, np.zeros(len(instants))) for name in ("north", "east", "psi"))
         return distances(
             self.vessel,
             *self._inputs(instants),
-            np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1),
+            self._north_east(instants, future),
             step=self.step,
             method=self.integrator,
             parameters=parameters,

@@ -557,7 +557,7 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
                 message = f"{pattern!r} is no family: {choices(pattern, families)}"
                 raise DocumentError(message, file=file, path=f"{path}.families")
             met.update(matching)
-        if not method.compensates:
+        if not method.meets_none:
             met -= {NO_MODEL}
         ways.append(Way(block.name, block.kind, method, tuple(f.name for f in foundations if f.family in met)))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}

@@ -1,0 +1,227 @@
+"""Learned force: a small bounded network inside the equations of motion, trained through multi-step rollouts.
+
+M nu_dot = (forces of the vessel) + tau(u, v, r), tau = tau_max tanh(c h(u, v, r)), the term `hull.learned`. Its numbers
+minimise the mean squared position error over the horizon plus a ridge on them, by L-BFGS on exact gradients of the
+rollout. A network inside an equation: universal differential equations (Rackauckas et al. 2020); a network as the
+damping of a ship: van de Ven et al. (2007).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveFloat, PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+BLOCK = "hull.learned"
+SCALES = ("u_scale", "v_scale", "r_scale")
+LIMITS = ("X_max", "Y_max", "N_max")
+HIDDEN = ("w_u", "w_v", "w_r", "w_0")
+OUTPUT = ("c_X", "c_Y", "c_N")
+LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
+
+
+@dataclass(frozen=True)
+class ForceCorrector:
+    """A force added to the equations: numbers of the block `hull.learned`, name -> (units,) or (1,)."""
+
+    block: Mapping[str, Array]
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def with_force(self, physics: Physics) -> Physics:
+        """Return the physics with the learned force among its terms."""
+        return physics.with_values({BLOCK: plain(self.block)})
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return paths (T, S, 2) [m] in the frame (11) of the physics with the learned force."""
+        return self.with_force(physics).paths(instants)
+
+    def header(self) -> dict[str, Any]:
+        """Return the hyperparameters."""
+        return {"hyperparameters": dict(self.hyperparameters)}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the numbers of the block by name."""
+        return dict(self.block)
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where a number is missing or lists differ in length."""
+        names = (*SCALES, *LIMITS, *HIDDEN, *OUTPUT)
+        missing = next((name for name in names if name not in arrays), None)
+        if missing is not None:
+            raise ResultError("missing in the saved force", path=missing)
+        if len({arrays[name].shape for name in (*HIDDEN, *OUTPUT)}) != 1:
+            raise ResultError("the lists of the saved force differ in length", path=BLOCK)
+        return cls({name: arrays[name] for name in names}, dict(header["hyperparameters"]))
+
+
+class LearnedForce(Searched):
+    """A bounded tanh network of u, v, r as a force in the equations, trained on the errors of the path.
+
+    Parameters
+    ----------
+    trials : values of the ridge that are tried, evenly spread by its logarithm.
+    units : hidden units of the network.
+    ridge : weight of the mean squared output weight [m^2]; a range is searched.
+    limit : bound of the force, times m U^2 / L_pp, and of the moment, times I_z (U / L_pp)^2, with U the greatest speed
+        of the training windows.
+    iterations : of L-BFGS, at most.
+    samples : training windows that the loss is taken over, at most; more are drawn from.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
+    meets_none: ClassVar[bool] = False
+    corrector: ClassVar[type[Any]] = ForceCorrector
+
+    trials: PositiveInt = 5
+    units: PositiveInt = 12
+    ridge: Scale = (1e-4, 1.0)
+    limit: PositiveFloat = 1.0
+    iterations: PositiveInt = 80
+    samples: PositiveInt = 1500
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Train a force for every foundation: the ridge that validates best, then all windows with it."""
+        return {name: self._fit(task, name) for name in task.cases}
+
+    def ridges(self) -> list[float]:
+        """Return the values of the ridge that are tried."""
+        return (
+            [self.ridge]
+            if isinstance(self.ridge, float)
+            else [float(r) for r in np.geomspace(*self.ridge, self.trials)]
+        )
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        case, instants, future = task.cases[name], task.instants(name), task.windows.future
+        if not np.isfinite(case.paths).all():
+            blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
+            return Fitted(
+                None, [{"number": i, "params": {"ridge": r}, **blank} for i, r in enumerate(self.ridges())], 0.0
+            )
+        begin = time.perf_counter()
+        assert case.physics.vessel is not None
+        if "learned" in case.physics.vessel.document.get("hull", {}):
+            raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
+        everything = np.arange(len(task.windows))
+        trials: list[dict[str, Any]] = []
+        best = (np.inf, self.ridges()[0])
+        starts: dict[int, Array | None] = {}
+        for number, ridge in enumerate(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
+            start, losses, steps = time.perf_counter(), [], 0
+            for fold, (training, validation) in enumerate(task.folds):
+                trainer = self._trainer(task, name, instants, future, training, seed_of(task.seed, name, fold))
+                weights, count = trainer.solve(ridge, starts.get(fold))
+                starts[fold], steps = weights, max(steps, count)
+                losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
+            value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
+            state = "complete" if np.isfinite(value) else "diverged"
+            trials.append({"number": number, "params": {"ridge": ridge}, "value": value, "state": state})
+            trials[-1] |= {"epochs": steps, "seconds": time.perf_counter() - start}
+            best = min(best, (value, ridge)) if np.isfinite(value) else best
+            if task.on_trial is not None:
+                task.on_trial(number + 1, len(self.ridges()))
+        if not np.isfinite(best[0]):
+            return Fitted(None, trials, time.perf_counter() - begin)
+        trainer = self._trainer(task, name, instants, future, everything, seed_of(task.seed, name))
+        weights, _ = trainer.solve(best[1], None)
+        corrector = ForceCorrector(trainer.block(weights), {"ridge": best[1]})
+        return Fitted(corrector, trials, time.perf_counter() - begin)
+
+    def _trainer(self, task: Task, name: str, instants: Instants, future: Array, windows: Index, seed: int) -> _Trainer:
+        """The problem of one fold: a physics with the block, and at most `samples` of the training windows."""
+        generator = np.random.default_rng(seed)
+        some = windows
+        if len(windows) > self.samples:
+            some = np.sort(generator.choice(windows, self.samples, replace=False))
+        physics = task.cases[name].physics
+        assert physics.vessel is not None
+        columns = {motion: instants.columns[motion][windows] for motion in ("u", "v", "r")}
+        block: dict[str, Array] = {
+            scale: np.array([max(float(columns[motion].std()), LEAST_SCALE)])
+            for scale, motion in zip(SCALES, ("u", "v", "r"), strict=True)
+        }
+        block |= limits(physics.vessel, float(np.hypot(columns["u"], columns["v"]).max()), self.limit)
+        block |= {key: generator.standard_normal(self.units) for key in HIDDEN}
+        block |= {key: np.zeros(self.units) for key in OUTPUT}
+        return _Trainer(physics, block, instants.select(some), future[:, some], self.iterations)
+
+
+def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
+    """Bounds of the force: factor times m U^2 / L [N] and I_z (U / L)^2 [N m], by name."""
+    inertia, length = vessel.document["inertia"], float(vessel.document["particulars"]["L_pp"])
+    force = factor * float(inertia["m"]) * max(speed, LEAST_SCALE) ** 2 / length
+    moment = factor * float(inertia["I_z"]) * (max(speed, LEAST_SCALE) / length) ** 2
+    return {"X_max": np.array([force]), "Y_max": np.array([force]), "N_max": np.array([moment])}
+
+
+def plain(block: Mapping[str, Array]) -> dict[str, Any]:
+    """The block as a vessel document holds it: numbers, and lists of numbers."""
+    return {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in block.items()}
+
+
+class _Trainer:
+    """Loss and slope of the weights of one network on some windows."""
+
+    def __init__(
+        self, physics: Physics, block: Mapping[str, Array], instants: Instants, future: Array, iterations: int
+    ) -> None:
+        self.physics = physics.with_values({BLOCK: plain(block)})
+        assert self.physics.vessel is not None
+        self.first, self.instants, self.future, self.iterations = dict(block), instants, future, iterations
+        self.names = [f"{BLOCK}.{key}.{unit}" for key in (*HIDDEN, *OUTPUT) for unit in range(len(block["w_0"]))]
+        paths = list(self.physics.vessel.parameters)
+        self.places = np.array([paths.index(name) for name in self.names])
+        self.values = np.array(list(self.physics.vessel.parameters.values()))
+        self.start = np.concatenate([block[key] for key in (*HIDDEN, *OUTPUT)])
+        self.num_hidden = len(HIDDEN) * len(block["w_0"])
+
+    def with_weights(self, weights: Array) -> Array:
+        """All numbers of the vessel with these weights, (P,)."""
+        values = self.values.copy()
+        values[self.places] = weights
+        return values
+
+    def solve(self, ridge: float, start: Array | None) -> tuple[Array, int]:
+        """Minimise the loss from a start (default: no force); weights and the number of iterations."""
+        from scipy.optimize import minimize  # a study is read without it
+
+        def loss(weights: Array) -> tuple[float, Array]:
+            value, slope = self.physics.gradient(self.instants, self.future, self.names, self.with_weights(weights))
+            if not np.isfinite(value) or not np.isfinite(slope).all():
+                return 1e12, np.zeros(len(weights))
+            apart = weights - np.where(np.arange(len(weights)) < self.num_hidden, self.start, 0.0)
+            return value + ridge * float((apart**2).mean()), slope + 2 * ridge * apart / len(weights)
+
+        found = minimize(
+            loss,
+            self.start if start is None else start,
+            jac=True,
+            method="L-BFGS-B",
+            options={"maxiter": self.iterations},
+        )
+        return np.asarray(found.x), int(found.nit)
+
+    def error(self, weights: Array, instants: Instants, future: Array) -> float:
+        """Mean squared position error [m^2] on other windows."""
+        paths, _ = self.physics.variant_paths(instants, self.with_weights(weights)[None])
+        return float(np.square(paths[:, 0] - future).sum(axis=-1).mean())
+
+    def block(self, weights: Array) -> dict[str, Array]:
+        """The block with these weights."""
+        parts: Sequence[Array] = np.split(weights, len(HIDDEN) + len(OUTPUT))
+        return self.first | dict(zip((*HIDDEN, *OUTPUT), parts, strict=True))
