@@ -33,7 +33,7 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import Excitation, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.simulation.truth import aboard, horizontal
+from shipid.simulation.log import aboard, horizontal
 from shipid.units import RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,21 +30,41 @@ WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 @dataclass(frozen=True)
 class Controls:
-    """What the commands of a vessel do.
+    """What the commands of a vessel do; the equations are asked when it is first needed.
 
     drives : shaft speeds that push it ahead.
     helm : angle command -> +1 or -1, its sign that turns the ship to starboard; those that turn nothing are left out.
+
+    Both raise DocumentError for a vessel that nothing drives ahead or turns.
     """
 
     vessel: Vessel
-    commands: tuple[str, ...]
-    drives: tuple[str, ...]
-    helm: Mapping[str, float]
 
     @classmethod
     def of(cls, vessel: Vessel) -> Controls:
-        """Ask the equations; DocumentError for a vessel that nothing drives ahead or turns."""
-        commands = dynamics(vessel).commands
+        """Controls whose equations have been asked; DocumentError for a vessel that nothing drives ahead or turns."""
+        controls = cls(vessel)
+        _ = controls.helm
+        return controls
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Every command of the vessel."""
+        return dynamics(self.vessel).commands
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Shaft speeds that push the vessel ahead."""
+        return self._effects[0]
+
+    @property
+    def helm(self) -> Mapping[str, float]:
+        """Angle command -> sign that turns the ship to starboard."""
+        return self._effects[1]
+
+    @cached_property
+    def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float]]:
+        vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
         drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
@@ -58,7 +79,7 @@ class Controls:
         if not drives or not helm:
             message = f"no command {'turns' if drives else 'drives'} {vessel.name}: a manoeuvre needs `n` and an angle"
             raise DocumentError(message, file=vessel.file, path="thruster")
-        return cls(vessel, commands, drives, helm)
+        return drives, helm
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""
