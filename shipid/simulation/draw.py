@@ -46,7 +46,7 @@ class Draw(BaseModel):
         Parameters
         ----------
         duration : of its log [s].
-        at : where in its range each quantity lies; a quantity is a key without its unit (`n`, `angle`), `psi` the course.
+        at : where in its range each quantity lies: a key without its unit (`n`, `angle`), `psi` for the course.
 
         Raises
         ------
@@ -84,7 +84,9 @@ def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Keys and values, those of a table as `table.key`: `bow.n_rpm = 0` is a table in TOML."""
     found: list[tuple[str, Any]] = []
     for key, value in given.items():
-        found += [(f"{key}.{inner}", one) for inner, one in value.items()] if isinstance(value, Mapping) else [(key, value)]
+        found += (
+            [(f"{key}.{inner}", one) for inner, one in value.items()] if isinstance(value, Mapping) else [(key, value)]
+        )
     return found
 
 

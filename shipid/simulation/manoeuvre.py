@@ -175,7 +175,10 @@ class Steps(Ordered):
     """
 
     orders: Annotated[dict[str, Range], Field(description="key -> least and greatest level, in the unit of the key")]
-    hold: Annotated[tuple[Positive, Positive], Field(description="s, least and greatest time of a level")] = (10.0, 40.0)
+    hold: Annotated[tuple[Positive, Positive], Field(description="s, least and greatest time of a level")] = (
+        10.0,
+        40.0,
+    )
     seed: Annotated[int, Field(description="of levels and times")] = 0
 
     @property

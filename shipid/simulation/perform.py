@@ -163,9 +163,7 @@ def _rows(length: float, interval: float) -> int:
     return max(int(length / interval + 1e-9), 1) + 1
 
 
-def _weather(
-    vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int
-) -> dict[str, Array]:
+def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int) -> dict[str, Array]:
     """Each channel of the vessel's environment, (1 or num_instants, num_manoeuvres)."""
     names = dynamics(vessel).environment
     unknown = next((name for name in environment if name not in names), None)
@@ -213,7 +211,7 @@ def _orders(
 ) -> dict[str, Array]:
     """What is ordered from each record on, (num_records, num_samples); the last record repeats the last command.
 
-    Commands are (num_steps, num_samples), of which `moments` (num_records,) are in force; weather is that of the records.
+    Commands are (num_steps, num_samples), those of `moments` (num_records,) are in force; weather is of the records.
     """
     model = dynamics(vessel, helmsman)
     records, samples = path.states.shape[0], path.states.shape[2]

@@ -59,7 +59,8 @@ class Truth(BaseModel):
     def _moved(cls, data: Any) -> Any:
         key = next((key for key in MOVED if isinstance(data, Mapping) and key in data), None)
         if key is not None:
-            raise ValueError(f"{key} is a key of the manoeuvres: move it from [truth] to a block [[truth.manoeuvre]]")
+            block = f'[[truth.manoeuvre]], kind = "turning", {key} = {data[key]!r}'
+            raise ValueError(f"{key} belongs to the manoeuvres: write {block}")
         return data
 
     @model_validator(mode="after")
@@ -146,8 +147,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
             components=None if truth.waves is None else wave_loads(vessel, draw_components(truth.waves, chi, keys)),
         )
     except ShipidError as error:
-        message = f"{truth.vessel}: {error.message}, or narrower ranges" if "step" in error.message else error.message
-        raise DocumentError(message, path="truth.manoeuvre") from None
+        raise DocumentError(error.message, path="truth") from None
     frame = frame.drop(columns=[name for name in frame if str(name).startswith("actual.")])
     return measure(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
 

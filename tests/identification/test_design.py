@@ -16,6 +16,7 @@ from shipid.simulation.manoeuvre import (
     ReverseSpiral,
     Spiral,
     StationKeeping,
+    Steps,
     Turning,
     TurningCircle,
     Zigzag,
@@ -123,8 +124,8 @@ def test_limits_of_the_actuators_hold() -> None:
 @pytest.mark.parametrize(
     ("manoeuvre", "helm", "rpm"),
     [
-        (Turning(n_rpm=100, duration=60, orders={"port.alpha": -0.5, "port.n": 2.5}), np.degrees(0.5), 150),
-        (Turning(n_rpm=100, duration=60, orders={}), 0, 100),
+        (Turning(duration=60, orders={"port.alpha_deg": -30, "n_rpm": 100, "port.n_rpm": 150}), 30, 150),
+        (Steps(duration=60, orders={"alpha_deg": (-35, 20), "n_rpm": (50, 120)}), 35, 120),
         (TurningCircle(n_rpm=100, duration=60), 35, 100),
         (PullOut(n_rpm=100, duration=60, turn=30, angle_deg=15), 15, 100),
         (Zigzag(n_rpm=100, duration=60), 20, 100),

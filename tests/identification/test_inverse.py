@@ -21,7 +21,9 @@ D_P = [("thruster.port.D_p", "thruster.starboard.D_p")]
 
 
 def sailed(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
-    given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "start_speed": (1, 4), **more}
+    orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
+    block = orders | {key: more.pop(key) for key in (*orders, "delta_deg") if key in more}
+    given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "manoeuvre": [block], **more}
     return Dataset(simulate(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
 
 
