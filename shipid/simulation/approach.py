@@ -112,47 +112,51 @@ def steady(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
 
-    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s; position and heading then begin anew.
+    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s, each on its own; position and heading then begin
+    anew.
 
     Raises
     ------
     ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships.
     """
     vessel, model = controls.vessel, dynamics(controls.vessel)
-    names = (*model.state, *model.hidden)
-    state = {name: np.zeros(len(n)) for name in names}
-    orders, memory = controls.orders(n, np.zeros(len(n))), None
-    calm = {name: np.zeros(len(n)) for name in model.environment}
+    names, count = (*model.state, *model.hidden), len(n)
+    state = {name: np.zeros(count) for name in names}
+    orders = controls.orders(n, np.zeros(count))
+    memory = {name: orders[name].copy() for name in model.memory}
+    moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
     for _ in range(int(LONGEST / CHUNK)):
         path = rollout(
             vessel,
-            state,
-            orders,
-            calm,
+            {name: values[moving] for name, values in state.items()},
+            {name: values[moving] for name, values in orders.items()},
+            {name: np.zeros(len(moving)) for name in model.environment},
             step=step,
             num_steps=num_steps,
             every=num_steps,
             method=method,
-            memory=memory,
+            memory={name: values[moving] for name, values in memory.items()},
             engine=engine,
         )
         if path.diverged.any():
             raise ShipidError(
-                f"the approach of {vessel.name} at {_rpm(n, path.diverged[0])} rpm diverges: "
+                f"the approach of {vessel.name} at {_rpm(n[moving], path.diverged[0])} rpm diverges: "
                 f"take a smaller step than {step:g} s"
             )
-        before = state
-        state = {name: path[name][-1, 0] for name in names}
-        memory = {name: path[f"actual.{name}"][-1, 0] for name in model.memory}
-        changed = [np.abs(state[name] - before[name]) for name in model.state[model.num_dof :]]
-        moving = np.max(changed, axis=0) >= SETTLED
-        if not moving.any():
+        velocities = model.state[model.num_dof :]
+        changed = np.max([np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities], axis=0)
+        for name in names:
+            state[name][moving] = path[name][-1, 0]
+        for name, values in memory.items():
+            values[moving] = path[f"actual.{name}"][-1, 0]
+        moving = moving[changed >= SETTLED]  # who is steady stops here: no start may depend on its company
+        if not len(moving):
             _check_straight(vessel, n, state["r"])
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
-            return state | {name: np.zeros(len(n)) for name in anew}, memory
+            return state | {name: np.zeros(count) for name in anew}, memory
     raise ShipidError(
-        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n, moving)} rpm: "
+        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
         'start from rest (approach = "rest")'
     )
 
