@@ -30,10 +30,10 @@ from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.problem import SIGNALS
 from shipid.simulation.approach import Controls
+from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Excitation, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.simulation.log import aboard, horizontal
 from shipid.units import RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel

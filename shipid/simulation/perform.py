@@ -17,7 +17,6 @@ from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
 from shipid.simulation.log import ON_BOARD, logged, run_names
 from shipid.simulation.manoeuvre import Manoeuvre
-
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
