@@ -65,16 +65,6 @@ class Manoeuvre(BaseModel, ABC):
     def start(self) -> Start:
         """State of the ship at t = 0."""
 
-    @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg] that it may order, to either side."""
-        return 0.0
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Greatest shaft speed [rpm] that it may order, ahead or astern."""
-        return 0.0
-
     def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
         """Who gives the orders; None where the clock does."""
         return None
@@ -157,16 +147,6 @@ class Turning(Ordered):
         """Order at times (T,), constant."""
         return np.full(len(t), self.orders[key])
 
-    @property
-    def greatest_helm(self) -> float:
-        """Of the orders that are angles [deg]."""
-        return max((abs(order) for key, order in self.orders.items() if key.endswith("_deg")), default=0.0)
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Of the orders that are shaft speeds [rpm]."""
-        return max((abs(order) for key, order in self.orders.items() if key.endswith("_rpm")), default=0.0)
-
 
 class Steps(Ordered):
     """Orders that change within a run: each key has random levels in its range, each held for a random time.
@@ -190,16 +170,6 @@ class Steps(Ordered):
         """Order at times (T,), piecewise constant."""
         return aprbs(t, hold=self.hold, levels=self.orders[key], key=(self.seed, "steps", key))
 
-    @property
-    def greatest_helm(self) -> float:
-        """Of the levels that are angles [deg]."""
-        return max((max(map(abs, pair)) for key, pair in self.orders.items() if key.endswith("_deg")), default=0.0)
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Of the levels that are shaft speeds [rpm]."""
-        return max((max(map(abs, pair)) for key, pair in self.orders.items() if key.endswith("_rpm")), default=0.0)
-
 
 class Approached(Manoeuvre):
     """A manoeuvre by helm and shaft speed after an approach, at whose end the log begins with t = 0."""
@@ -213,6 +183,11 @@ class Approached(Manoeuvre):
     def start(self) -> Start:
         """Steady straight ahead, or at rest."""
         return Start(shaft=self.n_rpm * RPM) if self.approach == "steady" else Start()
+
+    @property
+    def greatest_helm(self) -> float:
+        """Greatest angle [deg] that it may order, to either side."""
+        return 0.0
 
     @property
     def greatest_shaft(self) -> float:

@@ -434,7 +434,7 @@ def _truth(named: str, vessel: Vessel, service: float, rpm: float, horizon: floa
     keys = dict.fromkeys(order_keys(name)[1] for name in dynamics(vessel).commands)
     orders = {key: [low, high] if key.endswith("_rpm") else [-HELM_DEG, HELM_DEG] for key in keys}
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
-    why = f"Constant orders, a turn each: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; hard over either way"
+    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, and hard over either way"
     yield Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
 
