@@ -11,6 +11,7 @@ from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
 from shipid.hybrid.recipe import Recipe, RidgeRecipe
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
+from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
 
@@ -49,6 +50,14 @@ def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None
     small = read_plan("simulation-small").study
     for name in ("family", "grid", "split", "prediction"):
         assert getattr(constant, name) == getattr(changing, name) == getattr(small, name), name
+
+
+def test_the_first_instant_comes_after_the_run_up() -> None:
+    plan = read_plan("zigzags", {"truth.run_up": 12.0})
+    assert plan.past == 12
+    windows = all_windows(plan, obtain(plan))
+    assert (windows.t.min(), windows.t.max()) == (12.0, 12.0 + 59.0)
+    assert set(windows.spans.values()) == {(0.0, 12.0 + 59.0 + 15.0)}
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
