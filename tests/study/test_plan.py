@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from shipid.hybrid.recipe import Recipe, RidgeRecipe
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
-from shipid.hybrid.recipe import Recipe, RidgeRecipe
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
