@@ -16,7 +16,7 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import Engine, rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit
-from shipid.physics.signals import steers
+from shipid.physics.signals import is_shaft, neutral, steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -67,7 +67,7 @@ class Controls:
     def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float]]:
         vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
-        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
+        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
         drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
         straight = acceleration(vessel, PROBE_SPEED, running)
@@ -84,16 +84,18 @@ class Controls:
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""
-        still = np.zeros(len(n))
         angles = {name: sign * helm for name, sign in self.helm.items()}
-        return {name: angles.get(name, n if name in self.drives else still) for name in self.commands}
+        return {
+            name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
+            for name in self.commands
+        }
 
 
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
-    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others 0."""
+    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others neutral."""
     model = dynamics(vessel)
     state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
-    memory, orders = ([commands.get(name, 0.0) for name in names] for names in (model.memory, model.commands))
+    memory, orders = ([commands.get(name, neutral(name)) for name in names] for names in (model.memory, model.commands))
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
     rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
     return rates[[model.state.index(name) for name in ("u", "v", "r")]]

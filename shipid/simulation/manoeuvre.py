@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.errors import DocumentError, choices
-from shipid.physics import SIGNALS, helm
+from shipid.physics import helm
 from shipid.physics.helm import Helmsman
+from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
 from shipid.units import DEGREE, RPM
@@ -469,18 +470,17 @@ KINDS: dict[str, type[Manoeuvre]] = {
 }
 """Name -> class of every kind. To add one, write the class and name it here."""
 
-UNITS = {"rev/s": ("_rpm", RPM), "rad": ("_deg", DEGREE)}
-
 
 def order_unit(command: str) -> float:
     """SI units in one unit of the key that orders a command."""
-    return UNITS.get(SIGNALS.commands[command.rpartition(".")[2]], ("", 1.0))[1]
+    return SIGNALS[signal_of(command)].factor
 
 
 def order_keys(command: str) -> tuple[str, str]:
     """Keys that order a command: its full name with the unit (`bow.n_rpm`), and its signal's for all (`n_rpm`)."""
-    signal = command.rpartition(".")[2]
-    suffix = UNITS.get(SIGNALS.commands[signal], ("", 1.0))[0]
+    signal = signal_of(command)
+    shown = SIGNALS[signal].shown
+    suffix = f"_{shown}" if shown else ""
     return f"{command}{suffix}", f"{signal}{suffix}"
 
 
