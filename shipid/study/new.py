@@ -23,7 +23,7 @@ from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
-from shipid.physics.signals import SIGNALS, signal_of
+from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
@@ -434,9 +434,12 @@ def _truth(named: str, vessel: Vessel, service: float, rpm: float, horizon: floa
     weather = dynamics(vessel).environment
     if "V_w" in weather:
         yield Choice("truth.wind_speed", [0.0, 6.0], "m/s, from anywhere: up to a moderate breeze")
-    ranges = {"shaft": [low, high], "helm": [-HELM_DEG, HELM_DEG]}
-    rows = {order_keys(name)[1]: SIGNALS[signal_of(name)] for name in dynamics(vessel).commands}
-    orders = {key: ranges.get(row.drives, [value / row.factor for value in row.usual]) for key, row in rows.items()}
+    orders = {}
+    for name in dynamics(vessel).commands:
+        row = SIGNALS[signal_of(name)]
+        usual = [value / row.factor for value in row.usual]
+        limits = [low, high] if is_shaft(name) else [-HELM_DEG, HELM_DEG] if steers(name) else usual
+        orders[order_keys(name)[1]] = limits
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, and hard over either way"
     yield Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
