@@ -30,10 +30,10 @@ from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.problem import SIGNALS
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import Excitation, Manoeuvre
+from shipid.simulation.log import aboard, horizontal
+from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.simulation.truth import aboard, horizontal
 from shipid.units import RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -68,7 +68,7 @@ class Candidate:
     """A manoeuvre that could be run."""
 
     title: str
-    manoeuvre: Manoeuvre
+    manoeuvre: Approached
 
     @property
     def hours(self) -> float:
@@ -119,7 +119,7 @@ def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) ->
     yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} rpm, {speed:.2g} m/s", waves)
 
 
-def allowed(manoeuvre: Manoeuvre, limits: Limits) -> bool:
+def allowed(manoeuvre: Approached, limits: Limits) -> bool:
     """Whether no order is beyond the limits; rates bind excitations alone, the actuators have their own."""
     shaft = manoeuvre.greatest_shaft <= limits.n_rpm * (1 + 1e-9)
     return shaft and manoeuvre.greatest_helm <= limits.angle_deg * (1 + 1e-9)

@@ -30,7 +30,7 @@ from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
 from shipid.identification.collinearity import Collinearity, collinearity
-from shipid.simulation.truth import aboard
+from shipid.simulation.log import aboard
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 

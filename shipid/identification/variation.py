@@ -20,7 +20,7 @@ from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate
 from shipid.identification.problem import MOVING
 from shipid.interrupts import uninterrupted
-from shipid.simulation.truth import aboard, horizontal
+from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 
 Array = NDArray[np.float64]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit
-from shipid.physics.signals import steers
+from shipid.physics.signals import is_shaft, neutral, steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -30,23 +31,43 @@ WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 @dataclass(frozen=True)
 class Controls:
-    """What the commands of a vessel do.
+    """What the commands of a vessel do; the equations are asked when it is first needed.
 
     drives : shaft speeds that push it ahead.
     helm : angle command -> +1 or -1, its sign that turns the ship to starboard; those that turn nothing are left out.
+
+    Both raise DocumentError for a vessel that nothing drives ahead or turns.
     """
 
     vessel: Vessel
-    commands: tuple[str, ...]
-    drives: tuple[str, ...]
-    helm: Mapping[str, float]
 
     @classmethod
     def of(cls, vessel: Vessel) -> Controls:
-        """Ask the equations; DocumentError for a vessel that nothing drives ahead or turns."""
-        commands = dynamics(vessel).commands
+        """Controls whose equations have been asked; DocumentError for a vessel that nothing drives ahead or turns."""
+        controls = cls(vessel)
+        _ = controls.helm
+        return controls
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Every command of the vessel."""
+        return dynamics(self.vessel).commands
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Shaft speeds that push the vessel ahead."""
+        return self._effects[0]
+
+    @property
+    def helm(self) -> Mapping[str, float]:
+        """Angle command -> sign that turns the ship to starboard."""
+        return self._effects[1]
+
+    @cached_property
+    def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float]]:
+        vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
-        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if not steers(name)}
+        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
         drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
         straight = acceleration(vessel, PROBE_SPEED, running)
@@ -59,20 +80,22 @@ class Controls:
         if not drives or not helm:
             message = f"no command {'turns' if drives else 'drives'} {vessel.name}: a manoeuvre needs `n` and an angle"
             raise DocumentError(message, file=vessel.file, path="thruster")
-        return cls(vessel, commands, drives, helm)
+        return drives, helm
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""
-        still = np.zeros(len(n))
         angles = {name: sign * helm for name, sign in self.helm.items()}
-        return {name: angles.get(name, n if name in self.drives else still) for name in self.commands}
+        return {
+            name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
+            for name in self.commands
+        }
 
 
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
-    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others 0."""
+    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others neutral."""
     model = dynamics(vessel)
     state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
-    memory, orders = ([commands.get(name, 0.0) for name in names] for names in (model.memory, model.commands))
+    memory, orders = ([commands.get(name, neutral(name)) for name in names] for names in (model.memory, model.commands))
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
     rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
     return rates[[model.state.index(name) for name in ("u", "v", "r")]]
@@ -92,47 +115,51 @@ def steady(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
 
-    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s; position and heading then begin anew.
+    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s, each on its own; position and heading then begin
+    anew.
 
     Raises
     ------
     ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships.
     """
     vessel, model = controls.vessel, dynamics(controls.vessel)
-    names = (*model.state, *model.hidden)
-    state = {name: np.zeros(len(n)) for name in names}
-    orders, memory = controls.orders(n, np.zeros(len(n))), None
-    calm = {name: np.zeros(len(n)) for name in model.environment}
+    names, count = (*model.state, *model.hidden), len(n)
+    state = {name: np.zeros(count) for name in names}
+    orders = controls.orders(n, np.zeros(count))
+    memory = {name: orders[name].copy() for name in model.memory}
+    moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
     for _ in range(int(LONGEST / CHUNK)):
         path = rollout(
             vessel,
-            state,
-            orders,
-            calm,
+            {name: values[moving] for name, values in state.items()},
+            {name: values[moving] for name, values in orders.items()},
+            {name: np.zeros(len(moving)) for name in model.environment},
             step=step,
             num_steps=num_steps,
             every=num_steps,
             method=method,
-            memory=memory,
+            memory={name: values[moving] for name, values in memory.items()},
             engine=engine,
         )
         if path.diverged.any():
             raise ShipidError(
-                f"the approach of {vessel.name} at {_rpm(n, path.diverged[0])} rpm diverges: "
+                f"the approach of {vessel.name} at {_rpm(n[moving], path.diverged[0])} rpm diverges: "
                 f"take a smaller step than {step:g} s"
             )
-        before = state
-        state = {name: path[name][-1, 0] for name in names}
-        memory = {name: path[f"actual.{name}"][-1, 0] for name in model.memory}
-        changed = [np.abs(state[name] - before[name]) for name in model.state[model.num_dof :]]
-        moving = np.max(changed, axis=0) >= SETTLED
-        if not moving.any():
+        velocities = model.state[model.num_dof :]
+        changed = np.max([np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities], axis=0)
+        for name in names:
+            state[name][moving] = path[name][-1, 0]
+        for name, values in memory.items():
+            values[moving] = path[f"actual.{name}"][-1, 0]
+        moving = moving[changed >= SETTLED]  # who is steady stops here: no start may depend on its company
+        if not len(moving):
             _check_straight(vessel, n, state["r"])
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
-            return state | {name: np.zeros(len(n)) for name in anew}, memory
+            return state | {name: np.zeros(count) for name in anew}, memory
     raise ShipidError(
-        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n, moving)} rpm: "
+        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
         'start from rest (approach = "rest")'
     )
 

@@ -1,4 +1,4 @@
-"""Standard manoeuvres of any vessel, as blocks: turning, zigzag, pull-out, spirals, crash stop, excitation, DP.
+"""Kinds of manoeuvres of any vessel: orders by the clock or by a helmsman, and how a run starts.
 
 Helm angles are counted by what they do: helm > 0 turns the ship to starboard, whatever sign a command needs for it.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,13 +15,15 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.errors import DocumentError, choices
-from shipid.physics import SIGNALS, helm
+from shipid.physics import helm
 from shipid.physics.helm import Helmsman
+from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
 from shipid.units import DEGREE, RPM
 
 Array = NDArray[np.float64]
+Range = tuple[FiniteFloat, FiniteFloat]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
@@ -30,21 +33,157 @@ RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 
+@dataclass(frozen=True)
+class Start:
+    """How a ship is at t = 0: upright, and still but for its speed ahead.
+
+    Parameters
+    ----------
+    shaft : [rev/s] of an approach straight ahead in calm water until steady; None: no approach.
+    speed : ahead [m/s] where there is no approach.
+    at_order : whether lagged actuators have reached their first orders; else they are at rest.
+    """
+
+    shaft: float | None = None
+    speed: float = 0.0
+    at_order: bool = False
+
+
 class Manoeuvre(BaseModel, ABC):
-    """What all kinds share: the approach, at whose end the log begins with t = 0."""
+    """What all kinds share: a name, a heading at the start, a start, and orders."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     name: Annotated[str | None, Field(description="of the run; absent: M001, M002, ...")] = None
-    n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
-    approach: Annotated[
-        Literal["steady", "rest"], Field(description="straight ahead at n_rpm in calm water until steady, or at rest")
-    ] = "steady"
     course_deg: Annotated[FiniteFloat, Field(description="deg, heading at t = 0")] = 0.0
 
     @property
     @abstractmethod
     def length(self) -> float:
         """Length of the log [s]."""
+
+    @property
+    @abstractmethod
+    def start(self) -> Start:
+        """State of the ship at t = 0."""
+
+    def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
+        """Who gives the orders; None where the clock does."""
+        return None
+
+    @abstractmethod
+    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
+        """Commands in force from times (T,) [s] on, or the inputs of the helmsman; `speed` [m/s] is that at t = 0."""
+
+    def check(self, controls: Controls) -> None:
+        """Raise DocumentError where this vessel cannot do it."""
+        self.helmsman(controls)
+
+
+class Ordered(Manoeuvre):
+    """Orders to the commands themselves, as the vessel takes them, from a speed ahead on, without an approach.
+
+    A key of `orders` is a signal with its unit, for all commands that have it (`n_rpm`, `alpha_deg`, `delta_deg`), or
+    one command (`bow.n_rpm`), which goes before. Every command needs an order.
+    """
+
+    duration: Annotated[Positive, Field(description="s")]
+    start_speed: Annotated[FiniteFloat, Field(description="m/s ahead at t = 0")] = 0.0
+    actuators_at: Annotated[
+        Literal["order", "rest"], Field(description="where lagged actuators are at t = 0: at their first order, or 0")
+    ] = "order"
+
+    @property
+    def length(self) -> float:
+        """Length of the log [s]."""
+        return self.duration
+
+    @property
+    def start(self) -> Start:
+        """At `start_speed`, without an approach."""
+        return Start(speed=self.start_speed, at_order=self.actuators_at == "order")
+
+    @property
+    @abstractmethod
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the orders."""
+
+    @abstractmethod
+    def series(self, key: str, t: Array) -> Array:
+        """Order of a key at times (T,) [s], in the unit of the key."""
+
+    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
+        """Commands [SI] from times (T,) on; DocumentError for a command without an order, or an order of none."""
+        series = {key: self.series(key, t) for key in self.keys}
+        chosen = {name: order_keys(name) for name in controls.commands}
+        valid = [key for pair in chosen.values() for key in pair]
+        unknown = next((key for key in series if key not in valid), None)
+        if unknown is not None:
+            message = f"orders no command of {controls.vessel.name}: {choices(unknown, set(valid))}"
+            raise DocumentError(message, path=f"manoeuvre.{unknown}")
+        found = {}
+        for name, (single, common) in chosen.items():
+            key = single if single in series else common
+            if key not in series:
+                message = f"missing: {controls.vessel.name} takes the command {name}, give {common} = [low, high]"
+                raise DocumentError(message, path=f"manoeuvre.{common}")
+            found[name] = series[key] * order_unit(name)
+        return found
+
+    def check(self, controls: Controls) -> None:
+        """Raise DocumentError for a command without an order, or an order of no command."""
+        self.told(controls, np.zeros(1), 0.0)
+
+
+class Turning(Ordered):
+    """Constant orders: a turn, unless the angle is zero."""
+
+    orders: Annotated[dict[str, FiniteFloat], Field(description="key -> order, in the unit of the key")] = {}
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the orders."""
+        return tuple(self.orders)
+
+    def series(self, key: str, t: Array) -> Array:
+        """Order at times (T,), constant."""
+        return np.full(len(t), self.orders[key])
+
+
+class Steps(Ordered):
+    """Orders that change within a run: each key has random levels in its range, each held for a random time.
+
+    Levels and times follow `excitation.aprbs`: keys change independently of each other.
+    """
+
+    orders: Annotated[dict[str, Range], Field(description="key -> least and greatest level, in the unit of the key")]
+    hold: Annotated[tuple[Positive, Positive], Field(description="s, least and greatest time of a level")] = (
+        10.0,
+        40.0,
+    )
+    seed: Annotated[int, Field(description="of levels and times")] = 0
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the orders."""
+        return tuple(self.orders)
+
+    def series(self, key: str, t: Array) -> Array:
+        """Order at times (T,), piecewise constant."""
+        return aprbs(t, hold=self.hold, levels=self.orders[key], key=(self.seed, "steps", key))
+
+
+class Approached(Manoeuvre):
+    """A manoeuvre by helm and shaft speed after an approach, at whose end the log begins with t = 0."""
+
+    n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
+    approach: Annotated[
+        Literal["steady", "rest"], Field(description="straight ahead at n_rpm in calm water until steady, or at rest")
+    ] = "steady"
+
+    @property
+    def start(self) -> Start:
+        """Steady straight ahead, or at rest."""
+        return Start(shaft=self.n_rpm * RPM) if self.approach == "steady" else Start()
 
     @property
     def greatest_helm(self) -> float:
@@ -64,16 +203,17 @@ class Manoeuvre(BaseModel, ABC):
         """Ordered helm angle [rad] at times (T,) [s], > 0 to starboard; amidships by default."""
         return np.zeros(len(t))
 
-    def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
-        """Who gives the orders; None where the clock does."""
-        return None
-
     def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Commands, or what the helmsman is told, in force from times (T,) on; `speed` [m/s] is that at t = 0."""
+        """Commands from times (T,) on, or the inputs of the helmsman."""
         return controls.orders(self.shaft(t), self.helm(t))
 
+    def check(self, controls: Controls) -> None:
+        """Raise DocumentError for a vessel that nothing drives ahead or turns."""
+        controls.orders(np.zeros(1), np.zeros(1))
+        self.helmsman(controls)
 
-class Executed(Manoeuvre):
+
+class Executed(Approached):
     """A manoeuvre that goes straight ahead until its first order is executed."""
 
     execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
@@ -88,33 +228,6 @@ class Timed(Executed):
     def length(self) -> float:
         """Length of the log [s]."""
         return self.duration
-
-
-class Turning(Timed):
-    """Constant commands, each on its own: `orders` by command in SI (`port.alpha`, rad), the others at n_rpm and 0."""
-
-    kind: Literal["turning"] = "turning"
-    orders: Annotated[dict[str, FiniteFloat], Field(description="command -> rev/s or rad, as the vessel takes it")]
-
-    @property
-    def greatest_helm(self) -> float:
-        """Of the orders that are angles [deg]."""
-        return max((abs(order) / DEGREE for name, order in self.orders.items() if not _is_shaft(name)), default=0.0)
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Of n_rpm and the orders that are shaft speeds [rpm]."""
-        return max(abs(self.n_rpm), *(abs(order) / RPM for name, order in self.orders.items() if _is_shaft(name)), 0.0)
-
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """Commands from times (T,) on."""
-        straight = super().told(controls, t, speed)
-        unknown = next((name for name in self.orders if name not in straight), None)
-        if unknown is not None:
-            raise DocumentError(f"{unknown!r} is no command: {choices(unknown, straight)}", path="manoeuvre.orders")
-        return straight | {
-            name: np.where(_from(self.execute_at, t), order, straight[name]) for name, order in self.orders.items()
-        }
 
 
 class HelmOver(Timed):
@@ -141,14 +254,12 @@ class HelmOver(Timed):
 class TurningCircle(HelmOver):
     """The helm is put over and held."""
 
-    kind: Literal["turning_circle"] = "turning_circle"
     angle_deg: Annotated[Positive, Field(description="deg of helm")] = 35.0
 
 
 class PullOut(HelmOver):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
 
-    kind: Literal["pull_out"] = "pull_out"
     turn: Annotated[Positive, Field(description="s that the helm is over")]
 
     def helm(self, t: Array) -> Array:
@@ -159,8 +270,14 @@ class PullOut(HelmOver):
 class Zigzag(HelmOver):
     """The helm is reversed each time the heading has changed from the course by the execute heading."""
 
-    kind: Literal["zigzag"] = "zigzag"
-    execute_heading_deg: Annotated[Positive, Field(description="deg off the course, to either side")] = 20.0
+    execute_heading_deg: Annotated[
+        Positive | None, Field(description="deg off the course, to either side; absent: as the helm")
+    ] = None
+
+    @property
+    def reversal_deg(self) -> float:
+        """Change of heading [deg] at which the helm is reversed."""
+        return self.angle_deg if self.execute_heading_deg is None else self.execute_heading_deg
 
     def helmsman(self, controls: Controls) -> Helmsman:
         """He sees the heading."""
@@ -168,7 +285,7 @@ class Zigzag(HelmOver):
 
     def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
         """The helm as first executed, the course and the execute heading."""
-        headings = {"course": self.course_deg, "execute_heading": self.sense * self.execute_heading_deg}
+        headings = {"course": self.course_deg, "execute_heading": self.sense * self.reversal_deg}
         more = {name: np.full(len(t), value * DEGREE) for name, value in headings.items()}
         return super().told(controls, t, speed) | more
 
@@ -176,7 +293,6 @@ class Zigzag(HelmOver):
 class Spiral(Executed):
     """Direct (Dieudonne) spiral: one helm angle after another, each held until the turn is steady."""
 
-    kind: Literal["spiral"] = "spiral"
     angles_deg: Annotated[
         tuple[FiniteFloat, ...], Field(min_length=1, description="deg, > 0 to starboard, in order")
     ] = SPIRAL
@@ -200,7 +316,6 @@ class Spiral(Executed):
 class ReverseSpiral(Executed):
     """Reverse (Bech) spiral: one yaw rate after another, each held by the helm until that is steady."""
 
-    kind: Literal["reverse_spiral"] = "reverse_spiral"
     rates_deg: Annotated[
         tuple[FiniteFloat, ...], Field(min_length=1, description="deg/s, > 0 to starboard, in order")
     ] = RATES
@@ -235,7 +350,6 @@ class ReverseSpiral(Executed):
 class CrashStop(Timed):
     """Full astern, the helm amidships."""
 
-    kind: Literal["crash_stop"] = "crash_stop"
     astern_rpm: Annotated[Positive, Field(description="rpm ordered astern")]
 
     @property
@@ -251,7 +365,6 @@ class CrashStop(Timed):
 class Excitation(Timed):
     """Helm and shaft move about zero and n_rpm by a multisine or by random levels (APRBS), within rate limits."""
 
-    kind: Literal["excitation"] = "excitation"
     signal: Literal["multisine", "aprbs"]
     angle_deg: Annotated[NotNegative, Field(description="deg, greatest helm; 0: not moved")] = 0.0
     amplitude_rpm: Annotated[NotNegative, Field(description="rpm about n_rpm at most; 0: not moved")] = 0.0
@@ -301,10 +414,9 @@ class Excitation(Timed):
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])
 
 
-class StationKeeping(Manoeuvre):
+class StationKeeping(Approached):
     """Azimuth units hold a position and a heading from t = 0 on."""
 
-    kind: Literal["station_keeping"] = "station_keeping"
     n_rpm: FiniteFloat = 0.0
     approach: Literal["steady", "rest"] = "rest"
     duration: Annotated[Positive, Field(description="s")]
@@ -344,15 +456,32 @@ class StationKeeping(Manoeuvre):
         return {name: np.full(len(t), value) for name, value in told.items()}
 
 
-AnyManoeuvre = Annotated[
-    Turning | TurningCircle | PullOut | Zigzag | Spiral | ReverseSpiral | CrashStop | Excitation | StationKeeping,
-    Field(discriminator="kind"),
-]
-"""Any kind, told apart by `kind`: a `[[manoeuvre]]` block."""
+KINDS: dict[str, type[Manoeuvre]] = {
+    "turning": Turning,
+    "steps": Steps,
+    "turning_circle": TurningCircle,
+    "pull_out": PullOut,
+    "zigzag": Zigzag,
+    "spiral": Spiral,
+    "reverse_spiral": ReverseSpiral,
+    "crash_stop": CrashStop,
+    "excitation": Excitation,
+    "station_keeping": StationKeeping,
+}
+"""Name -> class of every kind. To add one, write the class and name it here."""
 
 
-def _is_shaft(command: str) -> bool:
-    return SIGNALS.commands.get(command.rsplit(".", 1)[-1]) == "rev/s"
+def order_unit(command: str) -> float:
+    """SI units in one unit of the key that orders a command."""
+    return SIGNALS[signal_of(command)].factor
+
+
+def order_keys(command: str) -> tuple[str, str]:
+    """Keys that order a command: its full name with the unit (`bow.n_rpm`), and its signal's for all (`n_rpm`)."""
+    signal = signal_of(command)
+    shown = SIGNALS[signal].shown
+    suffix = f"_{shown}" if shown else ""
+    return f"{command}{suffix}", f"{signal}{suffix}"
 
 
 def _from(moment: float, t: Array) -> NDArray[np.bool_]:

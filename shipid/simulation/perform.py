@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
+from shipid.simulation.log import ON_BOARD, logged, run_names
 from shipid.simulation.manoeuvre import Manoeuvre
-from shipid.simulation.truth import ON_BOARD, logged, run_names
-from shipid.units import DEGREE, RPM
+from shipid.units import DEGREE
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
@@ -29,6 +30,7 @@ def perform(
     *,
     step: float,
     interval: float | None = None,
+    duration: float | None = None,
     method: Method = "rk4",
     environment: Mapping[str, float | Array] | None = None,
     components: Mapping[str, Array] | None = None,
@@ -36,13 +38,15 @@ def perform(
 ) -> pd.DataFrame:
     """Run manoeuvres and log them: all that one helmsman (or the clock) orders in one rollout.
 
-    The vessel's own actuators lag and limit what is ordered; a vessel without any follows at once. The approach is in
+    The vessel's actuators lag and limit what is ordered; a vessel without any follows at once. The approach is in
     calm water, from t = 0 on environment and sea act.
 
     Parameters
     ----------
     step, interval : of the integration, and between logged rows [s]; default: every step is logged.
-    environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> a value for all runs or (num_manoeuvres,); default 0.
+    duration : length of every log [s]; default: that of each manoeuvre.
+    environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series
+        (num_instants, num_manoeuvres) at t = 0, step, 2 step, ... to the end of the longest log; default 0.
     components : a sea for each manoeuvre, as `rollout` takes it (`shipid.simulation.sea.wave_loads`); default: calm.
 
     Returns
@@ -62,66 +66,104 @@ def perform(
     every = round(between / step)
     if every < 1 or abs(every * step - between) > 1e-9 * step * every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
-    names = [own.name or number for own, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
+    names = [one.name or number for one, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
-    controls, weather = Controls.of(vessel), _weather(vessel, environment or {}, len(manoeuvres))
+    rows = [_rows(one.length if duration is None else duration, step * every) for one in manoeuvres]
+    weather = _weather(vessel, environment or {}, len(manoeuvres), every * (max(rows) - 1) + 1)
     seas = {path: np.asarray(drawn) for path, drawn in (components or {}).items()}
     short = next((path for path, drawn in seas.items() if len(drawn) != len(manoeuvres)), None)
     if short is not None:
-        found = f"components of {short} are for {len(seas[short])} ships"
-        raise ShipidError(f"{found}, and there are {len(manoeuvres)} manoeuvres")
-    groups: dict[Helmsman | None, dict[str, Manoeuvre]] = {}
-    for name, own in zip(names, manoeuvres, strict=True):
-        groups.setdefault(own.helmsman(controls), {})[name] = own
+        counted = f"components of {short} are for {len(seas[short])} ships"
+        raise ShipidError(f"{counted}, and there are {len(manoeuvres)} manoeuvres")
+    controls = Controls(vessel)
+    groups: dict[Helmsman | None, list[int]] = {}
+    for place, one in enumerate(manoeuvres):
+        groups.setdefault(one.helmsman(controls), []).append(place)
     how: dict[str, Any] = {"step": step, "method": method, "engine": engine}
-    frames: dict[str, pd.DataFrame] = {}
-    for helmsman, members in groups.items():
-        chosen = [names.index(name) for name in members]
-        here = {channel: values[chosen] for channel, values in weather.items()}
-        sea = {path: drawn[chosen] for path, drawn in seas.items()}
-        frames |= _together(controls, helmsman, members, here, every, {**how, "components": sea})
-    return pd.concat([frames[name] for name in names], ignore_index=True)
+    logs: list[dict[str, Array]] = [{}] * len(manoeuvres)
+    for helmsman, places in groups.items():
+        batch = _Batch(
+            [names[place] for place in places],
+            [manoeuvres[place] for place in places],
+            max(rows[place] for place in places),
+            {channel: values[:, places] for channel, values in weather.items()},
+            {path: drawn[places] for path, drawn in seas.items()},
+        )
+        columns = _together(controls, helmsman, batch, every, how)
+        for sample, place in enumerate(places):
+            logs[place] = {name: values[: rows[place], sample] for name, values in columns.items()}
+    frame: dict[str, Any] = {"run": np.repeat(names, rows)}
+    frame["t"] = np.concatenate([np.arange(count) * (step * every) for count in rows])
+    frame |= {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
+    return pd.DataFrame(frame | {"flags": np.zeros(sum(rows), dtype=np.int64)})
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Manoeuvres that one helmsman orders, with the rows of the longest log, their weather and their seas."""
+
+    names: list[str]
+    manoeuvres: list[Manoeuvre]
+    rows: int
+    weather: Mapping[str, Array]
+    seas: Mapping[str, Array]
 
 
 def _together(
-    controls: Controls,
-    helmsman: Helmsman | None,
-    members: Mapping[str, Manoeuvre],
-    weather: Mapping[str, Array],
-    every: int,
-    how: Mapping[str, Any],
-) -> dict[str, pd.DataFrame]:
-    """Logs by name of manoeuvres that one helmsman orders, as one rollout of the longest."""
-    vessel, manoeuvres, interval = controls.vessel, list(members.values()), how["step"] * every
-    start, memory = _start(manoeuvres, controls, how)
-    num_steps = every * max(_rows(own, interval) - 1 for own in manoeuvres)
-    t = np.arange(num_steps) * how["step"]
-    told = [own.told(controls, t, speed) for own, speed in zip(manoeuvres, start["u"], strict=True)]
+    controls: Controls, helmsman: Helmsman | None, batch: _Batch, every: int, how: Mapping[str, Any]
+) -> dict[str, Array]:
+    """Columns (rows, num_samples) of the logs of a batch, as one rollout of the longest."""
+    vessel, num_steps = controls.vessel, every * (batch.rows - 1)
+    model, t = dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
+    start, memory = _start(batch.manoeuvres, controls, how)
+    told = [one.told(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
     commands = {name: np.stack([one[name] for one in told], axis=1) for name in told[0]}
-    given: dict[str, Any] = {"memory": memory, "helmsman": helmsman, **how}
-    path = rollout(vessel, start, commands, weather, num_steps=num_steps, every=every, **given)
+    if helmsman is None:
+        ready = [sample for sample, one in enumerate(batch.manoeuvres) if one.start.at_order]
+        for name, values in memory.items():
+            values[ready] = commands[name][0, ready]
+    weather = {name: values[: num_steps + 1] for name, values in batch.weather.items()}
+    path = rollout(
+        vessel,
+        start,
+        _held(commands),
+        {name: values[0] if len(values) == 1 else values[:-1] for name, values in weather.items()},
+        num_steps=num_steps,
+        every=every,
+        memory=memory,
+        helmsman=helmsman,
+        components=batch.seas,
+        keep=None if helmsman else (*model.state, *(f"actual.{name}" for name in model.memory)),
+        **how,
+    )
     if path.diverged.any():
-        worst = list(members)[int(np.argmax(path.diverged[0]))]
+        worst = batch.names[int(np.argmax(path.diverged[0]))]
         raise ShipidError(f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s")
-    columns = _columns(vessel, helmsman, path, commands, weather, every)
-    frames = {}
-    for sample, (name, own) in enumerate(members.items()):
-        rows = _rows(own, interval)
-        log = {column: values[:rows, sample] for column, values in columns.items()}
-        head = {"run": name, "t": np.arange(rows) * interval}
-        frames[name] = pd.DataFrame({**head, **log, "flags": np.zeros(rows, dtype=np.int64)})
-    return frames
+    moments = np.arange(batch.rows) * every
+    felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}
+    log = logged(path, model.state)
+    log |= _orders(vessel, helmsman, path, commands, felt, np.minimum(moments, num_steps - 1))
+    lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
+    log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}
+    return log | {name: values for name, values in felt.items() if name in ON_BOARD}
 
 
-def _rows(manoeuvre: Manoeuvre, interval: float) -> int:
-    """Rows of its log, the start included; at least two."""
-    return max(int(manoeuvre.length / interval + 1e-9), 1) + 1
+def _held(commands: Mapping[str, Array]) -> dict[str, Array]:
+    """Commands (T, num_samples), as (num_samples,) where none of them changes: less for an engine to read."""
+    if all((values == values[0]).all() for values in commands.values()):
+        return {name: values[0] for name, values in commands.items()}
+    return dict(commands)
 
 
-def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int) -> dict[str, Array]:
-    """Each channel of the vessel's environment, (num_manoeuvres,)."""
+def _rows(length: float, interval: float) -> int:
+    """Rows of a log of a length [s], the start included; at least two."""
+    return max(int(length / interval + 1e-9), 1) + 1
+
+
+def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int) -> dict[str, Array]:
+    """Each channel of the vessel's environment, (1 or num_instants, num_manoeuvres)."""
     names = dynamics(vessel).environment
     unknown = next((name for name in environment if name not in names), None)
     if unknown is not None:
@@ -130,48 +172,32 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
         )
     given = {name: np.asarray(environment.get(name, 0.0), dtype=float) for name in names}
     for name, values in given.items():
-        if values.shape not in ((), (count,)):
-            raise ShipidError(f"environment {name!r} must be one value or {count}, one a manoeuvre: {values.shape}")
-    return {name: np.array(np.broadcast_to(values, count)) for name, values in given.items()}
+        if values.shape not in ((), (count,), (instants, count)):
+            wanted = f"one value or {count}, one a manoeuvre, or a series ({instants}, {count})"
+            raise ShipidError(f"environment {name!r} must be {wanted}: {values.shape}")
+    return {
+        name: np.array(values if values.ndim == 2 else np.broadcast_to(values, (1, count)))
+        for name, values in given.items()
+    }
 
 
 def _start(
     manoeuvres: Sequence[Manoeuvre], controls: Controls, how: Mapping[str, Any]
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """States and memories at t = 0, name -> (num_manoeuvres,): at rest, or steady at the ordered shaft speed."""
+    """States and memories at t = 0, name -> (num_manoeuvres,); actuators at rest where no approach has moved them."""
     model, count = dynamics(controls.vessel), len(manoeuvres)
+    starts = [one.start for one in manoeuvres]
     start = {name: np.zeros(count) for name in (*model.state, *model.hidden)}
     memory = {name: np.zeros(count) for name in model.memory}
-    moving = [number for number, own in enumerate(manoeuvres) if own.approach == "steady"]
+    moving = [sample for sample, one in enumerate(starts) if one.shaft is not None]
     if moving:
-        speeds, which = np.unique([manoeuvres[number].n_rpm * RPM for number in moving], return_inverse=True)
-        for into, found in zip(
-            (start, memory),
-            steady(controls, speeds, **{name: how[name] for name in ("step", "method", "engine")}),
-            strict=True,
-        ):
-            for name, values in found.items():
+        speeds, which = np.unique([starts[sample].shaft for sample in moving], return_inverse=True)
+        for into, settled in zip((start, memory), steady(controls, speeds, **how), strict=True):
+            for name, values in settled.items():
                 into[name][moving] = values[which]
-    start["psi"] = start["psi"] + np.array([own.course_deg * DEGREE for own in manoeuvres])
+    start["u"] = start["u"] + np.array([0.0 if one.shaft is not None else one.speed for one in starts])
+    start["psi"] = start["psi"] + np.array([one.course_deg * DEGREE for one in manoeuvres])
     return start, memory
-
-
-def _columns(
-    vessel: Vessel,
-    helmsman: Helmsman | None,
-    path: Trajectories,
-    commands: Mapping[str, Array],
-    weather: Mapping[str, Array],
-    every: int,
-) -> dict[str, Array]:
-    """Columns of the log, (num_records, num_samples)."""
-    model = dynamics(vessel, helmsman)
-    log = logged(path, model.state)
-    log |= _orders(vessel, helmsman, path, commands, weather, every)
-    lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
-    log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}
-    shape = path.states.shape[0], path.states.shape[2]
-    return log | {name: np.broadcast_to(values, shape) for name, values in weather.items() if name in ON_BOARD}
 
 
 def _orders(
@@ -180,16 +206,17 @@ def _orders(
     path: Trajectories,
     commands: Mapping[str, Array],
     weather: Mapping[str, Array],
-    every: int,
+    moments: NDArray[np.intp],
 ) -> dict[str, Array]:
-    """What is ordered from each record on, (num_records, num_samples); the last record repeats the last command."""
+    """What is ordered from each record on, (num_records, num_samples); the last record repeats the last command.
+
+    Commands are (num_steps, num_samples), those of `moments` (num_records,) are in force; weather is of the records.
+    """
     model = dynamics(vessel, helmsman)
     records, samples = path.states.shape[0], path.states.shape[2]
-
-    moments = np.minimum(np.arange(records) * every, len(commands[model.commands[0]]) - 1)
-    told = np.stack([commands[name][moments] for name in model.commands], axis=-1)
     if helmsman is None:
-        return {name: told[..., model.commands.index(name)] + 0.0 for name in model.ordered}
+        return {name: commands[name][moments] + 0.0 for name in model.ordered}
+    told = np.stack([commands[name][moments] for name in model.commands], axis=-1)
     felt = np.zeros((records, samples, len(model.environment)))
     for channel, name in enumerate(model.environment):
         felt[..., channel] = weather[name]
@@ -199,5 +226,5 @@ def _orders(
     # record by record: a map of all is slow to build
     rows = model.orders.map("rows", "serial", samples, [model.orders.n_in() - 1], [])
     inputs = (states, path.states[:, 0][..., memory], told, felt)  # (num_records, num_samples, channel)
-    found = np.array([np.array(rows(*(part[k].T for part in inputs), values)) for k in range(records)])
-    return {name: found[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
+    ordered = np.array([np.array(rows(*(part[k].T for part in inputs), values)) for k in range(records)])
+    return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

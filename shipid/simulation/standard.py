@@ -13,8 +13,8 @@ from shipid.simulation.approach import Controls, acceleration
 from shipid.simulation.manoeuvre import (
     HELMS,
     RATES,
+    Approached,
     CrashStop,
-    Manoeuvre,
     PullOut,
     ReverseSpiral,
     Spiral,
@@ -44,7 +44,7 @@ class Standard:
 
     kind: str
     title: str
-    manoeuvre: Manoeuvre
+    manoeuvre: Approached
     speed: float
     step: float
     interval: float
@@ -130,11 +130,11 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     return high
 
 
-def _title(name: str, own: Manoeuvre) -> str:
+def _title(name: str, own: Approached) -> str:
     """What is done, in words."""
     words = name.replace("-", " ")
     if isinstance(own, Zigzag):
-        return f"{words} {own.angle_deg:g}/{own.execute_heading_deg:g}, first to {own.side}"
+        return f"{words} {own.angle_deg:g}/{own.reversal_deg:g}, first to {own.side}"
     if isinstance(own, (TurningCircle, PullOut)):
         return f"{words}, {own.angle_deg:g} deg of helm to {own.side}"
     if isinstance(own, Spiral):
@@ -149,7 +149,7 @@ def _round(value: float) -> float:
     return float(f"{steps[np.argmin(np.abs(np.log(steps / value)))]:.6g}")
 
 
-Build = Callable[[Sequence[float], str, float | None, float, dict[str, Any]], Manoeuvre]
+Build = Callable[[Sequence[float], str, float | None, float, dict[str, Any]], Approached]
 
 
 def _zigzag(angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]) -> Zigzag:

@@ -23,7 +23,9 @@ from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
+from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls
+from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import obtain, partition, prepare
@@ -429,12 +431,18 @@ def _truth(named: str, vessel: Vessel, service: float, rpm: float, horizon: floa
     yield Choice("truth.duration", float(f"{horizon + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
     yield Choice("truth.step", fine, f"s: she takes {length / service:.3g} s for her length")
     yield Choice("truth.interval", step, "s between logged rows")
-    yield Choice("truth.n_rpm", [low, high], f"up to {high:g} rpm, which hold {service:.3g} m/s in calm water")
-    yield Choice("truth.alpha_deg", [-HELM_DEG, HELM_DEG], "rudder or azimuth: hard over either way")
-    yield Choice("truth.start_speed", [float(f"{service / 2:.3g}"), float(f"{service:.3g}")], "m/s ahead")
     weather = dynamics(vessel).environment
     if "V_w" in weather:
         yield Choice("truth.wind_speed", [0.0, 6.0], "m/s, from anywhere: up to a moderate breeze")
+    orders = {}
+    for name in dynamics(vessel).commands:
+        row = SIGNALS[signal_of(name)]
+        usual = [value / row.factor for value in row.usual]
+        limits = [low, high] if is_shaft(name) else [-HELM_DEG, HELM_DEG] if steers(name) else usual
+        orders[order_keys(name)[1]] = limits
+    speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
+    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, and hard over either way"
+    yield Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
 
 def _degraded(named: str, vessel: Vessel) -> list[Any]:

@@ -325,9 +325,10 @@ class Plan:
 
     @property
     def past(self) -> int:
-        """Steps of the past that every window holds: what the study asks for, or more where a method needs it."""
-        prediction = self.study.prediction
-        seconds = max(prediction.past, *(way.method.past for way in self.methods))
+        """Steps of the past that every window holds: the run-up, what the study asks for, or more for a method."""
+        prediction, truth = self.study.prediction, self.study.truth
+        run_up = 0.0 if truth is None else truth.run_up
+        seconds = max(run_up, prediction.past, *(way.method.past for way in self.methods))
         return math.ceil(seconds / prediction.step - 1e-9)
 
     @property

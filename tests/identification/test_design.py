@@ -9,14 +9,13 @@ from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, plan, rank
 from shipid.simulation.manoeuvre import (
+    Approached,
     CrashStop,
     Excitation,
-    Manoeuvre,
     PullOut,
     ReverseSpiral,
     Spiral,
     StationKeeping,
-    Turning,
     TurningCircle,
     Zigzag,
 )
@@ -123,8 +122,6 @@ def test_limits_of_the_actuators_hold() -> None:
 @pytest.mark.parametrize(
     ("manoeuvre", "helm", "rpm"),
     [
-        (Turning(n_rpm=100, duration=60, orders={"port.alpha": -0.5, "port.n": 2.5}), np.degrees(0.5), 150),
-        (Turning(n_rpm=100, duration=60, orders={}), 0, 100),
         (TurningCircle(n_rpm=100, duration=60), 35, 100),
         (PullOut(n_rpm=100, duration=60, turn=30, angle_deg=15), 15, 100),
         (Zigzag(n_rpm=100, duration=60), 20, 100),
@@ -135,7 +132,7 @@ def test_limits_of_the_actuators_hold() -> None:
         (StationKeeping(duration=60), 180, 200),
     ],
 )
-def test_no_kind_orders_more_than_the_limits(manoeuvre: Manoeuvre, helm: float, rpm: float) -> None:
+def test_no_kind_orders_more_than_the_limits(manoeuvre: Approached, helm: float, rpm: float) -> None:
     assert manoeuvre.greatest_helm == pytest.approx(helm)
     assert manoeuvre.greatest_shaft == pytest.approx(rpm)
     assert allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))

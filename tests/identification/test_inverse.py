@@ -11,6 +11,7 @@ from shipid.data.kinematics import Noise
 from shipid.errors import DataError
 from shipid.identification.inverse import inverse_dynamics
 from shipid.simulation.truth import Truth, simulate
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
 
@@ -21,7 +22,11 @@ D_P = [("thruster.port.D_p", "thruster.starboard.D_p")]
 
 
 def sailed(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
-    given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "start_speed": (1, 4), **more}
+    orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
+    block = orders | {key: more.pop(key) for key in orders if key in more}
+    if "rudder.delta" in dynamics(vessel).commands:
+        block["delta_deg"] = block.pop("alpha_deg")
+    given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "manoeuvre": [block], **more}
     return Dataset(simulate(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
 
 

@@ -60,6 +60,15 @@ def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
         Controls.of(balanced)
 
 
+def test_no_approach_depends_on_its_company() -> None:
+    """A fast and a slow ship settle at different times: each start is what it is alone, bit for bit."""
+    n = np.array([0.8, 3.5])
+    together, _ = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    for place, one in enumerate(n):
+        alone, _ = steady(Controls.of(SHIP), np.array([one]), step=0.1, method="rk4", engine="casadi")
+        assert {name: values[place] for name, values in together.items()} == {name: v[0] for name, v in alone.items()}
+
+
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60

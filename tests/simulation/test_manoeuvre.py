@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from shipid.errors import DocumentError
 from shipid.simulation.manoeuvre import (
-    AnyManoeuvre,
+    KINDS,
     CrashStop,
     Excitation,
     Manoeuvre,
@@ -20,6 +20,7 @@ from shipid.simulation.manoeuvre import (
     ReverseSpiral,
     Spiral,
     StationKeeping,
+    Steps,
     Turning,
     TurningCircle,
     Zigzag,
@@ -139,14 +140,51 @@ def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: floa
 
 
 def test_turning_takes_commands_as_the_vessel_does() -> None:
-    log = one(SHIP, Turning(n_rpm=120, approach="rest", orders={"port.alpha": 0.3, "starboard.n": 1.5}, duration=20))
-    assert (log["port.alpha"] == 0.3).all()
-    assert (log["starboard.alpha"] == 0).all()
-    assert (log["starboard.n"] == 1.5).all()
-    assert (log["port.n"] == 2.0).all()
-    assert log["u"].iloc[0] == 0.0
-    with pytest.raises(DocumentError, match=r"'port.delta' is no command: did you mean 'port"):
-        one(SHIP, Turning(n_rpm=120, orders={"port.delta": 0.3}, duration=20))
+    orders = {"n_rpm": 120, "alpha_deg": 10, "port.alpha_deg": -20}
+    log = one(SHIP, Turning(orders=orders, start_speed=1.5, duration=20))
+    assert (log["port.alpha"] == -20 * DEGREE).all()
+    assert (log["starboard.alpha"] == 10 * DEGREE).all()
+    assert (log[["port.n", "starboard.n"]] == 2.0).all(axis=None)
+    assert log["u"].iloc[0] == 1.5
+
+
+def test_steps_hold_levels_in_their_ranges() -> None:
+    """Levels differ, each holds for 2 to 5 s, shaft and angle change at their own times; another seed, other orders."""
+    steps = Steps(orders={"n_rpm": (60, 90), "alpha_deg": (-20, 10)}, hold=(2.0, 5.0), seed=3, duration=60)
+    log = one(SHIP, steps)
+    for signal, unit, low, high in (("n", 1 / 60, 60, 90), ("alpha", DEGREE, -20, 10)):
+        series = log[f"port.{signal}"].to_numpy() / unit
+        assert low <= series.min() < low + 0.25 * (high - low)
+        assert high - 0.25 * (high - low) < series.max() <= high
+        changes = np.flatnonzero(np.diff(series))
+        assert 11 <= len(changes) <= 30
+        held_for = np.diff(changes) * 0.1
+        assert held_for.min() > 1.9
+        assert held_for.max() < 5.1
+        np.testing.assert_array_equal(log[f"starboard.{signal}"], log[f"port.{signal}"])
+    times = [set(np.flatnonzero(np.diff(log[name]))) for name in ("port.n", "port.alpha")]
+    assert len(times[0] & times[1]) < len(times[0]) / 2
+    other = one(SHIP, steps.model_copy(update={"seed": 4}))
+    assert np.abs(other["port.n"] - log["port.n"]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("orders", "path", "said"),
+    [
+        ({"n_rpm": 120}, "manoeuvre.alpha_deg", "give alpha_deg"),
+        ({"n_rpm": 120, "alpha_deg": 5, "delta_deg": 5}, "manoeuvre.delta_deg", "orders no command of R/V Gunnerus"),
+        ({"n_rpm": 120, "alpha_deg": 5, "bow.n_rpm": 5}, "manoeuvre.bow.n_rpm", "orders no command"),
+    ],
+)
+def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, said: str) -> None:
+    with pytest.raises(DocumentError, match=said) as caught:
+        one(SHIP, Turning(orders=orders, duration=20))
+    assert caught.value.path == path
+
+
+def test_zigzag_turns_back_at_its_helm_angle_unless_told() -> None:
+    assert Zigzag(n_rpm=100, angle_deg=10, duration=60).reversal_deg == 10
+    assert Zigzag(n_rpm=100, angle_deg=10, execute_heading_deg=20, duration=60).reversal_deg == 20
 
 
 def test_pull_out_of_a_stable_ship_ends_straight() -> None:
@@ -259,23 +297,17 @@ def test_station_keeping_goes_where_it_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    "block",
+    ("kind", "block"),
     [
-        {"kind": "zigzag", "n_rpm": 145, "duration": 60, "angle": 20},
-        {"kind": "zigzag", "n_rpm": 145},
-        {"kind": "turning_circle", "n_rpm": 145, "duration": 60, "angle_deg": -35},
-        {"kind": "spiral", "n_rpm": 145, "hold": 60, "angles_deg": []},
-        {"kind": "excitation", "n_rpm": 145, "duration": 60, "signal": "noise"},
-        {"kind": "circle", "n_rpm": 145, "duration": 60},
+        ("zigzag", {"n_rpm": 145, "duration": 60, "angle": 20}),
+        ("zigzag", {"n_rpm": 145}),
+        ("turning", {"duration": 60, "n_rpm": 145}),
+        ("turning_circle", {"n_rpm": 145, "duration": 60, "angle_deg": -35}),
+        ("spiral", {"n_rpm": 145, "hold": 60, "angles_deg": []}),
+        ("excitation", {"n_rpm": 145, "duration": 60, "signal": "noise"}),
+        ("steps", {"orders": {"n_rpm": 145}, "duration": 60}),
     ],
 )
-def test_impossible_blocks_are_refused(block: dict[str, Any]) -> None:
+def test_impossible_blocks_are_refused(kind: str, block: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
-        TypeAdapter(AnyManoeuvre).validate_python(block)
-
-
-def test_a_block_is_a_manoeuvre() -> None:
-    block = {"kind": "zigzag", "n_rpm": 145, "angle_deg": 20, "execute_heading_deg": 10, "side": "port", "duration": 60}
-    assert TypeAdapter(AnyManoeuvre).validate_python(block) == Zigzag(
-        n_rpm=145, angle_deg=20, execute_heading_deg=10, side="port", duration=60
-    )
+        KINDS[kind](**block)

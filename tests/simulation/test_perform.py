@@ -104,6 +104,29 @@ def test_wind_is_one_for_all_or_one_for_each_and_none_before_the_start() -> None
     assert abs(drift[0]) < 1e-6 < drift[1] < drift[2]
 
 
+def test_weather_may_change_from_step_to_step() -> None:
+    """A series that does not change is a constant; one that does is logged as it is, and felt by clock and helmsman."""
+    two = [CIRCLE, Zigzag(name="zigzag", n_rpm=120, duration=30)]
+    speeds = np.array([4.0, 6.0])
+    held = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": speeds, "beta_w": 0.4})
+    level = np.broadcast_to(speeds, (301, 2))
+    same = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": level, "beta_w": 0.4})
+    pd.testing.assert_frame_equal(same, held, rtol=1e-12)
+    rising = np.linspace(0, 10, 301)[:, None] + [0.0, 1.0]
+    blown = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": rising, "beta_w": 0.4})
+    for place, (_, run) in enumerate(blown.groupby("run", sort=False)):
+        np.testing.assert_allclose(run["V_w"], rising[::5, place][: len(run)])
+    assert np.abs(blown["v"] - held["v"]).max() > 0.01
+
+
+def test_one_duration_for_all() -> None:
+    chosen = [CIRCLE, Spiral(n_rpm=120, hold=4, angles_deg=(5, -5)), Zigzag(n_rpm=120, duration=30)]
+    frame = perform(SHIP, chosen, step=0.1, interval=0.5, duration=12.0)
+    assert frame.groupby("run")["t"].max().to_list() == [12.0] * 3
+    apart = perform(SHIP, chosen[:1], step=0.1, interval=0.5)
+    pd.testing.assert_frame_equal(frame[frame["run"] == "M001"], apart[apart["t"] <= 12.0], rtol=1e-12)
+
+
 def test_performing_twice_is_the_same() -> None:
     chosen = [Zigzag(n_rpm=145, duration=20), StationKeeping(duration=20, east=1.0)]
     pd.testing.assert_frame_equal(perform(SHIP, chosen, step=0.1), perform(SHIP, chosen, step=0.1))

@@ -392,11 +392,10 @@ def test_bundled_ship_rides_long_waves_but_for_the_sway_of_a_manoeuvring_model(n
 
 
 def calm(name: str, **changes: Any) -> Truth:
-    return Truth(
-        **{"vessel": name, "manoeuvres": 12, "duration": 160.0, "wind_speed": (0.0, 0.0), "seed": 3}
-        | {"start_speed": (0.0, 0.5), "actuators_at": "rest"}
-        | changes
-    )
+    block = {"n_rpm": (50.0, 200.0), "alpha_deg": (-50.0, 50.0), "start_speed": (0.0, 0.5), "actuators_at": "rest"}
+    block |= {key: changes.pop(key) for key in block if key in changes}
+    given = {"vessel": name, "manoeuvres": 12, "duration": 160.0, "wind_speed": (0.0, 0.0), "seed": 3}
+    return Truth(**given | {"manoeuvre": [block]} | changes)
 
 
 @BOTH

@@ -21,8 +21,14 @@ from tests.conftest import LAG, PATCHED
 SHIP = load_vessel("gunnerus-28.9")
 
 
+TURNS = {"n_rpm": (50.0, 200.0), "alpha_deg": (-50.0, 50.0)}
+
+
 def truth(**changes: Any) -> Truth:
-    return Truth(**{"vessel": "gunnerus-28.9", "manoeuvres": 6, "duration": 4.0, "step": 0.1, "seed": 5, **changes})
+    """A short truth; keys of the manoeuvre go into a block of turns."""
+    block = TURNS | {key: changes.pop(key) for key in ("start_speed", "actuators_at", *TURNS) if key in changes}
+    short = {"vessel": "gunnerus-28.9", "manoeuvres": 6, "duration": 4.0, "step": 0.1, "seed": 5}
+    return Truth(**{**short, "manoeuvre": [block], **changes})
 
 
 def first_rows(frame: pd.DataFrame) -> pd.DataFrame:
@@ -116,7 +122,7 @@ def test_every_structure_logs_a_dataset(name: str) -> None:
 
 def test_diverging_truth_is_told() -> None:
     wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
-    with pytest.raises(DocumentError, match=r"diverges in manoeuvre \d+ of 6") as caught:
+    with pytest.raises(DocumentError, match=r"diverges in M00\d: take a smaller step") as caught:
         simulate(truth(start_speed=(2.0, 3.0)), wild)
     assert caught.value.path == "truth"
 

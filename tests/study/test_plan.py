@@ -6,11 +6,12 @@ import re
 from pathlib import Path
 
 import pytest
+from shipid.hybrid.recipe import Recipe, RidgeRecipe
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
-from shipid.hybrid.recipe import Recipe, RidgeRecipe
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
+from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
 
@@ -22,6 +23,9 @@ from tests.study.tiny import tiny_plan
         ("full-scale", 4 + 2 + 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 10),
         ("simulation-small", 4 + 3 * 3 + 1 + 1, 3 * 2),
+        ("constant-orders", 4 + 3 * 3 + 1 + 1, 3 * 2),
+        ("changing-orders", 4 + 3 * 3 + 1 + 1, 3 * 2),
+        ("zigzags", 1 + 2 + 1, 3),
     ],
 )
 def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
@@ -32,7 +36,28 @@ def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
 
 
 def test_every_bundled_study_is_tested() -> None:
-    assert set(bundled("studies")) == {"quick", "full-scale", "simulation", "simulation-small"}
+    worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "zigzags"}
+    assert set(bundled("studies")) == {"quick", "full-scale", *worlds}
+
+
+def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
+    """Weather, sea, start, models and amounts are those of the other, and a past comes before the first instant."""
+    constant, changing = read_plan("constant-orders").study, read_plan("changing-orders").study
+    assert constant.truth is not None
+    assert changing.truth is not None
+    assert constant.truth.run_up == 20.0
+    assert constant.truth.model_copy(update={"manoeuvre": changing.truth.manoeuvre}) == changing.truth
+    small = read_plan("simulation-small").study
+    for name in ("family", "grid", "split", "prediction"):
+        assert getattr(constant, name) == getattr(changing, name) == getattr(small, name), name
+
+
+def test_the_first_instant_comes_after_the_run_up() -> None:
+    plan = read_plan("zigzags", {"truth.run_up": 12.0})
+    assert plan.past == 12
+    windows = all_windows(plan, obtain(plan))
+    assert (windows.t.min(), windows.t.max()) == (12.0, 12.0 + 59.0)
+    assert set(windows.spans.values()) == {(0.0, 12.0 + 59.0 + 15.0)}
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:

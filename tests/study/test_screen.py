@@ -91,7 +91,9 @@ def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Pa
     )
     rules = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.5, 3.0]}]
     family = [{"name": "wrong", "base": str(vessel), "members": 2, "perturb": rules}]
-    plan = tiny_plan(tmp_path, {"family": family, "truth.vessel": str(vessel), "truth.actuators_at": "rest"})
+    plan = tiny_plan(
+        tmp_path, {"family": family, "truth.vessel": str(vessel), "truth.manoeuvre.0.actuators_at": "rest"}
+    )
     plan.vessels["gunnerus-28.9"] = plan.vessels[str(vessel)]  # type: ignore[index]
     np.testing.assert_allclose(screened(plan, 3)["A"], [row["mean"] for row in by_paths(plan, 3)], rtol=1e-12)
 

@@ -1,0 +1,187 @@
+"""Blocks of manoeuvres: what is drawn, what is fixed, what is refused; laws over all kinds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from pydantic import ValidationError
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DocumentError
+from shipid.simulation.draw import Draw
+from shipid.simulation.manoeuvre import KINDS, Excitation, Spiral, Steps, Timed, Turning, Zigzag, order_keys
+from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate
+from shipid.units import DEGREE
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import LAG
+
+SHIP = load_vessel("gunnerus-28.9")
+LAGGED = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
+SHAFT = {"n_rpm": [80.0, 150.0]}
+BLOCKS: dict[str, dict[str, Any]] = {
+    "turning": {**SHAFT, "alpha_deg": [-40.0, 40.0], "start_speed": [0.0, 2.0]},
+    "steps": {**SHAFT, "alpha_deg": [-40.0, 40.0], "hold": [2.0, 6.0]},
+    "turning_circle": {**SHAFT, "angle_deg": [10.0, 35.0], "side": ["starboard", "port"]},
+    "pull_out": {**SHAFT, "turn": [5.0, 10.0]},
+    "zigzag": {**SHAFT, "angle_deg": [10.0, 30.0], "side": ["starboard", "port"], "approach": "rest"},
+    "spiral": {**SHAFT, "hold": 4.0, "angles_deg": [20.0, -20.0, 5.0]},
+    "reverse_spiral": {**SHAFT, "hold": 8.0, "rates_deg": [1.0, -1.0]},
+    "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
+    "excitation": {**SHAFT, "signal": "aprbs", "angle_deg": 15.0, "hold": [2.0, 6.0]},
+    "station_keeping": {"north": [-1.0, 1.0], "most_rpm": 150.0},
+}
+
+
+def truth(*blocks: dict[str, Any], **changes: Any) -> Truth:
+    given = {"vessel": "gunnerus-28.9", "manoeuvres": 3, "duration": 20.0, "step": 0.1, "seed": 5}
+    return Truth(**{**given, "manoeuvre": list(blocks), **changes})
+
+
+def test_every_kind_has_an_example() -> None:
+    assert set(BLOCKS) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", list(BLOCKS))
+def test_every_kind_is_a_truth(kind: str) -> None:
+    """A dataset, each run as long as run-up and duration say, no two runs alike; more runs change none that exist."""
+    block = {"kind": kind, **BLOCKS[kind]}
+    few = simulate(truth(block, manoeuvres=2, run_up=5.0), LAGGED)
+    many = simulate(truth(block, manoeuvres=4, run_up=5.0), LAGGED)
+    pd.testing.assert_frame_equal(many.iloc[: len(few)], few, rtol=1e-9, atol=1e-9)
+    runs = [run for _, run in many.groupby("run")]
+    assert len(Dataset(many, {"clock": "run", "flags": []}).frame) == 4 * 26
+    for run in runs:
+        np.testing.assert_allclose(run["t"], np.arange(26.0))
+    for name in ("psi", "port.n", "V_w"):
+        assert len({tuple(run[name].round(9)) for run in runs}) == 4, name
+
+
+@pytest.mark.parametrize("kind", list(BLOCKS))
+def test_every_kind_refuses_a_key_that_it_has_not(kind: str) -> None:
+    if "orders" in KINDS[kind].model_fields:  # any key may be an order: the vessel tells
+        with pytest.raises(DocumentError, match="orders no command") as caught:
+            check_truth(truth({"kind": kind, **BLOCKS[kind], "helm": 3.0}), SHIP)
+        assert caught.value.path == "truth.manoeuvre.0.helm"
+    else:
+        with pytest.raises(ValidationError, match=f"helm: no key of {kind}"):
+            truth({"kind": kind, **BLOCKS[kind], "helm": 3.0})
+
+
+def test_every_command_of_every_vessel_takes_orders(vessel: Vessel) -> None:
+    """Ranges by signal; without one, the line names the key that is missing."""
+    keys = {order_keys(name)[1]: [5.0, 10.0] for name in dynamics(vessel).commands}
+    for kind in ("turning", "steps"):
+        block = {"kind": kind, "start_speed": 1.0, **keys}
+        log = simulate(truth(block, manoeuvres=2, duration=1.0, step=0.01, wind_speed=(0, 0)), vessel)
+        assert set(dynamics(vessel).commands) <= set(log)
+        for missing in keys:
+            with pytest.raises(DocumentError, match=rf"give {missing} = \[low, high\]") as caught:
+                check_truth(truth({key: value for key, value in block.items() if key != missing}), vessel)
+            assert caught.value.path == f"truth.manoeuvre.0.{missing}"
+
+
+def test_one_command_may_have_orders_of_its_own() -> None:
+    """The tunnel unit stays still while the azimuths run: `bow.n_rpm = 0` of TOML is a table."""
+    ship = SHIP.with_values({"thruster.bow.off": False})
+    for given in ({"bow.n_rpm": 0.0}, {"bow": {"n_rpm": 0.0}}):
+        log = simulate(truth({**BLOCKS["turning"], **given}), ship)
+        assert (log["bow.n"] == 0).all()
+        assert (log["port.n"] > 1).all()
+
+
+def test_a_kind_is_one_edit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A class and its name: no other place knows the kinds."""
+
+    class Weave(Timed):
+        """The helm swings like a sine."""
+
+        angle_deg: float = 10.0
+
+        def helm(self, t: np.ndarray) -> np.ndarray:
+            """Helm angle [rad]."""
+            return self.angle_deg * DEGREE * np.sin(t)
+
+    with pytest.raises(ValidationError, match="'weave' is no kind of manoeuvre"):
+        truth({"kind": "weave"})
+    monkeypatch.setitem(KINDS, "weave", Weave)
+    log = simulate(truth({"kind": "weave", "n_rpm": 120.0, "angle_deg": [5.0, 15.0]}), SHIP)
+    greatest = log.groupby("run")["port.alpha"].max() / DEGREE
+    assert greatest.between(4.5, 15).all()
+    assert greatest.nunique() == 3
+
+
+def test_shares_are_met_and_no_run_depends_on_their_number() -> None:
+    """400 draws: a share of 0.3 within 5 standard errors."""
+    blocks = {"kind": "zigzag", "share": 0.3, **SHAFT}, {"kind": "turning", "share": 0.7, **BLOCKS["turning"]}
+    many = draw_manoeuvres(truth(*blocks, manoeuvres=400))
+    zigzags = [isinstance(one, Zigzag) for one in many]
+    assert abs(np.mean(zigzags) - 0.3) < 5 * np.sqrt(0.3 * 0.7 / 400)
+    assert many[:50] == draw_manoeuvres(truth(*blocks, manoeuvres=50))
+    doubled = [{**block, "share": 2 * block["share"]} for block in blocks]
+    assert many == draw_manoeuvres(truth(*doubled, manoeuvres=400))
+
+
+def test_a_mixture_is_logged_in_one_frame() -> None:
+    blocks = [{"kind": kind, **BLOCKS[kind]} for kind in ("turning", "zigzag", "steps")]
+    mixed = truth(*blocks, manoeuvres=12, seed=6)
+    assert {type(one) for one in draw_manoeuvres(mixed)} == {Turning, Zigzag, Steps}
+    assert simulate(mixed, LAGGED).groupby("run").size().to_list() == [21] * 12
+
+
+def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
+    def at(place: float) -> Any:
+        return lambda _: place
+
+    zigzag = Draw(kind="zigzag", n_rpm=[80, 150], angle_deg=20, side=["starboard", "port"])
+    low, high = (zigzag.manoeuvre(60.0, at(place)) for place in (0.0, 0.999))
+    assert low == Zigzag(n_rpm=80, angle_deg=20, side="starboard", duration=60, course_deg=0)
+    assert isinstance(high, Zigzag)
+    assert (high.n_rpm, high.angle_deg, high.side) == (pytest.approx(149.93), 20, "port")
+    assert high.course_deg == pytest.approx(359.64)
+    fixed = Draw(kind="zigzag", n_rpm=100, course_deg=[30, 40]).manoeuvre(60.0, at(0.5))
+    assert fixed.course_deg == 35
+    spiral = Draw(kind="spiral", n_rpm=100, hold=10, angles_deg=[15, -15]).manoeuvre(60.0, at(0.5))
+    assert isinstance(spiral, Spiral)
+    assert spiral.angles_deg == (15, -15)
+    steps = Draw(kind="steps", n_rpm=100, alpha_deg=[-10, 20]).manoeuvre(60.0, at(0.5))
+    assert isinstance(steps, Steps)
+    assert steps.orders == {"n_rpm": (100, 100), "alpha_deg": (-10, 20)}
+
+
+def test_seeds_are_drawn_unless_given() -> None:
+    block = {"kind": "excitation", **BLOCKS["excitation"]}
+    drawn = draw_manoeuvres(truth(block))
+    assert len({one.seed for one in drawn if isinstance(one, Excitation)}) == 3
+    same = draw_manoeuvres(truth({**block, "seed": 7}))
+    assert {one.seed for one in same if isinstance(one, Excitation)} == {7}
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ({"kind": "zigzags", **SHAFT}, "did you mean 'zigzag'"),
+        ({"kind": "zigzag", "n_rpm": [150.0, 80.0]}, "n_rpm runs backwards"),
+        ({"kind": "zigzag", "n_rpm": [1.0, 2.0, 3.0]}, r"n_rpm: give a number or \[low, high\]"),
+        ({"kind": "zigzag", **SHAFT, "angle_deg": [-5.0, 5.0]}, "angle_deg: Input should be greater than 0"),
+        ({"kind": "zigzag", **SHAFT, "duration": 5.0}, r"duration: no key of zigzag: \[truth\] gives it"),
+        ({"kind": "zigzag", **SHAFT, "side": ["port", "left"]}, "side: Input should be"),
+        ({"kind": "zigzag"}, "n_rpm: Field required"),
+        ({"kind": "steps", "n_rpm": [1.0, True]}, "n_rpm: give a number"),
+        ({"kind": "turning", "share": 0.0, **SHAFT}, "greater than 0"),
+    ],
+)
+def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        truth(block)
+
+
+def test_a_vessel_that_cannot_is_refused_beforehand() -> None:
+    rudder = load_vessel("mariner")
+    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "station_keeping", **BLOCKS["station_keeping"]}
+    with pytest.raises(DocumentError, match="station keeping needs two azimuth units") as caught:
+        check_truth(truth(*blocks), rudder)
+    assert caught.value.path == "truth.manoeuvre.1"

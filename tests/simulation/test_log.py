@@ -1,0 +1,39 @@
+"""What a simulated ship logs: velocities of the horizontal plane and back, names of runs and columns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.simulation.log import aboard, column_of, horizontal, run_names
+
+
+def test_horizontal_velocities_are_those_of_the_rotation() -> None:
+    """u and v are the first two components of R_y(theta) R_x(phi) (u, v, w), r the third of the Euler rates."""
+    rng = np.random.default_rng(3)
+    body = {name: rng.normal(size=50) for name in ("u", "v", "w", "q", "r")}
+    body |= {"phi": rng.uniform(-0.5, 0.5, 50), "theta": rng.uniform(-0.3, 0.3, 50)}
+    found = horizontal(body)
+    for k in range(50):
+        c, s = np.cos(body["phi"][k]), np.sin(body["phi"][k])
+        roll = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        c, s = np.cos(body["theta"][k]), np.sin(body["theta"][k])
+        trim = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        level = trim @ roll @ [body[name][k] for name in ("u", "v", "w")]
+        np.testing.assert_allclose([found["u"][k], found["v"][k]], level[:2], atol=1e-12)
+        rate = (body["q"][k] * np.sin(body["phi"][k]) + body["r"][k] * np.cos(body["phi"][k])) / c
+        np.testing.assert_allclose(found["r"][k], rate, atol=1e-12)
+    back = aboard({**body, **found})
+    for name in ("u", "v", "r"):
+        np.testing.assert_allclose(back[name], body[name], atol=1e-12)
+
+
+def test_a_level_ship_logs_its_own_velocities() -> None:
+    level = {name: np.array([value]) for name, value in (("u", 2.0), ("v", -0.3), ("r", 0.05))}
+    assert {name: values[0] for name, values in horizontal(level).items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
+
+
+def test_names_sort_as_they_count() -> None:
+    assert run_names(2) == ["M001", "M002"]
+    many = run_names(1200)
+    assert many == sorted(many)
+    assert (many[0], column_of("down"), column_of("psi")) == ("M0001", "z", "psi")
