@@ -16,6 +16,7 @@ from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, S
 from shipid.report.errors_over import model_chips
 from shipid.report.figure import Chip, Control, Figure, FixedWindow, plane
 from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
+from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres, number
 
@@ -292,3 +293,11 @@ def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> 
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
     sizes_said = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {sizes_said}: {'; '.join(parts)}."
+
+
+SECTION = Section(
+    "The predictions",
+    draw=lambda content: (browser(content), snapshots(content)),
+    needs=("snapshots",),
+    anchors=("browser", "snapshots"),
+)
