@@ -51,7 +51,7 @@ def _before(
     if verbose:
         log_to_stderr()
     if version:
-        from shipid import __version__
+        from shipid.version import __version__
 
         typer.echo(__version__)
         raise typer.Exit

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from shipid import __version__
 from shipid.identification.outcome import Identified
 from shipid.report.identification import IdentificationContent
+from shipid.version import __version__
 
 
 def identification_content(found: Identified, dataset: str | Path, command: str = "") -> IdentificationContent:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid import __version__
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import record_of
@@ -19,6 +18,7 @@ from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, length_of, standard
+from shipid.version import __version__
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
 
