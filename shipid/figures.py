@@ -224,7 +224,7 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     plain = {"kind": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
     ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)
     names = cells["model"].astype(str) + "-" + cells["N_D"].astype(str)
-    absent = {"status": ok, "cell": names, **unknown, **plain}
+    absent: dict[str, Any] = {"status": ok, "cell": names, **unknown, **plain}
     return cells.assign(**{name: value for name, value in absent.items() if name not in cells})
 
 

@@ -123,7 +123,8 @@ def _stacked(panels: Sequence[Panel], height: int) -> go.Figure:
     layout = dict(panels[0].figure.layout.to_plotly_json())
     for name in ("xaxis", "yaxis"):
         layout.pop(name, None)
-    shapes, notes = [], []
+    shapes: list[Any] = []
+    notes: list[Any] = []
     for row, panel in enumerate(panels):
         number = "" if row == 0 else str(row + 1)
         bottom = 1 - (row * (height + GAP) + height) / total
@@ -215,7 +216,7 @@ def _bar(scale: Scale) -> go.Scatter:
     return go.Scatter(x=[None, None], y=[None, None], mode="markers", marker=marker, showlegend=False, hoverinfo="skip")
 
 
-def _wrapped(text: str, most: int = 120) -> str:
+def _wrapped(text: str, most: int = 110) -> str:
     lines = [""]
     for word in text.split():
         if len(lines[-1]) + len(word) > most:
