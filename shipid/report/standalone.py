@@ -88,8 +88,8 @@ def painted(figure: go.Figure, dark: bool = False) -> go.Figure:
             return [paint(item) for item in value]
         return value
 
-    plain = paint(figure.to_plotly_json())
-    return go.Figure(plain["data"], {**plain["layout"], "paper_bgcolor": colours["--page"]})
+    data = [paint(trace.to_plotly_json()) for trace in figure.data]
+    return go.Figure(data, {**paint(figure.layout.to_plotly_json()), "paper_bgcolor": colours["--page"]})
 
 
 def _colours(dark: bool) -> dict[str, str]:

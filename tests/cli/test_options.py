@@ -36,10 +36,6 @@ def test_stem_keeps_the_dot_of_a_name() -> None:
 
     names = ("gunnerus-28.9", "a/b.toml", Path("x/log.parquet"))
     assert [stem(name) for name in names] == ["gunnerus-28.9", "b", "log"]
-        "gunnerus-28.9",
-        "b",
-        "log",
-    ]
 
 
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:

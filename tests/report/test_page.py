@@ -169,10 +169,10 @@ def test_axes_have_units(content):
     for section in drawn(SECTIONS, content):
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
-                for name, axis in panel.figure.layout.to_plotly_json().items():
+                for name, drawn_axis in panel.figure.layout.to_plotly_json().items():
                     if re.fullmatch(r"[xy]axis\d*", name):
-                        named = axis.get("ticktext") or axis.get("showticklabels") is False
-                        assert named or re.search(r"\S \[[^\]]+\]$", axis["title"]["text"]), (item.id, name)
+                        named = drawn_axis.get("ticktext") or drawn_axis.get("showticklabels") is False
+                        assert named or re.search(r"\S \[[^\]]+\]$", drawn_axis["title"]["text"]), (item.id, name)
                         seen += 1
     assert seen > 20
 

@@ -1,3 +1,4 @@
+import itertools
 import re
 
 import numpy as np
@@ -43,7 +44,7 @@ def test_panels_lie_below_each_other(simulation):
     axes = [name for name in made.layout.to_plotly_json() if re.fullmatch(r"yaxis\d*", name)]
     assert len(axes) == quantities > 1
     domains = sorted(made.layout[name].domain for name in axes)
-    assert all(a[1] < b[0] for a, b in zip(domains, domains[1:], strict=False)), "no panel lies on another"
+    assert all(a[1] < b[0] for a, b in itertools.pairwise(domains)), "no panel lies on another"
     assert domains[0][0] >= -1e-9
     assert domains[-1][1] <= 1 + 1e-9
 

@@ -17,4 +17,4 @@ def test_a_manoeuvre_is_simulated_measured_and_shown(name):
     assert (len(content.levels) > 0) == (name == "spiral")
     np.testing.assert_array_equal(content.log["t"], done.record.t)
     assert np.ptp(content.outline[:, 0]) == pytest.approx(31.25)  # over all [m]
-    assert [sentence.figure for sentence in content.answer][0] == "measures"
+    assert content.answer[0].figure == "measures"

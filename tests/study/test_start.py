@@ -43,5 +43,5 @@ def test_the_folder_is_named_after_the_study() -> None:
 def test_a_mistake_is_an_error_of_shipid() -> None:
     with pytest.raises(ShipidError, match="did you mean 'quick'"):
         run("quik")
-    with pytest.raises(ShipidError, match="grid.M_D"):
+    with pytest.raises(ShipidError, match=r"grid\.M_D"):
         next(events(TINY, {"grid.M_D": [4]}))
