@@ -208,8 +208,7 @@ def _from_frames(frames: dict[str, Any]) -> ReportContent:
     cells = _completed(frames.pop("cells", pd.DataFrame({"model": [], "N_D": [], "H": []})))
     models = frames.pop("models", None)
     if models is None:
-        columns = {"model": "model", "kind": "family", "A": "A", "A_90": "A_90", "A_rms": "A_rms"}
-        models = cells.drop_duplicates("model")[list(columns)].rename(columns=columns)
+        models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
         models = models.assign(status="ok", description="")
     naive = frames.pop("naive", dict.fromkeys(("mean", "p90", "rms"), np.nan))
     words = {"title": "", "name": "", "answer": [], "findings": []}
@@ -221,7 +220,7 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
     unknown = dict.fromkeys(("A", "A_90", "A_rms", "H_90", "rms"), np.nan)
-    plain = {"kind": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
+    plain = {"family": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
     ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)
     names = cells["model"].astype(str) + "-" + cells["N_D"].astype(str)
     absent: dict[str, Any] = {"status": ok, "cell": names, **unknown, **plain}

@@ -13,7 +13,7 @@ Floats = np.ndarray[tuple[int, ...], np.dtype[np.floating]]
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.signedinteger]]
 PathKey = tuple[str, str, int]
 
-DATA_DRIVEN = "none"  # the family (column `kind`) of the model without physics
+DATA_DRIVEN = "none"  # the family of the model without physics
 # Columns of a trial; whatever else its frame holds is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
@@ -76,13 +76,13 @@ class ReportContent:
     """Everything one report shows; a frame without rows leaves its figure out.
 
     `source` is "physics", "cooperative" or "naive". Rows of physics and naive hold whatever the number of
-    manoeuvres and have N_D = 0; the pure data-driven model is the one of kind "none", its source "cooperative".
+    manoeuvres and have N_D = 0; the pure data-driven model is the one of family "none", its source "cooperative".
 
     Parameters
     ----------
     title, name : the study's question in words and its short name.
     answer : a few sentences, in order.
-    cells : one row per cell: model, kind, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
+    cells : one row per cell: model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
     naive : mean, p90, rms [m] of the floor of constant u, v, r.
     models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.windows import Windows
-from shipid.hybrid.compensator import choose_features, feature_table
+from shipid.hybrid.features import choose_features, feature_table
 from shipid.study.plan import PUBLISHED, Plan, Published
 from shipid.study.prepare import nested
 from shipid.units import DEGREE, RPM

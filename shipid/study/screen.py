@@ -15,10 +15,10 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.native import compiler
 from shipid.errors import DocumentError, choices
+from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
-from shipid.predictor import check_columns, physics_distances
 from shipid.study.plan import Plan
-from shipid.study.prepare import not_measured, partition, planned, window_memory
+from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -84,15 +84,10 @@ def _rows(
     for same in _equal_lags(base, values):
         vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
         for windows in parts:
-            found = physics_distances(
-                vessel,
-                windows.columns,
+            found = physics_of(plan, vessel).distances(
+                instants_of(plan, vessel, dataset, windows),
                 windows.future,
-                plan.study.prediction.step,
-                plan.study.prediction.method,
-                parameters=values[same],
-                memory=window_memory(vessel, dataset, windows),
-                planned=planned(plan, windows),
+                values[same],
                 engine="native" if device == "cpu" and compiler() is not None else "auto",
                 device=device,
             )
