@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from shipid.errors import ShipidError
+from shipid.study.store import read_rows
 from tests.cli.running import BAD, said
 
 
@@ -15,6 +16,6 @@ def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ShipidError, match=r"takes this command; the data have propeller\.n"):
         said(
-            *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", "right-N0004-s0"),
+            *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", read_rows(tiny_run)["cell"].iloc[0]),
             *("--mapping", BAD / "logs" / "plain.toml"),
         )

@@ -52,7 +52,7 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
 
 def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:
     text = said("study", "variants", study)
-    rows = read_rows(tiny_run).drop_duplicates("model").set_index("model")
+    rows = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")
     for name in ("right", "wrong-1", "wrong-2"):
         shown = re.search(rf"^ *{name} +(\S+)", text, re.MULTILINE)
         assert shown
@@ -83,9 +83,10 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     next((folder / "batches").iterdir()).unlink()
     assert "4 of 8 cells to do" in said("study", "resume", folder, "--workers", "1")
 
-    text = said("predict", folder, folder / DATASET, "--cell", "none-N0004-s0")
-    assert f"{12 * 21} instants, {12 * 21 * 5} points -> none-N0004-s0.parquet" in text
-    assert len(pd.read_parquet("none-N0004-s0.parquet")) == 12 * 21 * 5
+    cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
+    text = said("predict", folder, folder / DATASET, "--cell", cell)
+    assert f"{12 * 21} instants, {12 * 21 * 5} points -> {cell}.parquet" in text
+    assert len(pd.read_parquet(f"{cell}.parquet")) == 12 * 21 * 5
     assert "outside what the cell was trained on" in text
 
 
