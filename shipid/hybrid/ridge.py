@@ -27,18 +27,10 @@ from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.settings import seed_of
+from shipid.physics.signals import mirror_sign, orders_thrust, steers
 
 SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
 ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
-ODD = {
-    "v",
-    "r",
-    "v_rw",
-    "alpha",
-    "delta",
-    "y",
-    "psi",
-}  # change sign in the mirror: motions, relative wind, angles of actuators
 
 
 @dataclass(frozen=True)
@@ -236,10 +228,11 @@ def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ..
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
         words = re.split("([^a-z]+)", component)
-        if signal == "n" and ACROSS & set(words) and f"{component}.alpha" not in table:
+        turns = any(steers(other) for other in table if other.startswith(f"{component}."))
+        if orders_thrust(column) and ACROSS & set(words) and not turns:
             return None
         partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
-        sign = -1.0 if signal in ODD else 1.0
+        sign = mirror_sign(column)
         if column in standing and partner in standing:
             matrix[names.index(standing[partner]), names.index(standing[column])] = sign
         elif column in standing or partner not in table or not np.allclose(values, sign * table[partner]):

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Engine, rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.helm import Unit, steers
+from shipid.physics.helm import Unit
+from shipid.physics.signals import steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

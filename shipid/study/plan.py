@@ -20,8 +20,8 @@ from shipid.hybrid.methods import method_of
 from shipid.identification.problem import Identify, unknowns
 from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
+from shipid.physics.signals import SIGNALS, named
 from shipid.simulation.truth import Truth, check_truth
-from shipid.units import DEGREE, RPM
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -31,11 +31,15 @@ NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 MOST_STEPS = 100_000
 IDENTIFIED = "identified from the runs of each cell"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
-PUBLISHED = {  # key of a published envelope -> signal, factor to SI
-    **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
-    "n_rpm": ("n", RPM),
-    **{f"{name}_deg": (name, DEGREE) for name in ("r", "alpha", "delta")},
-}
+INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
+
+
+def published_keys() -> dict[str, tuple[str, float]]:
+    """Key of a published envelope -> signal, factor to SI: `n`, and `n_rpm` in the unit that sailors read."""
+    names = (*INPUTS, *named("command"))
+    read = {name: SIGNALS[name] for name in names if SIGNALS[name].shown}
+    in_words = {f"{name}_{row.read_in.partition('/')[0]}": (name, row.factor) for name, row in read.items()}
+    return {name: (name, 1.0) for name in names} | in_words
 
 
 class Strict(BaseModel):
@@ -148,8 +152,8 @@ class Published(Strict):
     @model_validator(mode="after")
     def _sensible(self) -> Published:
         for key, limits in self.envelope.items():
-            if key not in PUBLISHED:
-                raise ValueError(f"envelope.{key} is no input: {choices(key, PUBLISHED)}")
+            if key not in published_keys():
+                raise ValueError(f"envelope.{key} is no input: {choices(key, published_keys())}")
             if len(limits) != 3 or limits != sorted(limits):
                 raise ValueError(f"envelope.{key}: give [min, mean, max], found {limits}")
         return self

@@ -308,7 +308,7 @@ def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) ->
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
-    if counter > MOST_REDRAWS or not any(isinstance(block.factor, tuple) for block in family.perturb):
+    if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
         raise DocumentError(
             f"{foundation.name} diverges on {share:.1%} of the training windows{tries}: "

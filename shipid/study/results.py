@@ -16,9 +16,10 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
+from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.envelope import SAILORS, envelope_table
+from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of
 from shipid.vessel.outline import ship_outline
@@ -178,15 +179,15 @@ def commands_frame(results: Results) -> pd.DataFrame:
     result = frame[["run", "t"]].reset_index(drop=True)
     shown: dict[str, str] = {}
     for name in results.dataset.commands:
-        alike = (other for other in shown if other.rpartition(".")[2] == name.rpartition(".")[2])
+        alike = (other for other in shown if signal_of(other) == signal_of(name))
         twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
         if twin is None:
             shown[name] = name.partition(".")[0]
         else:
             shown[twin] += f" and {name.partition('.')[0]}"
     for name, components in shown.items():
-        word, unit, factor = SAILORS[name.rpartition(".")[2]]
-        result[f"{components} {word} [{unit}]"] = frame[name].to_numpy() * factor
+        unit, factor = read_unit(name)
+        result[f"{components} {SIGNALS[signal_of(name)].word} [{unit}]"] = frame[name].to_numpy() * factor
     return _with_gaps(result, ["run"])
 
 

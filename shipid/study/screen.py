@@ -31,11 +31,7 @@ OWN = ("family", "member", "A", "A_90", "diverged")
 
 def families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [
-        family
-        for family in resolve(plan.study.family, plan.file)
-        if any(isinstance(block.factor, tuple) for block in family.perturb)
-    ]
+    drawn = [family for family in resolve(plan.study.family, plan.file) if any(block.drawn for block in family.perturb)]
     if name is None and not drawn:
         raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
     found = [family for family in drawn if name in (None, family.name)]
