@@ -10,7 +10,7 @@ import numpy as np
 
 from shipid.data.windows import Instants, from_frame, to_frame
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import Distances, Engine, distances, rollout
+from shipid.engine.rollout import Distances, distances, rollout
 from shipid.errors import DataError
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -74,7 +74,7 @@ class Physics:
         future: Array,
         parameters: Array | None = None,
         *,
-        engine: Engine = "auto",
+        engine: str = "auto",
         device: str = "cpu",
     ) -> Distances:
         """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11), without keeping paths."""

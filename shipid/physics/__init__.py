@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from shipid.physics import hull, propeller, radiation, restoring, rudder, signals, thruster, waves, wind
+from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, signals, thruster, waves, wind
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,7 @@ TERMS: dict[str, Term] = {
     "hull.abkowitz": Term(hull.abkowitz),
     "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
     "hull.resistance": Term(hull.resistance),
+    "hull.learned": Term(learned.learned),
     "restoring.hydrostatic": Term(restoring.hydrostatic),
     "radiation.heave_pitch": Term(
         radiation.heave_pitch, states=radiation.heave_pitch_states, rates=radiation.heave_pitch_rates

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.engine.integrate import Method
-from shipid.engine.rollout import Engine, rollout
+from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit
 from shipid.physics.signals import steers
@@ -88,7 +88,7 @@ def helm_effect(controls: Controls, n: float, u: float) -> float:
 
 
 def steady(
-    controls: Controls, n: Array, *, step: float, method: Method, engine: Engine
+    controls: Controls, n: Array, *, step: float, method: Method, engine: str
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
 
