@@ -4,28 +4,109 @@ It declares ships as symbols, degrades them on purpose, compensates them with da
 It is not a simulator with a user interface, not a controller, and not a deep-learning framework.
 """
 
-from importlib import import_module
+from __future__ import annotations
 
-__version__ = "0.1.0"
+import logging
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from shipid.version import __version__ as __version__
+
+if TYPE_CHECKING:  # for editors and type checkers; at run time a name is imported when it is first used
+    from shipid import figures as figures
+    from shipid.data.checks import check_dataset as check_dataset
+    from shipid.data.dataset import Dataset as Dataset
+    from shipid.data.dataset import read_dataset as read_dataset
+    from shipid.data.dataset import write_dataset as write_dataset
+    from shipid.data.windows import Windows as Windows
+    from shipid.data.windows import cut_windows as cut_windows
+    from shipid.engine.rollout import Trajectories as Trajectories
+    from shipid.engine.rollout import rollout as rollout
+    from shipid.errors import ShipidError as ShipidError
+    from shipid.identification.outcome import run_identification as run_identification
+    from shipid.identification.problem import Identify as Identify
+    from shipid.identification.solve import identify as identify
+    from shipid.logs.guess.columns import guess as guess
+    from shipid.logs.importing import import_log as import_log
+    from shipid.logs.mapping import read_mapping as read_mapping
+    from shipid.predictor import Predictor as Predictor
+    from shipid.simulation.measured import measure_standard as measure_standard
+    from shipid.simulation.perform import perform as perform
+    from shipid.simulation.standard import standard as standard
+    from shipid.simulation.truth import Truth as Truth
+    from shipid.simulation.truth import simulate as simulate
+    from shipid.study.contents import write_pages as write_pages
+    from shipid.study.plan import Plan as Plan
+    from shipid.study.plan import read_plan as read_plan
+    from shipid.study.results import Results as Results
+    from shipid.study.results import read_results as read_results
+    from shipid.study.run import run_study as run_study
+    from shipid.study.screen import screen as screen
+    from shipid.study.start import events as events
+    from shipid.study.start import run as run
+    from shipid.vessel.load import Vessel as Vessel
+    from shipid.vessel.load import load_vessel as load_vessel
+    from shipid.vessel.perturb import Family as Family
+    from shipid.vessel.perturb import Perturbation as Perturbation
+    from shipid.vessel.perturb import Variant as Variant
+    from shipid.vessel.perturb import draw as draw
+    from shipid.vessel.perturb import members as members
+
 
 _PUBLIC = {
-    "load_vessel": "shipid.vessel.load",
-    "Vessel": "shipid.vessel.load",
-    "rollout": "shipid.engine.rollout",
-    "read_dataset": "shipid.data.dataset",
-    "import_log": "shipid.logs.importing",
-    "cut_windows": "shipid.data.windows",
-    "identify": "shipid.identification.solve",
+    "Dataset": "shipid.data.dataset",
+    "Family": "shipid.vessel.perturb",
     "Identify": "shipid.identification.problem",
+    "Perturbation": "shipid.vessel.perturb",
+    "Plan": "shipid.study.plan",
     "Predictor": "shipid.predictor",
-    "run_study": "shipid.study.run",
+    "Results": "shipid.study.results",
     "ShipidError": "shipid.errors",
+    "Trajectories": "shipid.engine.rollout",
+    "Truth": "shipid.simulation.truth",
+    "Variant": "shipid.vessel.perturb",
+    "Vessel": "shipid.vessel.load",
+    "Windows": "shipid.data.windows",
+    "check_dataset": "shipid.data.checks",
+    "cut_windows": "shipid.data.windows",
+    "draw": "shipid.vessel.perturb",
+    "events": "shipid.study.start",
+    "figures": "shipid",
+    "guess": "shipid.logs.guess.columns",
+    "identify": "shipid.identification.solve",
+    "import_log": "shipid.logs.importing",
+    "load_vessel": "shipid.vessel.load",
+    "measure_standard": "shipid.simulation.measured",
+    "members": "shipid.vessel.perturb",
+    "perform": "shipid.simulation.perform",
+    "read_dataset": "shipid.data.dataset",
+    "read_mapping": "shipid.logs.mapping",
+    "read_plan": "shipid.study.plan",
+    "read_results": "shipid.study.results",
+    "rollout": "shipid.engine.rollout",
+    "run": "shipid.study.start",
+    "run_identification": "shipid.identification.outcome",
+    "run_study": "shipid.study.run",
+    "screen": "shipid.study.screen",
+    "simulate": "shipid.simulation.truth",
+    "standard": "shipid.simulation.standard",
+    "write_dataset": "shipid.data.dataset",
+    "write_pages": "shipid.study.contents",
 }
+"""Public name -> module that defines it."""
 
 __all__ = sorted(_PUBLIC)
 
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent until the user asks
+
 
 def __getattr__(name: str) -> object:
-    if name in _PUBLIC:
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'shipid' has no attribute {name!r}; public names: {', '.join(__all__)}")
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'shipid' has no attribute {name!r}; public names: {', '.join(__all__)}")
+    if _PUBLIC[name] == __name__:
+        return import_module(f"{__name__}.{name}")
+    return getattr(import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

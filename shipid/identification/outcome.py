@@ -13,7 +13,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from shipid import __version__
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, choices
@@ -33,6 +32,7 @@ from shipid.measures.rows import measure_rows
 from shipid.physics.signals import is_shaft
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import length_of, standard
+from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import patch_text

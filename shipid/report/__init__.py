@@ -1,11 +1,10 @@
 """Results as one page a ship builder can read: frames in, HTML and Markdown out."""
 
-from shipid.report.content import ANCHORS, DATA_DRIVEN, Finding, ReportContent, Sentence, Snapshot
+from shipid.report.content import DATA_DRIVEN, Finding, ReportContent, Sentence, Snapshot
 from shipid.report.page import write_report
 from shipid.report.summary import write_summary
 
 __all__ = [
-    "ANCHORS",
     "DATA_DRIVEN",
     "Finding",
     "ReportContent",

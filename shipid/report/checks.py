@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,11 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report import logs, tables
-from shipid.report.content import ReportContent, Sentence
+from shipid.report.content import Finding, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
-from shipid.report.page import Section, page, write
+from shipid.report.page import page, write
 from shipid.report.palette import category
+from shipid.report.section import Section
 from shipid.report.tables import Cell, Table
 from shipid.report.wording import counted, listed
 
@@ -21,43 +23,40 @@ POINTS = 600  # of one line: more than pixels are wide
 HEADING, RATE = 0, 1  # colours
 
 
-def write_checks(
-    file: Path,
-    name: str,
-    checks: pd.DataFrame,
-    series: pd.DataFrame,
-    tracks: pd.DataFrame,
-    repairs: pd.DataFrame,
-    provenance: Mapping[str, str],
-) -> Path:
-    """Write the page of a checked log, which makes no request; raises ResultError if the place cannot be written.
+@dataclass(frozen=True, eq=False)
+class CheckContent:
+    """Everything the page of a checked log shows.
 
     Parameters
     ----------
+    name : short name of the log.
     checks : check, run, value, unit, limit, ok, sentence.
     series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s].
     tracks : run, set, north, east [m].
     repairs : kind, column, count, note; may be empty.
     provenance : label -> value.
     """
-    content = ReportContent(
-        title="Is this log in order?",
-        name=name,
-        answer=_answer(checks),
-        findings=[],
-        cells=pd.DataFrame(),
-        naive={},
-        models=pd.DataFrame(),
-        tracks=tracks,
-        repairs=repairs,
-        provenance=provenance,
-    )
-    parts = [
-        Section("checks", "The checks", (_table(checks),)),
-        Section("motion", "What the checks compare", (_motion(series),)),
-        Section("data", "The data", (logs.manoeuvres(content), tables.repairs(content))),
-    ]
-    return write(page(content, [part for part in parts if any(part.items)], "data check"), file)
+
+    name: str
+    checks: pd.DataFrame
+    series: pd.DataFrame
+    tracks: pd.DataFrame
+    repairs: pd.DataFrame
+    provenance: Mapping[str, str]
+    title: str = "Is this log in order?"
+    study_document: str = ""
+    command: str = ""
+    findings: Sequence[Finding] = ()
+
+    @property
+    def answer(self) -> list[Sentence]:
+        """How many checks passed, and which failed."""
+        return _answer(self.checks)
+
+
+def write_checks(content: CheckContent, file: Path) -> Path:
+    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
+    return write(page(content, SECTIONS, "data check"), file)
 
 
 def _answer(checks: pd.DataFrame) -> list[Sentence]:
@@ -90,7 +89,7 @@ def _table(checks: pd.DataFrame) -> Table:
     return Table("all-checks", "Every check", "", headings, [False, False, False, True, True, False], rows)
 
 
-def _motion(series: pd.DataFrame) -> Figure | None:
+def motion(series: pd.DataFrame) -> Figure | None:
     """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
     runs = [str(run) for run in pd.unique(series["run"])]
     if not runs:
@@ -139,3 +138,16 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
     ]
     shown = (("deg/s", rates), ("m", drift), ("m/s", speeds))
     return [Panel(go.Figure(traces, layout(axis("time in the run [s]"), axis(f"[{unit}]")))) for unit, traces in shown]
+
+
+SECTIONS: dict[str, Section] = {
+    "checks": Section("The checks", lambda content: (_table(content.checks),), ("checks",), ("all-checks",)),
+    "motion": Section(
+        "What the checks compare", lambda content: (motion(content.series),), ("series",), ("motion-figure",)
+    ),
+    "data": Section(
+        "The data",
+        lambda content: (logs.manoeuvres(content), tables.repairs(content)),
+        anchors=("manoeuvres", "repairs"),
+    ),
+}

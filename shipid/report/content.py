@@ -13,26 +13,7 @@ Floats = np.ndarray[tuple[int, ...], np.dtype[np.floating]]
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.signedinteger]]
 PathKey = tuple[str, str, int]
 
-DATA_DRIVEN = "none"  # the family (column `kind`) of the model without physics
-ANCHORS = (
-    "findings",
-    "map",
-    "gain",
-    "horizon",
-    "over-time",
-    "browser",
-    "snapshots",
-    "manoeuvres",
-    "envelope",
-    "repairs",
-    "factors",
-    "models",
-    "search",
-    "cells",
-    "provenance",
-)
-OF_A_MANOEUVRE = ("measures", "criteria", "track", "histories", "spiral")
-OF_AN_IDENTIFICATION = ("estimates", "free-runs")
+DATA_DRIVEN = "none"  # the family of the model without physics
 # Columns of a trial; whatever else its frame holds is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
@@ -45,17 +26,12 @@ class Sentence:
     Parameters
     ----------
     text : plain text.
-    figure : one of `ANCHORS` or, on the page of a manoeuvre, `OF_A_MANOEUVRE`, of an identification,
-        `OF_AN_IDENTIFICATION`; empty for no link; ValueError otherwise.
+    figure : id of a figure or table that a section of the page declares among its `anchors`, or "findings" or
+        "provenance"; empty for no link. Drawing the page raises ValueError for any other.
     """
 
     text: str
     figure: str = ""
-
-    def __post_init__(self) -> None:
-        known = (*ANCHORS, *OF_A_MANOEUVRE, *OF_AN_IDENTIFICATION)
-        if self.figure and self.figure not in known:
-            raise ValueError(f"no figure is called {self.figure!r}; valid: {', '.join(known)}")
 
 
 @dataclass(frozen=True)
@@ -100,13 +76,13 @@ class ReportContent:
     """Everything one report shows; a frame without rows leaves its figure out.
 
     `source` is "physics", "cooperative" or "naive". Rows of physics and naive hold whatever the number of
-    manoeuvres and have N_D = 0; the pure data-driven model is the one of kind "none", its source "cooperative".
+    manoeuvres and have N_D = 0; the pure data-driven model is the one of family "none", its source "cooperative".
 
     Parameters
     ----------
     title, name : the study's question in words and its short name.
     answer : a few sentences, in order.
-    cells : one row per cell: model, kind, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
+    cells : one row per cell: model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
     naive : mean, p90, rms [m] of the floor of constant u, v, r.
     models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
@@ -125,6 +101,7 @@ class ReportContent:
     repairs : kind, column, count, note.
     provenance : label -> value.
     study_document, command : the document as TOML text and the command that reproduces the study.
+    frames : further frames by name, for sections that show something new.
     """
 
     title: str
@@ -150,3 +127,4 @@ class ReportContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     study_document: str = ""
     command: str = ""
+    frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)

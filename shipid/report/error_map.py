@@ -13,8 +13,9 @@ import plotly.graph_objects as go
 from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
 from shipid.report.contours import contour, length, nice_levels, smoothed
 from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line
-from shipid.report.gain import unplotted
+from shipid.report.gain import gain, unplotted
 from shipid.report.palette import GRID, INK, MUTED, level
+from shipid.report.section import Section
 from shipid.report.selection import families, trained
 from shipid.report.wording import counted, metres, number
 
@@ -325,3 +326,11 @@ def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     text += f"; in {len(worse)} of {counted(len(physics), 'cell')} physics does not help"
     below = sum(float(accuracy[spot.model]) < limit for spot in physics)
     return text + (f", none of them below A = {metres(limit)}." if below else ".")
+
+
+SECTION = Section(
+    "What physics and data buy",
+    draw=lambda content: (error_map(content), gain(content)),
+    needs=("cells",),
+    anchors=("map", "gain"),
+)

@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 from shipid.report.content import Floats, Indices, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
 from shipid.report.palette import DASHES, INK, NAIVE, styles
+from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres
 
@@ -212,3 +213,10 @@ def _takeaway_time(means: pd.DataFrame) -> str:
     return f"{text} on average over the horizon" + (
         f", where its physics alone errs by {metres(float(same.error.iloc[0]))}." if len(same) else "."
     )
+
+
+SECTION = Section(
+    "Where the error grows",
+    draw=lambda content: (horizon(content), over_time(content)),
+    anchors=("horizon", "over-time"),
+)

@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from shipid.report import tables
 from shipid.report.content import ReportContent
 from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line
 from shipid.report.palette import INK, MUTED, SYMBOLS, category
+from shipid.report.section import Section
 from shipid.report.selection import families
 from shipid.report.wording import counted, listed, metres, number
 
@@ -138,3 +140,11 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
         text += f"; {far} is farthest from its base, by a factor of {math.exp(math.sqrt(float(away[far]))):.2f}"
         text += " (root mean square)"
     return f"{text}."
+
+
+SECTION = Section(
+    "The models",
+    draw=lambda content: (factors(content), tables.models(content)),
+    needs=("models",),
+    anchors=("factors", "models"),
+)

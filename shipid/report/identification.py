@@ -14,8 +14,9 @@ import plotly.graph_objects as go
 from shipid.report import tables
 from shipid.report.content import Finding, Floats, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, plane
-from shipid.report.page import Section, page, write
+from shipid.report.page import page, write
 from shipid.report.palette import GRID, INK, MUTED, category
+from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number
 
@@ -84,17 +85,7 @@ class IdentificationContent:
 
 def write_identification(content: IdentificationContent, file: Path) -> Path:
     """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    parts = [
-        Section(
-            "what-is-known",
-            "What is known",
-            (estimates(content), numbers(content), unseen(content), correlations(content)),
-        ),
-        Section("what-it-buys", "What it buys", (free_runs(content), errors(content), manoeuvres(content))),
-        Section("what-is-left", "What is left over", (residuals(content), profiles(content))),
-        Section("next", "What to run next", (programme(content),)),
-    ]
-    return write(page(content, [part for part in parts if any(part.items)], "identification"), file)
+    return write(page(content, SECTIONS, "identification"), file)
 
 
 def _bought(content: IdentificationContent) -> str:
@@ -438,3 +429,27 @@ def programme(content: IdentificationContent) -> Table | None:
     best = content.programme.iloc[0]
     takeaway = f"Most information per hour about these parameters: {best['manoeuvre']}."
     return Table("programme", "Candidates", takeaway, head, [False, True, True, True, False, True], rows)
+
+
+SECTIONS: dict[str, Section] = {
+    "what-is-known": Section(
+        "What is known",
+        lambda content: (estimates(content), numbers(content), unseen(content), correlations(content)),
+        needs=("estimates",),
+        anchors=("estimates", "numbers", "unseen", "correlations"),
+    ),
+    "what-it-buys": Section(
+        "What it buys",
+        lambda content: (free_runs(content), errors(content), manoeuvres(content)),
+        needs=("series", "errors"),
+        anchors=("free-runs", "errors", "manoeuvres"),
+    ),
+    "what-is-left": Section(
+        "What is left over",
+        lambda content: (residuals(content), profiles(content)),
+        anchors=("residuals", "profiles"),
+    ),
+    "next": Section(
+        "What to run next", lambda content: (programme(content),), needs=("programme",), anchors=("programme",)
+    ),
+}

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import pandas as pd
 import plotly.graph_objects as go
 
+from shipid.report import tables
 from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line, plane
 from shipid.report.palette import MUTED, category
+from shipid.report.section import Section
 from shipid.report.selection import thinned
 from shipid.report.wording import counted, distance, listed, number
 
@@ -145,3 +147,10 @@ def _beyond(frame: pd.DataFrame) -> str:
 
 def _sets(column: pd.Series[str]) -> Sequence[str]:
     return [str(name) for name in pd.unique(column)]
+
+
+SECTION = Section(
+    "The data",
+    draw=lambda content: (manoeuvres(content), envelope(content), tables.envelope(content), tables.repairs(content)),
+    anchors=("manoeuvres", "envelope", "envelope-table", "repairs"),
+)

@@ -12,8 +12,9 @@ import plotly.graph_objects as go
 
 from shipid.report.content import Finding, Floats, Sentence
 from shipid.report.figure import Chip, Figure, Panel, axis, layout, line, plane
-from shipid.report.page import Section, page, write
+from shipid.report.page import page, write
 from shipid.report.palette import GRID, MUTED, category
+from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import distance, number
 
@@ -77,11 +78,7 @@ class ManoeuvreContent:
 
 def write_manoeuvre(content: ManoeuvreContent, file: Path) -> Path:
     """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    parts = [
-        Section("results", "What was measured", (measures(content), criteria(content))),
-        Section("motion", "What the ship did", (track(content), histories(content), spiral(content))),
-    ]
-    return write(page(content, parts, "manoeuvre"), file)
+    return write(page(content, SECTIONS, "manoeuvre"), file)
 
 
 def _amount(value: float, unit: str) -> str:
@@ -247,3 +244,18 @@ def spiral(content: ManoeuvreContent) -> Figure | None:
 
 def _thinned(log: pd.DataFrame) -> pd.DataFrame:
     return log.iloc[:: max(1, len(log) // POINTS)]
+
+
+SECTIONS: dict[str, Section] = {
+    "results": Section(
+        "What was measured",
+        lambda content: (measures(content), criteria(content)),
+        anchors=("measures", "criteria"),
+    ),
+    "motion": Section(
+        "What the ship did",
+        lambda content: (track(content), histories(content), spiral(content)),
+        needs=("log",),
+        anchors=("track", "histories", "spiral"),
+    ),
+}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,38 +13,12 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from shipid.errors import ResultError
-from shipid.report import error_map, errors_over, factors, gain, logs, palette, paths, search, tables
+from shipid.report import palette, paths
 from shipid.report.content import Finding, ReportContent, Sentence
 from shipid.report.figure import Figure
-from shipid.report.tables import Table
+from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
+from shipid.report.sections import SECTIONS
 from shipid.report.wording import bound, number
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading of the page with its figures and tables; one without any is left out."""
-
-    id: str
-    title: str
-    items: tuple[Figure | Table | None, ...]
-
-
-def sections(content: ReportContent) -> list[Section]:
-    """Follow the storyboard; a new figure is one more entry here."""
-    listing = [
-        Section("results", "What physics and data buy", (error_map.error_map(content), gain.gain(content))),
-        Section("errors", "Where the error grows", (errors_over.horizon(content), errors_over.over_time(content))),
-        Section("predictions", "The predictions", (paths.browser(content), paths.snapshots(content))),
-        Section("the-models", "The models", (factors.factors(content), tables.models(content))),
-        Section(
-            "data",
-            "The data",
-            (logs.manoeuvres(content), logs.envelope(content), tables.envelope(content), tables.repairs(content)),
-        ),
-        Section("the-search", "The search", (search.search(content), search.table(content))),
-        Section("all-cells", "The cells", (tables.cells(content),)),
-    ]
-    return [section for section in listing if any(section.items)]
 
 
 class Shown(Protocol):
@@ -90,12 +63,24 @@ class Shown(Protocol):
 def render(content: ReportContent) -> str:
     """Write the page of a study as text."""
     windows = paths.window_data(content) if content.snapshots else None
-    return page(content, sections(content), "study", windows)
+    return page(content, SECTIONS, "study", windows)
 
 
-def page(content: Shown, parts: Sequence[Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
-    """Write sections as one page: `kicker` says above the title what it is; `windows` is what page.js browses."""
-    anchors = {item.id for section in parts for item in section.items if item} | {"findings", "provenance"}
+def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
+    """Write the sections that have something to show as one page of HTML.
+
+    Parameters
+    ----------
+    content : what `draw` of each section takes.
+    sections : registry of the page: id -> section, in order.
+    kicker : what kind of page it is, above the title.
+    windows : what page.js lets a reader browse, as `paths.window_data` returns it.
+
+    Raises ValueError for a sentence that links to a figure which no section declares.
+    """
+    parts = drawn(sections, content)
+    anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
+    _check_links(content.answer, anchors | declared(sections))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "bound": bound}
     template = environment.from_string(_resource("template.html.j2"))
@@ -119,6 +104,12 @@ def page(content: Shown, parts: Sequence[Section], kicker: str, windows: dict[st
     )
 
 
+def _check_links(answer: Sequence[Sentence], known: set[str]) -> None:
+    for sentence in answer:
+        if sentence.figure and sentence.figure not in known:
+            raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
+
+
 def write_report(content: ReportContent, file: Path) -> Path:
     """Write the report as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
     return write(render(content), file)
@@ -134,7 +125,7 @@ def write(text: str, file: Path) -> Path:
     return file
 
 
-def _figures(parts: Sequence[Section]) -> list[Figure]:
+def _figures(parts: Sequence[Drawn]) -> list[Figure]:
     return [item for section in parts for item in section.items if isinstance(item, Figure)]
 
 

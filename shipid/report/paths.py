@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
+from shipid.errors import ShipidError, choices
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
-from shipid.report.figure import Chip, Control, Figure, FixedWindow, plane
-from shipid.report.palette import DASHES, NAIVE, TRUTH, styles
+from shipid.report.figure import Chip, Control, Figure, FixedWindow, line, plane
+from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, styles
+from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres, number
 
@@ -195,6 +198,49 @@ def _spans(shot: dict[str, Any], lines: set[int]) -> list[list[float]]:
     return [[round(low - room, 2), round(high + room, 2)] for low, high in spans]
 
 
+def window_figure(
+    content: ReportContent, run: str | None = None, t: float | None = None, N_D: int | None = None
+) -> go.Figure:
+    """Draw one window of a test run as the browser of the page draws it.
+
+    Parameters
+    ----------
+    content : with `snapshots`.
+    run : test run; default: the first.
+    t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
+    N_D : manoeuvres that compensated models were trained on; default: the most that were recorded.
+
+    Raises ShipidError for a run or an N_D that no window holds.
+    """
+    runs, counts = windows_of(content), window_sizes(content)
+    if not runs:
+        raise ShipidError("there is nothing to draw: the results hold no windows", path="prediction")
+    if run is not None and run not in runs:
+        raise ShipidError(f"no window of run {run!r}; {choices(run, runs)}", path="prediction")
+    if N_D is not None and N_D not in counts:
+        raise ShipidError(f"no window with N_D = {N_D}; valid: {', '.join(map(str, counts))}", path="prediction")
+    windows, size = runs[run or next(iter(runs))], N_D or counts[-1]
+    window = windows[len(windows) // 2] if t is None else min(windows, key=lambda shot: abs(shot.t - t))
+    end, drawn = np.asarray(window.truth)[-1], exemplars(content)
+    traces = [line("true path", *_aside(window.truth), ["truth"], line={"color": TRUTH, "width": 9})]
+    ink = {"color": MUTED, "width": 1}
+    for x, y, psi in ((0.0, 0.0, 0.0), (*end, window.psi_end)):
+        turned = np.column_stack([np.cos(psi), -np.sin(psi), np.sin(psi), np.cos(psi)]).reshape(2, 2)
+        hull = np.vstack([window.outline, window.outline[:1]]) @ turned.T + [x, y]
+        traces.append(line("ship", *_aside(hull), ["ship"], line=ink, fill="toself", fillcolor="var(--hull)"))
+    for (model, source, count), points in window.paths.items():
+        if source == "naive" or (model in drawn and (source != "cooperative" or count == size)):
+            look = _line(content, model, source)
+            traces.append(line(look["name"], *_aside(points), look["keys"], line=look["line"]))
+    return go.Figure(traces, plane("y, to starboard [m]", "x, ahead [m]"))
+
+
+def _aside(points: Floats) -> tuple[Floats, Floats]:
+    """Columns of a path (n, 2) of x, y as a plot has them: y to the right, x up."""
+    path = np.asarray(points, dtype=float)
+    return path[:, 1], path[:, 0]
+
+
 def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     style = styles(content).get(model)
     pure = model == data_driven(content)
@@ -292,3 +338,11 @@ def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> 
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
     sizes_said = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {sizes_said}: {'; '.join(parts)}."
+
+
+SECTION = Section(
+    "The predictions",
+    draw=lambda content: (browser(content), snapshots(content)),
+    needs=("snapshots",),
+    anchors=("browser", "snapshots"),
+)

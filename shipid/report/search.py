@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 from shipid.report.content import TRIAL, Floats, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, MUTED, category
+from shipid.report.section import Section
 from shipid.report.selection import sizes
 from shipid.report.tables import Cell, Table, duration, figure, text
 from shipid.report.wording import counted, number
@@ -234,3 +235,11 @@ def _choice(chosen: pd.Series[float], share: bool) -> Cell:
         return figure(values.mean(), 2)
     low, middle, high = (float(value) for value in values.quantile([0.0, 0.5, 1.0]))
     return Cell(" / ".join(f"{value:.2g}" for value in (low, middle, high)), middle)
+
+
+SECTION = Section(
+    "The search",
+    draw=lambda content: (search(content), table(content)),
+    needs=("trials",),
+    anchors=("search", "search-table"),
+)

@@ -22,6 +22,7 @@ from shipid.study import store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of
+from shipid.vessel.outline import ship_outline
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
@@ -223,14 +224,6 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 }
             )
     return found
-
-
-def ship_outline(length: float, beam: float) -> np.ndarray:
-    """(k, 2) outline of a ship from above [m], body axes: a box with a pointed bow, for drawings to scale."""
-    half, shoulder = beam / 2, length / 2 - 0.25 * length
-    stern = -length / 2
-    points = [(stern, -half), (shoulder, -half), (length / 2, 0.0), (shoulder, half), (stern, half), (stern, -half)]
-    return np.array(points)
 
 
 def _final_heading(results: Results, run: str, t: float) -> float:

@@ -51,7 +51,7 @@ def _cells(models: list[Model], sizes: list[int], seeds: int, generator: np.rand
                     {
                         "cell": f"{model.name}/{size}/{seed}",
                         "model": model.name,
-                        "kind": model.family,
+                        "family": model.family,
                         "member": 0,
                         "A": model.accuracy,
                         "A_90": 2.1 * model.accuracy,

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
-from shipid.report.checks import write_checks
+from shipid.report.checks import CheckContent, write_checks
 from tests.report.test_page import NASTY, Page
 
 CHECKS = pd.DataFrame(
@@ -21,8 +21,12 @@ TRACKS = pd.DataFrame({"run": RUNS, "set": "the log", "north": [0.0, 1.0, 2.0, 3
 REPAIRS = pd.DataFrame(columns=["kind", "column", "count", "note"])
 
 
+def content(name: str, checks: pd.DataFrame = CHECKS) -> CheckContent:
+    return CheckContent(name, checks, SERIES, TRACKS, REPAIRS, {"log": name})
+
+
 def test_page_of_checks(tmp_path):
-    file = write_checks(tmp_path / "new" / "c.html", NASTY, CHECKS, SERIES, TRACKS, REPAIRS, {"log": NASTY})
+    file = write_checks(content(NASTY), tmp_path / "new" / "c.html")
     text = file.read_text()
     assert text.count(NASTY) == 0
     page = Page(text)
@@ -36,7 +40,7 @@ def test_page_of_checks(tmp_path):
 
 
 def test_a_log_in_order(tmp_path):
-    file = write_checks(tmp_path / "c.html", "log", CHECKS.iloc[:1], SERIES, TRACKS, REPAIRS, {})
+    file = write_checks(content("log", CHECKS.iloc[:1]), tmp_path / "c.html")
     assert "All 1 check of 1 run passed." in file.read_text()
     with pytest.raises(ResultError, match="cannot be written"):
-        write_checks(file / "c.html", "log", CHECKS, SERIES, TRACKS, REPAIRS, {})
+        write_checks(content("log"), file / "c.html")

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from shipid.report import identification
-from shipid.report.content import OF_AN_IDENTIFICATION
-from shipid.report.identification import IdentificationContent, write_identification
+from shipid.report.identification import SECTIONS, IdentificationContent, write_identification
+from shipid.report.section import declared
 from tests.report.test_page import Page
 
 NAMES = ["Y_v", "N_r", "X_vv"]
@@ -84,7 +84,7 @@ def test_the_page_fetches_nothing_and_every_link_leads_somewhere(held_out: tuple
     assert "<b>ship" not in text
     assert "T <1>" not in text
     anchors = {attributes.get("id") for _, attributes, _ in page.elements}
-    assert set(OF_AN_IDENTIFICATION) <= anchors
+    assert declared(SECTIONS) <= anchors | {"findings"}
     for tag, attributes, _ in page.elements:
         assert "src" not in attributes
         assert tag not in ("link", "iframe", "object", "img")

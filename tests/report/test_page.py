@@ -5,12 +5,16 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
 import pytest
 
 from shipid.errors import ResultError
-from shipid.report import ANCHORS, ReportContent, Sentence, write_report
-from shipid.report.figure import Figure
-from shipid.report.page import render, sections
+from shipid.report import ReportContent, Sentence, write_report
+from shipid.report.figure import Figure, Panel, axis, layout, line
+from shipid.report.page import render
+from shipid.report.section import Section, declared, drawn
+from shipid.report.sections import SECTIONS
 
 NASTY = "<script>alert('x')</script>"
 VOID = {"meta", "input", "br", "link", "img"}
@@ -80,7 +84,9 @@ def test_names_of_the_user_stay_text(page):
     content, text, parsed = page
     assert NASTY not in text
     # A name that became an element would be one script more.
-    with_views = [s for s in sections(content) for i in s.items if isinstance(i, Figure) and (i.views or i.windows)]
+    with_views = [
+        s for s in drawn(SECTIONS, content) for i in s.items if isinstance(i, Figure) and (i.views or i.windows)
+    ]
     assert len(parsed.all("script")) == len(with_views) + 3
     for attributes, data in parsed.all("script"):
         if attributes.get("type") == "application/json":
@@ -120,15 +126,15 @@ def test_sentences_link_to_what_is_there(page):
     answers = [text for _, text in parsed.all("li") if "Figure" in text and "With 30" in text]
     assert len(answers) == 1
     # A map needs several N_D.
-    assert set(ANCHORS) - set(ids) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
+    assert declared(SECTIONS) - set(ids) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
 
 
 def test_a_link_to_a_figure_without_data_is_left_out(simulation):
     bare = replace(simulation, horizon=simulation.horizon.iloc[:0])
     page = Page(render(bare))
     assert "#horizon" not in [a["href"] for a, _ in page.all("a")]
-    with pytest.raises(ValueError, match="valid: findings, map, gain"):
-        Sentence("Nothing.", "horizons")
+    with pytest.raises(ValueError, match="no figure is called 'horizons'; valid: browser, cells, "):
+        render(replace(simulation, answer=[Sentence("Nothing.", "horizons")]))
 
 
 def test_structure_for_those_who_listen(page):
@@ -151,7 +157,7 @@ def test_structure_for_those_who_listen(page):
 
 
 def test_every_figure_speaks(content):
-    for section in sections(content):
+    for section in drawn(SECTIONS, content):
         for item in section.items:
             if isinstance(item, Figure):
                 assert re.search(r"\d.*\.$", item.takeaway), item.id
@@ -160,20 +166,20 @@ def test_every_figure_speaks(content):
 
 def test_axes_have_units(content):
     seen = 0
-    for section in sections(content):
+    for section in drawn(SECTIONS, content):
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
-                for name, axis in panel.figure.layout.to_plotly_json().items():
+                for name, drawn_axis in panel.figure.layout.to_plotly_json().items():
                     if re.fullmatch(r"[xy]axis\d*", name):
-                        named = axis.get("ticktext") or axis.get("showticklabels") is False
-                        assert named or re.search(r"\S \[[^\]]+\]$", axis["title"]["text"]), (item.id, name)
+                        named = drawn_axis.get("ticktext") or drawn_axis.get("showticklabels") is False
+                        assert named or re.search(r"\S \[[^\]]+\]$", drawn_axis["title"]["text"]), (item.id, name)
                         seen += 1
     assert seen > 20
 
 
 def test_a_line_of_a_model_has_its_colour_everywhere(content):
     found: dict[str, set[str]] = {}
-    for section in sections(content):
+    for section in drawn(SECTIONS, content):
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
                 for trace in panel.figure.data:
@@ -188,11 +194,47 @@ def test_a_line_of_a_model_has_its_colour_everywhere(content):
 
 
 def test_views_exist_for_every_choice(content):
-    for section in sections(content):
+    for section in drawn(SECTIONS, content):
         for item in section.items:
             if isinstance(item, Figure) and item.views and item.controls:
                 shape = [len(control.options) for control in item.controls]
                 assert set(item.views) == {"-".join(map(str, index)) for index in np.ndindex(*shape)}
+
+
+def test_a_section_added_at_run_time_is_on_the_page(simulation, monkeypatch):
+    """One record in the registry: no other place is edited, not even for a link from the answer."""
+
+    def toy(content):
+        frame = content.frames["tides"]
+        plot = go.Figure([line("tide", frame.t, frame.height, [])], layout(axis("time [h]"), axis("height [m]")))
+        return [
+            Figure(
+                id="tide",
+                title="The tide",
+                takeaway=f"The tide rises by {frame.height.max():g} m.",
+                how="As given.",
+                alternative="A line of the height of the tide over time, and nothing else.",
+                height=200,
+                views={"": [Panel(plot)]},
+            ),
+            None,
+        ]
+
+    monkeypatch.setitem(SECTIONS, "tides", Section("Tides", toy, needs=("tides",), anchors=("tide",)))
+    linked = replace(simulation, answer=[Sentence("There is a tide.", "tide")])
+    tides = pd.DataFrame({"t": [0.0, 1.0, 2.0], "height": [0.0, 1.25, 0.5]})
+    page = Page(render(replace(linked, frames={"tides": tides})))
+    ids = [attributes.get("id") for _, attributes, _ in page.elements]
+    assert ids.index("cells") < ids.index("tides") < ids.index("tide") < ids.index("provenance")
+    assert any("The tide rises by 1.25 m." in text for _, text in page.all("p"))
+    hrefs = [a["href"] for a, _ in page.all("a")]
+    assert {"#tides", "#tide"} <= set(hrefs)
+    views = next(json.loads(text) for a, text in page.all("script") if '"tide"' in text and a.get("class") == "views")
+    assert list(views) == [""]
+
+    without = Page(render(linked))  # nothing of what it needs
+    assert not {"tides", "tide"} & {attributes.get("id") for _, attributes, _ in without.elements}
+    assert "#tide" not in [a["href"] for a, _ in without.all("a")]
 
 
 def test_it_stands_on_cells_alone(full_scale):

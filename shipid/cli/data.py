@@ -1,0 +1,150 @@
+"""`shipid data`: import, check, cut and measure logs of sea trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shipid.cli.terminal import criterion_table, measure_table, show, table, write_measures
+from shipid.errors import ShipidError
+
+app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
+
+
+@app.command("fetch")
+def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
+    """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
+    from shipid.logs.catalogue import fetch
+
+    typer.echo(str(fetch(name)))
+
+
+@app.command("import")
+def data_import(
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
+    log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: beside you")
+    ] = None,
+    without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
+    guess: Annotated[Path | None, typer.Option(help="draft a mapping of this log instead of importing it")] = None,
+    names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
+) -> None:
+    """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    if guess is not None:
+        if mapping or log or without:
+            raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
+        _draft(guess, tuple(filter(None, names.split(","))), out or Path(f"{guess.stem}.toml"))
+        return
+    if not mapping:
+        raise ShipidError("name a mapping, or draft one with --guess LOG")
+    from shipid.data.dataset import write_dataset
+    from shipid.logs.catalogue import fetch
+    from shipid.logs.importing import import_log
+    from shipid.logs.mapping import read_mapping
+
+    if out is not None and out.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    declared = read_mapping(mapping)
+    dataset = import_log(declared, log or fetch(mapping), without=without or ())
+    file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
+    repairs = dataset.metadata.get("repairs", [])
+    if repairs:
+        rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
+        show(table(["repair", "column", "count", "what was done"], rows))
+    typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
+
+
+def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
+    from shipid.files import write_new
+    from shipid.logs.guess.columns import guess
+    from shipid.logs.guess.draft import draft_mapping
+
+    found = guess(log, names)
+    file = write_new(draft_mapping(found), out)
+    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in found.columns)
+    show(table(["column", "from", "unit", "sure", "why"], rows))
+    if found.findings:
+        show(table(["found", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in found.findings)))
+    typer.echo(f"draft -> {file}: read it before you import with it")
+
+
+@app.command("segment")
+def data_segment(
+    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
+    out: Annotated[Path | None, typer.Option(help="TOML file to write; default: beside you")] = None,
+) -> None:
+    """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
+    from shipid.files import write_new
+    from shipid.logs.catalogue import fetch
+    from shipid.logs.guess.draft import moment, segment_log, segments_text
+    from shipid.logs.mapping import read_mapping
+
+    declared = read_mapping(mapping)
+    unit = declared.clock.unit
+    found = segment_log(declared, log or fetch(mapping))
+    file = write_new(segments_text(found, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    show(table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in found)))
+    typer.echo(f"{len(found)} segments -> {file}")
+
+
+@app.command("check")
+def data_check(
+    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
+) -> None:
+    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
+    from shipid.data.checks import check_dataset
+    from shipid.data.dataset import read_dataset
+
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    log = read_dataset(dataset)
+    checks = check_dataset(log)
+    if html is not None:
+        from shipid.data.contents import check_content
+        from shipid.report.checks import write_checks
+
+        typer.echo(f"plots: {write_checks(check_content(dataset.stem, log, checks), html)}")
+    ok = checks["ok"].astype(bool)
+    counts = (
+        (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
+        for name, group in checks.groupby("check", sort=False)
+    )
+    show(table(["check", "runs", "failed"], counts))
+    failed = int((~ok).sum())
+    if failed:
+        rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
+        show(table(["run", "failed", "what to look at"], rows))
+    typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
+    if failed:
+        raise typer.Exit(1)
+
+
+@app.command("measures")
+def data_measures(
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
+    manoeuvre: Annotated[
+        str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
+    ] = None,
+    length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars in m, for criteria")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+) -> None:
+    """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
+    from shipid.data.dataset import read_dataset
+    from shipid.logs.measuring import measure_dataset
+
+    found = measure_dataset(read_dataset(dataset), manoeuvre, length)
+    if len(found.measures):
+        show(measure_table(found.measures.to_dict("records"), ["run", "kind"]))
+    if len(found.criteria):
+        show(criterion_table(found.criteria.to_dict("records"), ["run"]))
+    if found.left:
+        show(table(["run", "not measured, because"], found.left.items()))
+    measured = found.measures["run"].nunique() if len(found.measures) else 0
+    typer.echo(f"{measured} runs measured, {len(found.left)} not")
+    if csv is not None:
+        write_measures(found.measures, csv)

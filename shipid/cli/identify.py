@@ -1,0 +1,161 @@
+"""`shipid identify`: numbers of a vessel from runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shipid.cli.options import command_line, pairs, parsed, stem
+from shipid.cli.terminal import digits, iterations, show, table
+from shipid.errors import ShipidError
+
+if TYPE_CHECKING:
+    from shipid.identification.outcome import Identified
+
+
+def identify(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    parameters: Annotated[
+        list[str] | None, typer.Option(help='what is unknown: dotted paths, "hull.derivatives.*", "...[order >= 3]"')
+    ] = None,
+    fixed: Annotated[list[str] | None, typer.Option(help="what of it is not, after all")] = None,
+    together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
+    prior: Annotated[
+        list[str] | None, typer.Option(help="paths=0.3: standard deviation of a factor around the base")
+    ] = None,
+    bounds: Annotated[list[str] | None, typer.Option(help="paths=[0.5, 2]: least and greatest factor")] = None,
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(help="unknown of each run, with =WIDTH if wanted: initial_state, current, heading_bias, ..."),
+    ] = None,
+    horizon: Annotated[float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs")] = None,
+    changes: Annotated[
+        list[str] | None, typer.Option("--set", help="key=value: any other key of \\[identify], such as weights.u=0.05")
+    ] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with an \\[identify] table to begin with")] = None,
+    runs: Annotated[list[str] | None, typer.Option(help="runs to fit, * for any part of a name; default: all")] = None,
+    test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
+    ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
+    profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
+    design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml beside you")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
+) -> None:
+    """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
+    from shipid.data.dataset import read_dataset
+    from shipid.files import check_new
+    from shipid.identification.outcome import read_settings, run_identification, write_patch
+    from shipid.vessel.load import load_vessel
+
+    file = out or Path(f"{stem(vessel)}-identified.toml")
+    check_new(file, "patch")
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    given: dict[str, Any] = {
+        "parameters": parameters,
+        "fixed": fixed,
+        "together": together and [group.split(",") for group in together],
+        "prior": prior and pairs(prior, "--prior", "paths=0.3"),
+        "bounds": bounds and pairs(bounds, "--bounds", "paths=[0.5,2]"),
+        "nuisance": nuisance and _widths(nuisance),
+        "horizon": horizon,
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    declared = read_settings(settings, options | parsed(changes))
+    ship, log = load_vessel(vessel), read_dataset(dataset)
+    try:
+        with iterations() as progress:
+            found = run_identification(
+                ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
+                progress=progress,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted: nothing was written\n")
+        sys.exit(130)
+    _show_identified(found)
+    write_patch(found, file)
+    count = len(found.solution.values)
+    typer.echo(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}")
+    if html is not None:
+        from shipid.identification.contents import identification_content
+        from shipid.report.identification import write_identification
+
+        content = identification_content(found, dataset, command_line())
+        typer.echo(f"page -> {write_identification(content, html)}")
+
+
+def _widths(given: list[str]) -> list[str] | dict[str, Any]:
+    """Names, or names with widths; the ordinary width where only others have one."""
+    if not any("=" in name for name in given):
+        return given
+    from shipid.identification.problem import WIDE
+
+    named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
+    return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
+
+
+def _show_identified(found: Identified) -> None:
+    """Estimates, what is not seen, free runs, manoeuvres, what to run next, warnings."""
+    solution = found.solution
+    fitted = f"{len(found.runs)} of {len(found.runs) + len(found.held_out)} runs, {len(solution.residuals)} residuals"
+    typer.echo(f"{found.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
+    rows: list[list[str]] = [
+        [
+            row["path"] + (f" (with {row['with']})" if row["with"] else ""),
+            row["unit"],
+            *(f"{row[name]:.4g}" for name in ("base", "value", "factor")),
+            *(
+                (f"{row['factor_error']:.4g}", f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}")
+                if row["factor_error"] < float("inf")
+                else ("-", "none")
+            ),
+            "yes" if row["identified"] else "no",
+        ]
+        for row in found.estimates.to_dict("records")
+    ]
+    columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
+    show(table(columns, rows))
+    words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
+    typer.echo(
+        f"Factors are on the base; standard errors and intervals are theirs, by {words[found.statistics.chosen]}."
+    )
+    for sentence in found.unseen:
+        typer.echo(f"  {sentence}")
+    typer.echo(f"Free runs {f'of {found.ahead:g} s' if found.ahead else 'as long as the runs'}, root mean square:")
+    show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(found)))
+    compared = [
+        [row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"]), row["unit"], row["note"]]
+        for row in found.manoeuvres.to_dict("records")
+    ]
+    show(table(["calm water", "measure", "before", "after", "unit", "note"], compared))
+    for curve in found.profiles:
+        typer.echo(f"profile: {curve.sentence}")
+    if found.programme is not None:
+        typer.echo("To run next, by information per hour:")
+        ranked = [
+            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
+             f"{1 - row['after'] / row['before']:.0%}"]
+            for row in found.programme.head(10).to_dict("records")
+        ]  # fmt: skip
+        show(table(["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"], ranked))
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def _free_rows(found: Identified) -> Iterator[list[str]]:
+    from math import degrees
+
+    from shipid.identification.free_run import ALL
+
+    for row in found.errors.to_dict("records"):
+        if row["run"] == ALL:
+            numbers = (row["u"], row["v"], degrees(row["r"]), row["position"])
+            named = {"fit": f"{len(found.runs)} fitted", "test": f"{len(found.held_out)} held out"}[row["set"]]
+            yield [named, row["model"], *(f"{value:.3g}" if value == value else "diverges" for value in numbers)]

@@ -1,0 +1,60 @@
+"""Options that several commands share, and how their text is read."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from shipid.errors import DocumentError
+
+Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
+Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
+Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
+Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
+Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
+
+
+def parsed(changes: list[str] | None) -> dict[str, Any]:
+    """`path=value` pairs; a value is TOML, or text as it stands."""
+    import tomllib
+
+    result: dict[str, Any] = {}
+    for change in changes or []:
+        path, equals, text = change.partition("=")
+        if not equals or not path:
+            raise DocumentError(f"{change!r}: write --set path=value, such as --set grid.N_D=[10,30]", path="--set")
+        try:
+            result[path] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            result[path] = text
+    return result
+
+
+def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
+    """`paths=value`, the value TOML; paths may hold a comparison."""
+    import tomllib
+
+    result = {}
+    for pair in given:
+        path, equals, text = pair.rpartition("=")
+        try:
+            if not equals or not path:
+                raise ValueError
+            result[path] = tomllib.loads(f"value = {text}")["value"]
+        except ValueError:
+            raise DocumentError(f"{pair!r}: write {example}", path=option) from None
+    return result
+
+
+def stem(name: str | Path) -> str:
+    """Name of a document or dataset without folder and ending; a dot in the name of a vessel is no ending."""
+    return Path(name).name.removesuffix(".toml").removesuffix(".parquet")
+
+
+def command_line() -> str:
+    """Return the command that is running, as one would type it again."""
+    return shlex.join(["shipid", *sys.argv[1:]])

@@ -1,0 +1,27 @@
+"""`shipid predict`: use the predictor of a cell on a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shipid.cli.options import Folder
+
+
+def predict(
+    folder: Folder,
+    log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
+    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
+    mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
+    out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv")] = None,
+) -> None:
+    """Write physics and cooperative paths in north-east for every instant of a log."""
+    from shipid.study.apply import predict_log
+
+    file = out or Path(f"{cell}.parquet")
+    frame, outside = predict_log(folder, cell, log, mapping, file)
+    typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
+    if outside:
+        typer.echo(f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)")

@@ -1,0 +1,91 @@
+"""`shipid simulate` and `shipid manoeuvre`: runs without recorded data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from shipid.cli.options import Changes, command_line, parsed, stem
+from shipid.cli.terminal import criterion_table, measure_table, show, table, write_measures
+from shipid.errors import DocumentError, ShipidError
+
+
+def simulate(
+    study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
+    out: Annotated[Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet beside you")] = None,
+    changes: Changes = None,
+) -> None:
+    """Simulate the truth of a study into a dataset, and show its envelope beside the published one."""
+    from shipid.data.dataset import write_dataset
+    from shipid.study.envelope import envelope, envelope_table
+    from shipid.study.plan import read_plan
+    from shipid.study.prepare import obtain, partition
+
+    if out is not None and out.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    plan = read_plan(study, parsed(changes))
+    if plan.truth is None:
+        raise DocumentError("has no [truth]: its runs are recorded", file=plan.file)
+    dataset = obtain(plan)
+    pool, test, _ = partition(plan, dataset)
+    found = envelope_table(envelope(plan, pool, test, dataset.commands), plan.study.published)
+    units = dict(zip(found["quantity"], found["unit"], strict=True))
+    rows = [
+        [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]
+        for name, part in found.groupby("set", sort=False)
+    ]
+    file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
+    typer.echo(f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> {file}")
+    typer.echo("least / mean / greatest at the instants of prediction:")
+    show(table(["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())], rows))
+
+
+def _limits(row: Any) -> str:
+    return " / ".join(f"{row[name].iloc[0]:.1f}" for name in ("min", "mean", "max")) if len(row) else ""
+
+
+def manoeuvre(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
+    angles: Annotated[
+        list[float] | None,
+        typer.Argument(
+            help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
+            metavar="[ANGLES]...",
+        ),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
+    side: Annotated[str, typer.Option(help="starboard or port: where she turns first")] = "starboard",
+    duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
+    step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+    log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
+) -> None:
+    """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
+    from shipid.data.dataset import Dataset, write_dataset
+    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.simulation.measured import manoeuvre_content, measure_standard
+    from shipid.vessel.load import load_vessel
+
+    if log is not None and log.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
+    ship = load_vessel(vessel)
+    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
+    title, rpm = done.standard.title, done.standard.manoeuvre.n_rpm
+    typer.echo(f"{ship.name}: {title}, approach at {done.standard.speed:.3g} m/s ({rpm:.4g} rpm)")
+    show(measure_table(done.measures, []))
+    if done.criteria:
+        show(criterion_table(done.criteria, []))
+    if csv is not None:
+        import pandas as pd
+
+        write_measures(pd.DataFrame(done.measures), csv)
+    if log is not None:
+        source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
+        typer.echo(f"log -> {write_dataset(Dataset(done.frame, source), log)}")
+    content = manoeuvre_content(done, command_line())
+    page = out or Path(f"{stem(vessel)}-{name}.html")
+    typer.echo(f"page -> {write_manoeuvre(content, page)}")

@@ -1,0 +1,184 @@
+"""Tables, progress and numbers on a terminal; plain lines anywhere else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from rich.table import Table
+
+    from shipid.study.run import Event
+
+
+def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
+    """Make a table of text: the headings of its columns, and rows of values."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    result = Table(box=box.SIMPLE_HEAD)
+    for column in columns:
+        result.add_column(Text(column))  # as text: rich would take [m] for markup
+    for row in rows:
+        result.add_row(*(Text(str(cell)) for cell in row))
+    return result
+
+
+def show(table: Table) -> None:
+    """Print a table: as wide as the terminal, 200 columns where there is none."""
+    from rich.console import Console
+
+    console = Console()
+    if console.is_terminal:
+        console.print(table)
+    else:
+        Console(width=200).print(table)
+
+
+def digits(value: float) -> str:
+    """Write a number with four digits; a dash where it is NaN."""
+    if abs(value) >= 1e6:  # a moment on a clock of dates
+        return f"{value:.1f}"
+    return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
+
+
+def measure_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of measures; `first` are columns that come before."""
+    rows = list(rows)
+    missing = any(row["note"] for row in rows)
+    body = [
+        [
+            *(row[key] for key in first),
+            row["measure"],
+            digits(row["value"]),
+            row["unit"],
+            "" if row["lengths"] != row["lengths"] else f"{row['lengths']:.2f}",
+            *[row["note"]] * missing,
+        ]
+        for row in rows
+    ]
+    return table([*first, "measure", "value", "unit", "ship lengths", *["why missing"] * missing], body)
+
+
+def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
+    """Table of criteria; `first` are columns that come before."""
+    body = [
+        [
+            *(row[key] for key in first),
+            row["criterion"],
+            *(digits(row[key]) for key in ("value", "limit")),
+            row["unit"],
+            row["verdict"],
+            row["note"],
+        ]
+        for row in rows
+    ]
+    return table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
+
+
+def write_measures(frame: DataFrame, file: Path) -> None:
+    """Write a table of measures as CSV or Parquet and say where."""
+    from shipid.files import write_table
+
+    write_table(file, frame)
+    typer.echo(f"measures -> {file}")
+
+
+def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterator[Any]:
+    """Pass blocks of rows on, with a bar of how many rows of all are there; on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    try:
+        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+            task = progress.add_task(what, total=total)
+            for block in blocks:
+                progress.advance(task, len(block))
+                yield block
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted: nothing was written\n")
+        raise
+
+
+@contextmanager
+def iterations() -> Iterator[Any]:
+    """What `identify` calls after each iteration: a line that is written over, on a terminal only."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status("cutting runs") as status:
+        yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
+
+
+def draw(events: Iterable[Event]) -> None:
+    """Live progress on a terminal; plain lines, one per finished cell, anywhere else."""
+    from rich.console import Console
+
+    from shipid.study.start import event_line
+
+    console = Console()
+    if not console.is_terminal:
+        for event in events:
+            line = event_line(event)
+            if line:
+                typer.echo(line)
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    best: dict[str, Any] = {}
+    worst: dict[str, Any] = {}
+    with Progress(*columns, console=console, refresh_per_second=2) as progress:  # drawing takes time from workers
+        task = progress.add_task("cells", total=None)
+        for event in events:
+            if event.kind == "note":
+                progress.console.print(event.text, markup=False, highlight=False)
+            elif event.kind == "start":
+                progress.update(task, total=event.total, completed=event.done)
+            elif event.kind == "cell":
+                row = event.row
+                if row["status"] == "ok":
+                    best = min((best or row, row), key=lambda r: r["H"])
+                    worst = max((worst or row, row), key=lambda r: r["H"])
+                label = (
+                    f"best {best['cell']} {best['H']:.2f} m, worst {worst['cell']} {worst['H']:.2f} m"
+                    if best
+                    else "cells"
+                )
+                progress.update(task, completed=event.done, description=label)
+
+
+def log_to_stderr() -> None:
+    """Show what shipid logs on standard error."""
+    import logging
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    logger = logging.getLogger("shipid")
+    logger.addHandler(handler)
+    logger.setLevel(logging.DEBUG)

@@ -1,0 +1,110 @@
+"""`shipid vessel`: list, show and write vessels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shipid.cli.terminal import show, table
+from shipid.errors import ShipidError
+
+app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or your own.")
+
+
+@app.command("list")
+def vessel_list() -> None:
+    """List the bundled vessels."""
+    from shipid.document import bundled, read
+
+    show(table(["name", "vessel"], ((name, read(file)["name"]) for name, file in bundled("models").items())))
+
+
+@app.command("show")
+def vessel_show(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")] = "",
+    schema: Annotated[
+        bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")
+    ] = False,
+) -> None:
+    """Show particulars, terms, and every parameter with its dotted path and unit."""
+    if schema:
+        import json
+
+        from shipid.vessel.schema import vessel_model
+
+        typer.echo(json.dumps(vessel_model().model_json_schema(), indent=1))
+        return
+    if not vessel:
+        raise ShipidError("name a vessel (see `shipid vessel list`), or ask for --schema")
+    from shipid.vessel.load import load_vessel
+    from shipid.vessel.schema import PARTICULARS, term_blocks
+
+    found = load_vessel(vessel)
+    document = found.document
+    typer.echo(
+        "\n".join(filter(None, [found.name, document.get("description"), f"file {found.file}, digest {found.digest}"]))
+    )
+    particulars = document.get("particulars", {})
+    typer.echo(
+        "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
+    )
+    fallback = document.get("source", "")
+    rows = [
+        (path, key.split(".")[1] + (", off" if off else ""), block.get("source") or fallback)
+        for off in (False, True)
+        for path, key, block in term_blocks(document, off)
+    ]
+    show(table(["term", "kind", "source"], rows))
+    for path, _, block in term_blocks(document):
+        if "table" in block:
+            omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
+            typer.echo(f"{path}: {min(omega):g} to {max(omega):g} rad/s, {len(set(beta))} headings from 0 to 180 deg")
+    show(table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
+
+
+@app.command("new")
+def vessel_new(
+    length: Annotated[float, typer.Option(help="m, between perpendiculars")],
+    beam: Annotated[float, typer.Option(help="m")],
+    draught: Annotated[float, typer.Option(help="m")],
+    block: Annotated[float, typer.Option(help="block coefficient")],
+    out: Annotated[Path, typer.Option(help="TOML file to write; one that is there stays as it is")],
+    speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
+    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth (two units)")] = "propeller-rudder",
+    ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
+    frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
+    name: Annotated[str | None, typer.Option(help="for people; default: first guess and length")] = None,
+) -> None:
+    """Write a first guess of a vessel from its main particulars: runnable, each number with its formula."""
+    if out.suffix != ".toml":
+        raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
+    if out.exists():
+        raise ShipidError("is there already: choose another name", file=out)
+    from shipid.vessel.template import Particulars, first_guess
+
+    given = Particulars(length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area)
+    found = first_guess(given, name or f"First guess, {length:g} m", str(out))
+    out.write_text(found.text, encoding="utf-8")
+    typer.echo(f"{len(found.vessel.parameters)} parameters by formula, none of them measured -> {out}")
+    typer.echo(f"{60 * found.n:.4g} rpm hold {given.service:.3g} m/s")
+    if found.growth < 0:
+        typer.echo("course-stable by these formulae")
+    else:
+        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / found.growth:.3g} s")
+
+
+def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Dotted path, value, unit; the entries of one table column share a row, addressed `path.0`, `path.1`, ..."""
+    import re
+    from itertools import groupby
+
+    for stem, group in groupby(values, key=lambda path: re.sub(r"\.\d+$", "", path)):
+        paths = list(group)
+        if len(paths) == 1:
+            yield paths[0], f"{values[paths[0]]:.10g}", units[paths[0]]
+        else:
+            yield f"{stem}.0 ... .{len(paths) - 1}", " ".join(f"{values[p]:g}" for p in paths), units[paths[0]]

@@ -1,0 +1,27 @@
+"""What the page of a checked log shows, assembled from the dataset."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from shipid.data.checks import check_series
+from shipid.data.dataset import Dataset
+from shipid.report.checks import CheckContent
+
+
+def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent:
+    """Assemble the page of a log: `name` is short, `checks` what `check_dataset` returned for it."""
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    return CheckContent(
+        name=name,
+        checks=checks,
+        series=check_series(log),
+        tracks=log.frame[["run", "north", "east"]].assign(set="the log"),
+        repairs=pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"]),
+        provenance={
+            "log": words,
+            "vessel": str(log.metadata.get("vessel") or "not said"),
+            "rows": str(len(log.frame)),
+        },
+    )

@@ -1,0 +1,243 @@
+"""Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
+
+Figures of a study take `Results` (as `shipid.run` and `shipid.read_results` return them), the content of a report, or
+simple frames: the table of cells alone, or a dict of frames by the names of `ReportContent`. A table of cells needs
+the columns model, N_D and H [m]; whatever else is absent is left open. Figures of an identification take its outcome,
+those of a manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
+
+All of them raise ShipidError where there is nothing to draw or an option does not exist, and take `dark=True` for
+light ink on a dark ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.errors import ShipidError, choices
+from shipid.report.checks import CheckContent
+from shipid.report.content import ReportContent
+from shipid.report.figure import Panel
+from shipid.report.identification import IdentificationContent
+from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.report.paths import browser, window_figure
+from shipid.report.standalone import dressed, standalone
+
+if TYPE_CHECKING:
+    from shipid.data.dataset import Dataset
+    from shipid.identification.outcome import Identified
+    from shipid.simulation.measured import Measured
+    from shipid.study.results import Results
+
+    Source = Results | ReportContent | pd.DataFrame | Mapping[str, pd.DataFrame]
+
+Statistic = Literal["mean", "90th percentile", "root mean square"]
+
+__all__ = [
+    "correlations",
+    "envelope",
+    "error_map",
+    "error_over_horizon",
+    "error_over_time",
+    "estimates",
+    "factors",
+    "free_runs",
+    "gain",
+    "histories",
+    "motion",
+    "prediction",
+    "profiles",
+    "residuals",
+    "search",
+    "spiral",
+    "track",
+    "tracks",
+]
+
+
+def error_map(source: Source, view: Literal["map", "3-D bars"] = "map", *, dark: bool = False) -> go.Figure:
+    """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
+    return standalone("error_map", content_of(source), [view], dark=dark)
+
+
+def gain(
+    source: Source,
+    statistic: Statistic = "mean",
+    scale: Literal["linear", "logarithmic"] = "linear",
+    *,
+    dark: bool = False,
+) -> go.Figure:
+    """H over N_D, a line per model; A beside H, a row per model, where there is a single N_D (`scale` is not used)."""
+    content = content_of(source)
+    chosen = [statistic, scale] if content.cells["N_D"].nunique() > 1 else [statistic]
+    return standalone("gain", content, chosen, dark=dark)
+
+
+def error_over_horizon(
+    source: Source,
+    statistic: Literal["mean", "90th percentile"] = "mean",
+    N_D: int | None = None,
+    *,
+    dark: bool = False,
+) -> go.Figure:
+    """Position error over the time ahead, of models trained on `N_D` manoeuvres; default: the most."""
+    return standalone("error_over_horizon", content_of(source), [statistic, N_D], dark=dark)
+
+
+def error_over_time(source: Source, run: str | None = None, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
+    """Position error at each instant of prediction of a test run (default: the first), with its commands below."""
+    return standalone("error_over_time", content_of(source), [run, N_D], dark=dark)
+
+
+def prediction(
+    source: Source, run: str | None = None, t: float | None = None, N_D: int | None = None, *, dark: bool = False
+) -> go.Figure:
+    """True and predicted paths from one instant of a test run, in metres ahead and to starboard, ship to scale.
+
+    Parameters
+    ----------
+    run : test run; default: the first.
+    t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
+    N_D : manoeuvres the models were trained on; default: the most.
+    """
+    content = content_of(source)
+    panel, record = Panel(window_figure(content, run, t, N_D)), browser(content)
+    assert record is not None  # window_figure has raised where there are no windows
+    return dressed(record, [panel], dark)
+
+
+def factors(source: Source, *, dark: bool = False) -> go.Figure:
+    """Factors of the perturbed numbers of every model, as dots on a logarithmic axis."""
+    return standalone("factors", content_of(source), dark=dark)
+
+
+def tracks(source: Source, *, dark: bool = False) -> go.Figure:
+    """Map of the tracks of all runs, north up, coloured by training, validation and test."""
+    return standalone("tracks", content_of(source), dark=dark)
+
+
+def envelope(source: Source, *, dark: bool = False) -> go.Figure:
+    """Least, mean and greatest value of every input, per set of runs."""
+    return standalone("envelope", content_of(source), dark=dark)
+
+
+def search(source: Source, N_D: int | Literal["all"] | None = None, *, dark: bool = False) -> go.Figure:
+    """Error of the trials of the search over each hyperparameter."""
+    return standalone("search", content_of(source), [] if N_D is None else [N_D], dark=dark)
+
+
+def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
+    """Heading against yaw rate, position against velocity, and velocities of a run (default: the first) of a log."""
+    if isinstance(source, CheckContent):
+        content = source
+    else:
+        from shipid.data.checks import check_dataset
+        from shipid.data.contents import check_content
+
+        content = check_content("log", source, check_dataset(source))
+    return standalone("motion", content, [run], dark=dark)
+
+
+def estimates(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+    """Estimates of an identification with 95 % intervals, as factors on the base values."""
+    return standalone("estimates", _identification(source), dark=dark)
+
+
+def correlations(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+    """Correlations of the estimates of an identification; needs two of them."""
+    return standalone("correlations", _identification(source), dark=dark)
+
+
+def free_runs(source: Identified | IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
+    """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
+    return standalone("free_runs", _identification(source), [run], dark=dark)
+
+
+def residuals(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+    """Autocorrelation of the residuals of an identification."""
+    return standalone("residuals", _identification(source), dark=dark)
+
+
+def profiles(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+    """Profile likelihoods of an identification, of the paths that were asked for."""
+    return standalone("profiles", _identification(source), dark=dark)
+
+
+def track(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+    """Track of a standard manoeuvre, north up, ship to scale."""
+    return standalone("track", _manoeuvre(source), dark=dark)
+
+
+def histories(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+    """Heading, helm, speeds and yaw rate of a standard manoeuvre over time."""
+    return standalone("histories", _manoeuvre(source), dark=dark)
+
+
+def spiral(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+    """Steady yaw rate over helm angle, of a spiral."""
+    return standalone("spiral", _manoeuvre(source), dark=dark)
+
+
+def content_of(source: Source) -> ReportContent:
+    """Return what a report shows: from results, from frames by name, or from the table of cells alone.
+
+    Assembling it from results takes a moment: whoever draws many figures calls this once and draws from the content.
+    Raises ShipidError for frames that the report does not know, or a table of cells without model, N_D or H.
+    """
+    if isinstance(source, ReportContent):
+        return source
+    if isinstance(source, pd.DataFrame):
+        return content_of({"cells": source})
+    if isinstance(source, Mapping):
+        return _from_frames(dict(source))
+    from shipid.study.contents import report_content
+
+    return report_content(source)
+
+
+def _from_frames(frames: dict[str, Any]) -> ReportContent:
+    known = {field.name for field in fields(ReportContent)}
+    for name in frames:
+        if name not in known:
+            raise ShipidError(f"a report shows no {name!r}; {choices(name, known)}", path="figures")
+    cells = _completed(frames.pop("cells", pd.DataFrame({"model": [], "N_D": [], "H": []})))
+    models = frames.pop("models", None)
+    if models is None:
+        models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
+        models = models.assign(status="ok", description="")
+    naive = frames.pop("naive", dict.fromkeys(("mean", "p90", "rms"), np.nan))
+    words = {"title": "", "name": "", "answer": [], "findings": []}
+    return ReportContent(**{**words, "cells": cells, "models": models, "naive": naive, **frames})
+
+
+def _completed(cells: pd.DataFrame) -> pd.DataFrame:
+    """Give a table of cells the columns that it lacks."""
+    if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
+        raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
+    unknown = dict.fromkeys(("A", "A_90", "A_rms", "H_90", "rms"), np.nan)
+    plain = {"family": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
+    ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)
+    names = cells["model"].astype(str) + "-" + cells["N_D"].astype(str)
+    absent: dict[str, Any] = {"status": ok, "cell": names, **unknown, **plain}
+    return cells.assign(**{name: value for name, value in absent.items() if name not in cells})
+
+
+def _identification(source: Identified | IdentificationContent) -> IdentificationContent:
+    if isinstance(source, IdentificationContent):
+        return source
+    from shipid.identification.contents import identification_content
+
+    return identification_content(source, "")
+
+
+def _manoeuvre(source: Measured | ManoeuvreContent) -> ManoeuvreContent:
+    if isinstance(source, ManoeuvreContent):
+        return source
+    from shipid.simulation.measured import manoeuvre_content
+
+    return manoeuvre_content(source)

@@ -1,0 +1,68 @@
+"""What a page is made of: sections, each with what it needs of the content and how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence, Sized
+from dataclasses import dataclass
+from typing import Any
+
+from shipid.report.figure import Figure
+from shipid.report.tables import Table
+
+Item = Figure | Table
+OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a page, as a registry such as `sections.SECTIONS` holds it.
+
+    Parameters
+    ----------
+    title : heading.
+    draw : content of the page -> figures and tables in order; None in place of one that has nothing to show.
+    needs : names of parts of the content (fields, or keys of its `frames`). The section is left out where one of them
+        is absent or empty.
+    anchors : ids of the figures and tables that `draw` may return; a sentence may link to each of them.
+    """
+
+    title: str
+    draw: Callable[[Any], Sequence[Item | None]]
+    needs: Sequence[str] = ()
+    anchors: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A section ready for the page: its id, its heading, its figures and tables."""
+
+    id: str
+    title: str
+    items: Sequence[Item]
+
+
+def declared(sections: Mapping[str, Section]) -> set[str]:
+    """Ids that a sentence of a page with these sections may link to."""
+    return {anchor for section in sections.values() for anchor in section.anchors} | set(OF_EVERY_PAGE)
+
+
+def part(content: object, name: str) -> Any:
+    """Return a part of the content: the field of that name, else the entry of `frames`, else None."""
+    found = getattr(content, name, None)
+    return getattr(content, "frames", {}).get(name) if found is None else found
+
+
+def drawn(sections: Mapping[str, Section], content: object) -> list[Drawn]:
+    """Draw the sections that have something to show, in the order of the registry."""
+    result = []
+    for name, section in sections.items():
+        if any(_empty(part(content, need)) for need in section.needs):
+            continue
+        items = [item for item in section.draw(content) if item is not None]
+        if items:
+            result.append(Drawn(name, section.title, items))
+    return result
+
+
+def _empty(value: object) -> bool:
+    return value is None or (isinstance(value, Sized) and len(value) == 0)

@@ -1,0 +1,16 @@
+"""The sections of a study's page, in order. A new section is one file that defines a `Section`, and one line here."""
+
+from __future__ import annotations
+
+from shipid.report import cells, error_map, errors_over, factors, logs, paths, search
+from shipid.report.section import Section
+
+SECTIONS: dict[str, Section] = {
+    "results": error_map.SECTION,
+    "errors": errors_over.SECTION,
+    "predictions": paths.SECTION,
+    "the-models": factors.SECTION,
+    "data": logs.SECTION,
+    "the-search": search.SECTION,
+    "all-cells": cells.SECTION,
+}

@@ -1,0 +1,92 @@
+"""A standard manoeuvre, simulated and measured; what its page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.measures import MEASURES
+from shipid.measures.criteria import criteria
+from shipid.measures.recognise import record_of
+from shipid.measures.record import Record
+from shipid.measures.rows import criterion_rows, measure_rows
+from shipid.measures.spiral import Levels, levels, rate_levels
+from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.simulation.perform import perform
+from shipid.simulation.standard import Standard, length_of, standard
+from shipid.version import __version__
+from shipid.vessel.load import Vessel
+from shipid.vessel.outline import ship_outline
+
+LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its steady levels are read from a record
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A standard manoeuvre that was simulated, with its measures.
+
+    Parameters
+    ----------
+    vessel, standard : the ship, and what she was ordered to do.
+    frame : the log, one row every `standard.interval` [s]: run, t, states and commands in SI units and radians.
+    record : the same as the measures read it.
+    measures, criteria : one dict per measure, and per criterion of IMO MSC.137(76) that applies.
+    """
+
+    vessel: Vessel
+    standard: Standard
+    frame: pd.DataFrame
+    record: Record
+    measures: list[dict[str, Any]]
+    criteria: list[dict[str, Any]]
+
+
+def measure_standard(
+    vessel: Vessel,
+    name: str,
+    angles: Sequence[float] = (),
+    *,
+    speed: float | None = None,
+    side: str = "starboard",
+    duration: float | None = None,
+    step: float | None = None,
+) -> Measured:
+    """Simulate a standard manoeuvre of a vessel in calm deep water and measure it; arguments as those of `standard`."""
+    chosen = standard(vessel, name, angles, speed=speed, side=side, duration=duration, step=step)
+    frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
+    record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
+    found, length = MEASURES[chosen.kind](record), length_of(vessel)
+    judged = criterion_rows(criteria(chosen.kind, found, length))
+    return Measured(vessel, chosen, frame, record, measure_rows(found, length), judged)
+
+
+def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:
+    """Assemble the page of a measured manoeuvre; `command` is the line that reproduces it."""
+    ship, chosen, record = measured.vessel, measured.standard, measured.record
+    columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
+    shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
+    read = LEVELS.get(chosen.kind)
+    steady = read(record) if read else Levels(np.empty(0), np.empty(0), 0)
+    sizes = ship.document["particulars"]
+    return ManoeuvreContent(
+        title=f"{ship.name}: {chosen.title}",
+        name=chosen.kind,
+        kind=chosen.kind,
+        log=pd.DataFrame({**columns, "shaft": shaft}),
+        measures=pd.DataFrame(measured.measures),
+        criteria=pd.DataFrame(measured.criteria),
+        outline=ship_outline(sizes.get("L_oa", sizes["L_pp"]), sizes.get("B", sizes["L_pp"] / 6)),
+        levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
+        provenance={
+            "Vessel": f"{ship.name}, digest {ship.digest}",
+            "Approach": f"{chosen.speed:.4g} m/s at {chosen.manoeuvre.n_rpm:.5g} rpm, calm deep water, no wind",
+            "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
+            "shipid": __version__,
+        },
+        command=command,
+    )

@@ -1,0 +1,107 @@
+"""The command line as a whole: help, mistakes in one line, interruptions, logging."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import shipid
+from shipid.cli import app
+from tests.cli.running import BAD, said, shell
+from tests.study.tiny import TINY
+
+
+def test_help_and_version_are_light() -> None:
+    """Nobody waits for PyTorch to read a help page."""
+    heavy = {"torch", "casadi", "pandas", "optuna", "numpy", "dask", "plotly", "pyarrow"}
+    code = (
+        "import sys\nfrom shipid.cli import main\ntry:\n    main()\nexcept SystemExit as end:\n"
+        f"    print(end.code, sorted({heavy!r} & set(sys.modules)))"
+    )
+    for arguments in (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"]):
+        result = shell(*arguments, code=code)
+        assert re.search(r"(0|2|None) \[\]$", result.stdout.strip()), (arguments, result)
+    assert shipid.__version__ in shell("--version").stdout
+
+
+def test_help_names_every_command() -> None:
+    for group, commands in (
+        ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre", "identify")),
+        (["vessel"], ("list", "show", "new")),
+        (["data"], ("import", "check", "fetch", "segment", "measures")),
+        (["study"], ("list", "variants", "screen", "run", "resume", "report")),
+    ):
+        text = said(*group, "--help")
+        assert all(re.search(rf"\b{name}\b", text) for name in commands), group
+
+
+MISTAKES = {
+    "unknown vessel": (["vessel", "show", "gunerus-28.9"], "did you mean 'gunnerus-28.9'?"),
+    "no vessel": (["vessel", "show"], "name a vessel"),
+    "unknown study": (["study", "run", "quik"], "did you mean 'quick'?"),
+    "broken study": (["study", "run", BAD / "studies" / "no-question.toml"], "no-question.toml: question: missing"),
+    "no --set path": (["study", "run", "quick", "--set", "grid.N_D"], "write --set path=value"),
+    "bad --set value": (["study", "run", "quick", "--set", "grid.N_D=[1000]"], "less 20 test runs leave 100"),
+    "no folder": (["study", "resume", "nowhere"], "nowhere: is not the folder of a run"),
+    "foreign folder": (["study", "report", BAD], "holds no study.toml"),
+    "broken mapping": (["data", "import", BAD / "mappings" / "unknown_unit.toml", "x.csv"], "valid here: rad/s"),
+    "no dataset": (["data", "check", "gone.parquet"], "gone.parquet: cannot be read"),
+    "no public log": (["data", "fetch", "gunnerus-2021"], "did you mean 'gunnerus-2022'?"),
+    "no cells": (["predict", BAD, "x.parquet", "--cell", "a"], "holds no finished cells"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line(
+    mistake: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shipid.cli import main
+
+    arguments, remedy = MISTAKES[mistake]
+    monkeypatch.setattr(sys, "argv", ["shipid", *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    out, err = capfd.readouterr()
+    assert (end.value.code, out) == (1, "")
+    assert re.fullmatch(r"error: [^\n]*\n", err)
+    assert remedy in err
+
+
+def test_mistakes_in_a_process_of_their_own(tmp_path: Path, tiny_run: Path) -> None:
+    """No traceback, no warning, exit 1: another study's folder, a damaged one, a file where a folder should be."""
+    damaged = tmp_path / "damaged"
+    damaged.mkdir()
+    (damaged / "study.toml").write_text("[[")
+    (damaged / "provenance.json").write_text((tiny_run / "provenance.json").read_text())
+    for arguments, remedy in (
+        (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
+        (["study", "resume", damaged], "damaged"),
+        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
+    ):
+        result = shell(*arguments)
+        assert result.returncode == 1
+        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
+        assert remedy in result.stderr
+
+
+def test_wrong_usage_is_not_a_traceback() -> None:
+    for arguments in (["study", "run"], ["nonsense"], ["study", "run", "quick", "--workers", "0"]):
+        result = CliRunner().invoke(app, arguments)
+        assert result.exit_code == 2
+        assert isinstance(result.exception, SystemExit)
+
+
+def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Path) -> None:
+    """`-v` shows on standard error what the library logs; without it, the library says nothing."""
+    import shutil
+
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    quiet, loud = shell("study", "report", folder), shell("-v", "study", "report", folder)
+    assert (quiet.returncode, quiet.stderr) == (0, "")
+    assert loud.returncode == 0
+    assert f"shipid.study.contents: report written: {folder / 'report.html'}" in loud.stderr
+    assert quiet.stdout == loud.stdout

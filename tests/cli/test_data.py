@@ -1,0 +1,63 @@
+"""`shipid data`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.data.dataset import read_dataset, write_dataset
+from shipid.study.store import DATASET
+from tests.cli.running import BAD, said
+from tests.logs.simulated import as_bridge, si_log
+
+
+def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv")
+    assert "41 rows in 1 runs -> plain.parquet" in text
+    assert read_dataset("plain.parquet").runs == ["good"]
+    said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
+    assert "10 of 10 checks passed" in said("data", "check", "deep/other.parquet")
+    refused = CliRunner().invoke(
+        app, ["data", "import", str(BAD / "logs" / "plain.toml"), str(BAD / "logs" / "good.csv"), "--out", "a.csv"]
+    )
+    assert "end in .parquet" in str(refused.exception)
+
+
+def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
+    dataset = read_dataset(tiny_run / DATASET)
+    wrong = dataset.frame.assign(r=dataset.frame["r"] + 0.5)
+    file = write_dataset(type(dataset)(wrong, dataset.metadata), tmp_path / "wrong.parquet")
+    result = CliRunner().invoke(app, ["data", "check", str(file)])
+    assert result.exit_code == 1
+    assert re.search(r"M001 +heading", result.output), "failures are listed by run"
+
+
+def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    as_bridge(si_log()).to_csv("trial.csv", index=False)
+    text = said("data", "import", "--guess", "trial.csv")
+    assert "draft -> trial.toml" in text
+    assert "positive turns the ship to starboard" in text
+    said("data", "import", "trial.toml", "trial.csv")
+    assert "7 segments -> trial-segments.toml" in said("data", "segment", "trial.toml", "trial.csv")
+    assert "checks passed" in said("data", "check", "trial.parquet", "--html", "deep/page.html")
+    assert Path("deep/page.html").stat().st_size > 1_000_000
+    for arguments, remedy in {
+        ("import", "--guess", "trial.csv"): "not written over",
+        ("import", "trial.toml", "--guess", "trial.csv"): "give neither mapping nor repairs",
+        ("import",): "draft one with --guess",
+        ("check", "trial.parquet", "--html", "page.pdf"): "end in .html",
+    }.items():
+        assert remedy in str(CliRunner().invoke(app, ["data", *arguments]).exception)
+
+
+def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHIPID_DATA", str(shared_data))
+    file = Path(said("data", "fetch", "gunnerus-2022").strip())
+    assert file.is_file()
+    assert shared_data in file.parents

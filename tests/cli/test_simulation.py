@@ -1,0 +1,50 @@
+"""`shipid simulate` and `shipid manoeuvre`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import read_dataset
+from shipid.errors import ShipidError
+from tests.cli.running import said, shell
+
+
+def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Table, page, CSV and log of one run; the log measures the same."""
+    monkeypatch.chdir(tmp_path)
+    text = said("manoeuvre", "gunnerus-28.9", "zigzag", 20, 10, "--csv", "z.csv", "--log", "z.parquet", "--speed", 4)
+    assert "approach at 4 m/s" in text
+    assert "zigzag 20/10, first to starboard" in text
+    assert Path("gunnerus-28.9-zigzag.html").is_file()
+    table = pd.read_csv("z.csv").set_index("measure")
+    assert table.loc["execute heading", "value"] == pytest.approx(10)
+    assert f"{table.loc['overshoot 1', 'value']:.3g}" in text
+    text = said("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
+    assert "1 runs measured, 0 not" in text
+    again = pd.read_csv("again.csv").set_index("measure")
+    pd.testing.assert_series_equal(again["value"], table["value"])
+
+
+def test_manoeuvres_that_cannot_be() -> None:
+    for arguments, expected in (
+        (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
+        (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
+    ):
+        result = shell(*arguments)
+        assert result.returncode == 1
+        assert result.stderr.startswith(expected)
+        assert result.stderr.count("\n") == 1
+
+
+def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:
+    text = said("simulate", study, "--out", "runs.parquet")
+    dataset = read_dataset("runs.parquet")
+    assert f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> runs.parquet" in text
+    assert len(dataset.runs) == 12
+    assert re.search(r"^ *test +-?\d+\.\d / -?\d+\.\d / -?\d+\.\d", text, re.MULTILINE)
+    with pytest.raises(ShipidError, match=r"let the name end in \.parquet"):
+        said("simulate", study, "--out", "runs.csv")

@@ -1,0 +1,113 @@
+"""`shipid study`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.document import bundled
+from shipid.errors import ShipidError
+from shipid.study.store import DATASET, read_rows
+from shipid.vessel.load import load_vessel
+from tests.cli.running import said
+
+
+def test_studies_and_variants(study: Path) -> None:
+    text = said("study", "list")
+    assert all(f" {name} " in text for name in bundled("studies"))
+    text = said("study", "variants", study, "--save", "patches")
+    accuracy = re.findall(r"^ *(right|wrong-1|wrong-2|none) +(\S+)", text, re.MULTILINE)
+    assert [name for name, _ in accuracy] == ["right", "wrong-1", "wrong-2", "none"]
+    assert [value == "-" for _, value in accuracy] == [False, False, False, True]
+    assert "3 patches -> patches" in text
+    assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
+    text = said("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
+    assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
+
+
+def test_screen_writes_a_row_per_member(study: Path) -> None:
+    text = said("study", "screen", study, "--members", "6")
+    frame = pd.read_csv("tiny-screen.csv")
+    assert list(frame["member"]) == [f"wrong-{k}" for k in range(1, 7)]
+    shown = re.search(r"^ *wrong +6 +0 +([\d. ]+)$", text, re.MULTILINE)
+    assert shown
+    expected = np.quantile(frame["A"], [0.05, 0.25, 0.5, 0.75, 0.95])
+    np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.005)
+    assert len(re.findall(r"^ *wrong +hull\.derivatives\.\S+ +[+-]\d\.\d\d +[+-]\d\.\d\d *$", text, re.MULTILINE)) == 5
+    said("study", "screen", study, "wrong", "--members", "2", "--out", "new/rows.parquet")
+    pd.testing.assert_frame_equal(pd.read_parquet("new/rows.parquet"), frame[:2], rtol=1e-12)
+    for arguments, remedy in (
+        (["right"], "'right' draws no factor from a range"),
+        (["--out", "rows.txt"], "ending in .parquet or .csv"),
+    ):
+        with pytest.raises(ShipidError, match=re.escape(remedy)):
+            said("study", "screen", study, *arguments)
+
+
+def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:
+    text = said("study", "variants", study)
+    rows = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")
+    for name in ("right", "wrong-1", "wrong-2"):
+        shown = re.search(rf"^ *{name} +(\S+)", text, re.MULTILINE)
+        assert shown
+        assert float(shown[1]) == pytest.approx(rows.loc[name, "A"], abs=0.005)
+
+
+def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
+    """The whole way on one worker, as a user goes it."""
+    text = said("study", "run", study, "--workers", "1")
+    folder = next(Path("results").iterdir())
+    assert re.fullmatch(r"tiny-[0-9a-f]{8}", folder.name)
+    assert "8 of 8 cells to do" in text
+    assert re.search(r"^\[8/8\] \S+: H \d+\.\d{3} m, H_90 \d+\.\d{3} m, ", text, re.MULTILINE)
+    assert text.rstrip().endswith(f"report: {folder / 'report.html'}")
+    answer = (folder / "answer.txt").read_text().splitlines()
+    assert all(f"  {line}" in text for line in answer)
+    assert len(answer) >= 4
+    assert read_rows(folder)["H"].tolist() == read_rows(tiny_run)["H"].tolist()
+
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Does the whole chain hold together?" in page
+    assert re.search(r"shipid study run \S+tiny\.toml", page)
+    assert "Does the whole chain hold together?" in (folder / "summary.md").read_text()
+
+    (folder / "report.html").unlink()
+    assert said("study", "report", folder).strip() == str(folder / "report.html")
+    assert (folder / "report.html").is_file()
+    next((folder / "batches").iterdir()).unlink()
+    assert "4 of 8 cells to do" in said("study", "resume", folder, "--workers", "1")
+
+    cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
+    text = said("predict", folder, folder / DATASET, "--cell", cell)
+    assert f"{12 * 21} instants, {12 * 21 * 5} points -> {cell}.parquet" in text
+    assert len(pd.read_parquet(f"{cell}.parquet")) == 12 * 21 * 5
+    assert "outside what the cell was trained on" in text
+
+
+def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    (folder / "batches" / "N0004-s0.json").unlink()
+    said("study", "report", folder)
+    assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
+    assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
+
+
+def test_interruption_says_how_to_go_on(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from shipid.study import run
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "run_study", interrupted)
+    result = CliRunner().invoke(app, ["study", "run", str(study), "--out", "mine"])
+    assert result.exit_code == 130
+    assert "Continue with: shipid study resume mine" in result.stderr

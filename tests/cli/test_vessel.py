@@ -1,0 +1,59 @@
+"""`shipid vessel`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from shipid.document import bundled
+from shipid.vessel.load import load_vessel
+from tests.cli.running import said, shell
+
+
+def test_vessels() -> None:
+    text = said("vessel", "list")
+    for name in bundled("models"):
+        assert f" {name} " in text
+    ship = load_vessel("gunnerus-28.9")
+    text = said("vessel", "show", "gunnerus-28.9")
+    assert ship.digest in text
+    columns = {
+        stem: re.search(rf"^\s*{stem}\.0 \.\.\. \.18 +(.+?)\s+-\s*$", text, re.MULTILINE)
+        for stem in ("wind.C_X", "wind.C_Y")
+    }
+    for stem, shown in columns.items():
+        assert shown, stem
+        assert [float(number) for number in shown[1].split()] == [ship.parameters[f"{stem}.{i}"] for i in range(19)]
+    for path, value in ship.parameters.items():
+        if re.fullmatch(r"wind\.\w+\.\d+", path):
+            continue
+        shown = re.search(rf"^\s*{re.escape(path)} +(\S+)", text, re.MULTILINE)
+        assert shown, path
+        assert float(shown[1]) == pytest.approx(value, rel=1e-9)
+    schema = json.loads(said("vessel", "show", "--schema"))
+    assert "hull" in schema["properties"]
+
+
+def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
+    file = tmp_path / "my-ship.toml"
+    order = ("vessel", "new", "--length", 33.9, "--beam", 9.6, "--draught", 2.6, "--block", 0.61, "--out", file)
+    text = said(*order, "--propulsor", "azimuth", "--ship-type", "research", "--speed", 5)
+    assert "none of them measured" in text
+    assert "rpm hold 5 m/s" in text
+    assert "course-stable" in text
+    assert load_vessel(str(file)).parameters["thruster.port.y"] == pytest.approx(-2.688)
+    assert "First guess, 33.9 m" in said("vessel", "show", file)
+    written = file.read_text()
+    again = shell(*order)
+    assert (again.returncode, again.stderr) == (1, f"error: {file}: is there already: choose another name\n")
+    assert file.read_text() == written
+
+
+def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
+    sizes = ("--length", 100, "--beam", 5, "--draught", 2, "--block", 0.6)
+    found = shell("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
+    assert found.returncode == 1
+    assert found.stderr == "error: length / beam = 20: the formulae hold for 3 to 9\n"

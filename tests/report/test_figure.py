@@ -1,0 +1,35 @@
+import numpy as np
+
+from shipid.report.figure import axis, label, layout, line, logarithmic, plane
+
+
+def test_names_of_the_user_are_text_for_plotly():
+    assert label("<b>a & b</b>") == "&lt;b&gt;a &amp; b&lt;/b&gt;"
+    assert line("<b>", [0.0], [1.0], []).name == "&lt;b&gt;"
+
+
+def test_a_line_is_in_single_precision_and_keeps_its_gaps():
+    drawn = line("a", [0.0, 1.0, 2.0], [1.0, np.nan, 2.0], ["model:a"])
+    assert drawn.y.dtype == np.float32
+    assert drawn.connectgaps is False
+    assert list(drawn.meta) == ["model:a"]
+
+
+def test_ticks_of_a_logarithmic_axis_are_numbers_one_can_read():
+    made = logarithmic("error [m]")
+    assert made["type"] == "log"
+    assert dict(zip(made["tickvals"], made["ticktext"], strict=True))[0.5] == "0.5"
+
+
+def test_a_plane_has_equal_axes_and_room_around():
+    made = plane("y [m]", "x [m]", [(0.0, 100.0), (-5.0, 5.0)])
+    assert (made["xaxis"]["scaleanchor"], made["xaxis"]["scaleratio"]) == ("y", 1)
+    assert made["xaxis"]["range"] == [-4.0, 104.0]
+    assert made["yaxis"]["range"] == [-9.0, 9.0]
+
+
+def test_options_override_the_layout():
+    made = layout(axis("a [1]"), axis("b [1]"), hovermode="closest", margin={"t": 1})
+    assert made["hovermode"] == "closest"
+    assert made["margin"] == {"t": 1}
+    assert made["xaxis"]["title"]["text"] == "a [1]"

@@ -1,0 +1,53 @@
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from shipid.report.section import Section, declared, drawn, part
+from shipid.report.tables import Table
+
+EMPTY = pd.DataFrame()
+FULL = pd.DataFrame({"a": [1.0]})
+
+
+def table(name: str) -> Table:
+    return Table(name, name, "", ["a"], [True], [])
+
+
+def test_a_part_is_a_field_or_a_frame():
+    content = SimpleNamespace(cells=FULL, frames={"waves": FULL, "cells": EMPTY})
+    assert part(content, "cells") is FULL, "fields come first"
+    assert part(content, "waves") is FULL
+    assert part(content, "tides") is None
+    assert part(SimpleNamespace(), "tides") is None
+
+
+@pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])
+def test_a_section_needs_its_parts(need, shown):
+    content = SimpleNamespace(full=FULL, empty=EMPTY, number=0.0)
+    section = Section("A", lambda _: [table("a")], needs=("full", need))
+    assert [one.id for one in drawn({"a": section}, content)] == ["a"] * shown
+
+
+def test_nothing_is_drawn_of_a_section_that_is_left_out():
+    def fails(_):
+        raise AssertionError
+
+    assert drawn({"a": Section("A", fails, needs=("absent",))}, SimpleNamespace()) == []
+
+
+def test_order_and_gaps():
+    sections = {
+        "b": Section("B", lambda _: [None, table("b")]),
+        "none": Section("Nothing", lambda _: [None]),
+        "a": Section("A", lambda _: (table("a"),)),
+    }
+    assert [(one.id, one.title, [i.id for i in one.items]) for one in drawn(sections, None)] == [
+        ("b", "B", ["b"]),
+        ("a", "A", ["a"]),
+    ]
+
+
+def test_declared_anchors():
+    sections = {"a": Section("A", lambda _: [], anchors=("x", "y")), "b": Section("B", lambda _: [], anchors=("z",))}
+    assert declared(sections) == {"x", "y", "z", "findings", "provenance"}

@@ -1,0 +1,54 @@
+import itertools
+import re
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.report.standalone import painted, standalone
+
+
+def test_colours_are_those_of_the_page():
+    names = go.Figure([go.Scatter(y=[1.0], line={"color": "var(--category-0)"}, customdata=["var(--ink)"])])
+    light, dark = painted(names), painted(names, dark=True)
+    assert light.data[0].line.color == "#0072B2"
+    assert dark.data[0].line.color == "#56B4E9"
+    assert light.layout.paper_bgcolor == "#ffffff"
+    assert dark.layout.paper_bgcolor != light.layout.paper_bgcolor
+
+
+def test_what_is_drawn_is_what_the_page_draws(simulation):
+    from shipid.report.gain import gain
+
+    ours, page = standalone("gain", simulation), gain(simulation).views["0-0"][0].figure
+    for mine, theirs in zip(ours.data, page.data, strict=False):
+        np.testing.assert_array_equal(mine.y, theirs.y)
+    chips = gain(simulation).chips
+    assert [trace.name for trace in ours.data if trace.showlegend] == [chip.label for chip in chips]
+    assert "What another manoeuvre buys" in ours.layout.title.text
+
+
+def test_options_choose_the_view(simulation):
+    mean, worst = (standalone("gain", simulation, [name]) for name in ("mean", "90th percentile"))
+    np.testing.assert_allclose(worst.data[0].y, 2.2 * np.array(mean.data[0].y), rtol=1e-6)
+    with pytest.raises(
+        ShipidError, match=r"gain: Position error: 'meen' is none of its options; did you mean 'mean'\?"
+    ):
+        standalone("gain", simulation, ["meen"])
+
+
+def test_panels_lie_below_each_other(simulation):
+    made = standalone("envelope", simulation)
+    quantities = simulation.envelope.quantity.nunique()
+    axes = [name for name in made.layout.to_plotly_json() if re.fullmatch(r"yaxis\d*", name)]
+    assert len(axes) == quantities > 1
+    domains = sorted(made.layout[name].domain for name in axes)
+    assert all(a[1] < b[0] for a, b in itertools.pairwise(domains)), "no panel lies on another"
+    assert domains[0][0] >= -1e-9
+    assert domains[-1][1] <= 1 + 1e-9
+
+
+def test_nothing_to_draw_is_a_sentence(full_scale):
+    with pytest.raises(ShipidError, match="error_map: there is nothing to draw"):
+        standalone("error_map", full_scale)

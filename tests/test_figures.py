@@ -1,0 +1,85 @@
+"""Every figure of the reports as a function, from results, contents or simple frames."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+import pytest
+
+from shipid import figures
+from shipid.errors import ShipidError
+from shipid.report import ReportContent
+from shipid.report.standalone import FIGURES
+from shipid.study.contents import report_content
+from shipid.study.results import read_results
+from tests.report import test_checks, test_identification, test_manoeuvre
+
+OTHERS = {
+    **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
+    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_manoeuvre.content("spiral")),
+    "motion": lambda: test_checks.content("log"),
+}
+
+
+@pytest.fixture(scope="module")
+def content(tiny_run: Path) -> ReportContent:
+    return report_content(read_results(tiny_run))
+
+
+def test_every_figure_of_the_report_has_a_function() -> None:
+    assert set(figures.__all__) == {*FIGURES, "prediction"}
+
+
+@pytest.mark.parametrize("name", figures.__all__)
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_plain_plotly_figure(name: str, dark: bool, content: ReportContent) -> None:
+    """It has data, a title, units at its axes, and no name of a colour that only the page knows."""
+    made = getattr(figures, name)(OTHERS[name]() if name in OTHERS else content, dark=dark)
+    assert isinstance(made, go.Figure)
+    assert len(made.data) > 0
+    assert made.layout.title.text
+    assert "var(" not in made.to_json()
+    assert "A figure" not in inspect.getdoc(getattr(figures, name)).splitlines()[0]
+
+
+def test_results_and_their_content_draw_the_same(tiny_run: Path, content: ReportContent) -> None:
+    assert figures.gain(read_results(tiny_run)).to_json() == figures.gain(content).to_json()
+
+
+def test_a_table_of_cells_is_enough() -> None:
+    cells = pd.DataFrame({"model": ["a", "a", "b", "b"], "N_D": [10, 30, 10, 30], "H": [2.0, 1.0, 3.0, np.nan]})
+    for source in (cells, {"cells": cells}):
+        made = figures.gain(source)
+        lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 2}
+        np.testing.assert_array_equal(lines["a"], [2.0, 1.0])
+        np.testing.assert_array_equal(lines["b"], [3.0, np.nan])
+    exact = cells.assign(A=[4.0, 4.0, 5.0, 5.0], H=[2.0, 1.0, 3.0, 2.5])
+    assert len(figures.error_map(exact).data[0].x) == 4
+
+
+def test_frames_that_do_not_fit_are_one_sentence() -> None:
+    with pytest.raises(ShipidError, match="cells: lacks the columns N_D, H"):
+        figures.gain(pd.DataFrame({"model": ["a"]}))
+    with pytest.raises(ShipidError, match=r"a report shows no 'cell'; did you mean 'cells'\?"):
+        figures.gain({"cell": pd.DataFrame()})
+
+
+def test_the_path_of_a_prediction_is_the_recorded_one(content: ReportContent) -> None:
+    window = content.snapshots[0]
+    made = figures.prediction(content, run=window.run, t=window.t)
+    truth = next(trace for trace in made.data if trace.name == "true path" and len(trace.x) > 1)
+    np.testing.assert_allclose(truth.x, window.truth[:, 1], atol=1e-6)
+    np.testing.assert_allclose(truth.y, window.truth[:, 0], atol=1e-6)
+    hulls = [trace for trace in made.data if trace.name == "ship"]
+    assert (
+        np.ptp(np.hypot(np.diff(hulls[0].x), np.diff(hulls[0].y)) - np.hypot(np.diff(hulls[1].x), np.diff(hulls[1].y)))
+        < 1e-4
+    )
+    with pytest.raises(ShipidError, match="no window of run 'M9'"):
+        figures.prediction(content, run="M9")
+    with pytest.raises(ShipidError, match="no window with N_D = 5; valid: 4, 6"):
+        figures.prediction(content, N_D=5)

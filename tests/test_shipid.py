@@ -1,0 +1,117 @@
+"""What one imports: public names, their types, and what an installed shipid takes along."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shipid
+from shipid.document import bundled_folder
+from tests.study.tiny import TINY
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_wheel_takes_models_and_studies_along() -> None:
+    """pyproject maps both folders to where `bundled_folder` looks first."""
+    build = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    assert build["targets"]["wheel"]["force-include"] == {
+        "models": "shipid/_bundled/models",
+        "studies": "shipid/_bundled/studies",
+    }
+
+
+def test_what_is_installed_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from shipid import document
+
+    (tmp_path / "site" / "shipid" / "_bundled" / "models").mkdir(parents=True)
+    (tmp_path / "site" / "models").mkdir()
+    monkeypatch.setattr(document, "__file__", str(tmp_path / "site" / "shipid" / "document.py"))
+    assert bundled_folder("models") == tmp_path / "site" / "shipid" / "_bundled" / "models"
+    assert bundled_folder("studies") == tmp_path / "site" / "studies"
+
+
+def test_public_names_load() -> None:
+    for name in shipid.__all__:
+        assert getattr(shipid, name) is not None
+    with pytest.raises(AttributeError, match="public names: "):
+        _ = shipid.nothing
+    assert np.isfinite(len(shipid.__all__))
+
+
+def test_names_can_be_found_by_typing() -> None:
+    """What `dir` lists, what is imported on first use and what a type checker sees are the same names."""
+    assert set(shipid.__all__) <= set(dir(shipid))
+    tree = ast.parse(Path(shipid.__file__).read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    typed = {(name.asname, node.module) for node in block.body for name in node.names}
+    assert typed == set(shipid._PUBLIC.items())
+
+
+def test_the_package_says_that_it_has_types() -> None:
+    assert (Path(shipid.__file__).parent / "py.typed").is_file()
+
+
+def test_the_library_says_nothing_unasked() -> None:
+    code = "import shipid, logging; logging.getLogger('shipid.study').warning('a note')"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_importing_is_light() -> None:
+    code = "import sys, shipid; dir(shipid); print(sorted({'numpy', 'torch', 'casadi', 'plotly'} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"
+
+
+def blocks(page: str) -> list[str]:
+    """Blocks of Python of a page of the documentation."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_ten_lines_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As printed; only the study is the smallest there is."""
+    monkeypatch.chdir(tmp_path)
+    ten, main_job, frames = blocks("python.md")
+    assert ten.count("\n") <= 14
+    space: dict[str, Any] = {"__name__": "__main__"}
+    exec(ten, space)
+    assert space["apart"][0] == 0.0
+    assert len(space["apart"]) == 5
+    assert all(0.1 < distance < 100 for distance in space["apart"][1:])
+    assert '"quick"' in main_job
+    exec(main_job.replace('"quick"', repr(str(TINY))).replace("[10]", "[4]"), space)
+    assert set(space["results"].cells["N_D"]) == {4}
+    assert Path("results/mine/report.html").is_file()
+    assert Path("gain.html").is_file()
+    exec(frames, space)
+    assert space["figure"].layout.yaxis.type == "log"
+
+
+@pytest.mark.slow
+def test_a_users_script_passes_strict_type_checks(tmp_path: Path) -> None:
+    """The documented lines as a script: strict, with shipid's modules read as an installed package's are."""
+    script = tmp_path / "mine.py"
+    script.write_text("".join(blocks("python.md")) + "reveal_type(results.cells)\nreveal_type(wrong[0])\n")
+    (tmp_path / "mypy.ini").write_text(
+        "[mypy]\nstrict = true\nfollow_imports = silent\npython_version = 3.12\n"
+        "[mypy-plotly.*,casadi.*,torch.*,dask.*,distributed.*,pooch.*,optuna.*,scipy.*,pyarrow.*]\n"
+        "ignore_missing_imports = true\nfollow_imports = skip\n"
+    )
+    cache = ROOT / ".mypy_cache" / "user"
+    command = [sys.executable, "-m", "mypy", "--config-file", "mypy.ini", "--cache-dir", str(cache), "mine.py"]
+    where = os.environ | {"MYPYPATH": str(ROOT)}
+    result = subprocess.run(command, cwd=tmp_path, env=where, capture_output=True, text=True, timeout=600, check=False)
+    assert result.returncode == 0, result.stdout
+    assert 'Revealed type is "pandas' in result.stdout
+    assert "shipid.vessel.load.Vessel" in result.stdout
