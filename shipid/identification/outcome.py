@@ -23,7 +23,7 @@ from shipid.identification.collinearity import listed, short
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
 from shipid.identification.problem import BLOCK, Identify, overrides, unknowns
 from shipid.identification.profile import Profile, profile, variance_ratio
-from shipid.identification.shooting import Progress
+from shipid.identification.fit import Progress
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import Fit, Statistics, autocorrelation, statistics
 from shipid.interrupts import uninterrupted

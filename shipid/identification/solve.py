@@ -11,21 +11,17 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.identification.problem import BLOCK, Identify, overrides
-from shipid.identification.residuals import Fit, Prediction, build, predict
-from shipid.identification.shooting import Point, Progress, Result, loss, poses, solve
+from shipid.identification.problem import BLOCK, Identify
+from shipid.identification.residuals import Fit, build
+from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
+from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import inverted
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-NEAR = 1e-6  # of a factor: so close to a bound it stands at it
-WORDS = {
-    "Solve_Succeeded": "ok",
-    "Solved_To_Acceptable_Level": "ok",
-    "Infeasible_Problem_Detected": "infeasible",
-    "Invalid_Number_Detected": "diverged",
-    "User_Requested_Stop": "stopped",
-}
+NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
+ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
+"""Setting `start` -> beginnings in the order in which they are tried, until one converges."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +100,8 @@ def identify(
     """
     begun = time.perf_counter()
     fit = build(vessel, dataset, runs, settings)
-    factors = _start(fit, dataset, start)
-    solution = _solved(fit, factors, start.point if isinstance(start, Solution) else None, progress, begun)
+    result, objective_start = _searched(fit, dataset, start, progress)
+    solution = _solution(fit, result, objective_start, time.perf_counter() - begun)
     targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
     while settings.drop is not None and solution.status in ("ok", "refused"):
         weakest = _weakest(solution, settings.drop, targets)
@@ -113,101 +109,73 @@ def identify(
             break
         fit = _without(fit, weakest, targets[weakest])
         dropped = (*solution.dropped, fit.unknown.paths[weakest])
-        solution = _solved(fit, solution.factors, solution.point, progress, begun, solution.objective_start)
-        solution = replace(solution, dropped=dropped)
+        factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
+        result = search(fit, factors, _point(result), progress, before=result.iterations)
+        solution = replace(
+            _solution(fit, result, objective_start, time.perf_counter() - begun), dropped=dropped
+        )
     return solution
 
 
-def _start(fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | None) -> Array:
-    """Factors to begin with, within the bounds."""
-    unknown, settings = fit.unknown, fit.settings
+def _searched(
+    fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
+) -> tuple[Result, float]:
+    """The end of the first search that converges, and the objective where it all began."""
     if isinstance(start, Solution):
-        start = dict(zip(start.paths, start.factors.tolist(), strict=True))
-    factors = unknown.centre.copy()
-    if start is not None:
-        for path, factor in start.items():
-            if path not in unknown.paths:
-                message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
-                raise DocumentError(message, file=fit.vessel.file, path=f"{BLOCK}.start")
-            factors[unknown.paths.index(path)] = factor
-    elif settings.start == "inverse":
-        from shipid.identification.inverse import inverse_dynamics  # it needs all of this package
-
-        own = overrides(settings, fit.runs, fit.vessel, fit.layout.model.environment, dataset.runs)
-        weather = {
-            run: {key.split(".", 1)[1]: value for key, value in values.items() if key.startswith("environment.")}
-            for run, values in own.items()
-        }
-        found = inverse_dynamics(
-            fit.vessel, dataset, fit.runs, unknown.groups, scale=unknown.scale, prior=unknown.prior, environment=weather
-        )
-        return _better(fit, found.factors, factors)
-    return np.clip(factors, unknown.low, unknown.high)
-
-
-def _better(fit: Fit, first: Array, second: Array) -> Array:
-    """Whichever predicts better: what explains accelerations step by step may diverge in a long prediction."""
-    unknown = fit.unknown
-    starts = [np.clip(factors, unknown.low, unknown.high) for factors in (first, second)]
-    begun = [next(iter(poses(fit, factors)))[1] for factors in starts]
-    objectives = [_objective(fit, predict(fit, x, b.nuisances)) for x, b in zip(starts, begun, strict=True)]
-    return starts[int(np.argmin(objectives))]
-
-
-def _solved(
-    fit: Fit,
-    factors: Array,
-    earlier: Point | None,
-    progress: Progress | None,
-    begun: float,
-    objective_start: float | None = None,
-) -> Solution:
-    """One solve and what it says."""
-    before = 0
-    for problem, begin in poses(fit, factors):
-        if objective_start is None:
-            objective_start = _objective(fit, predict(fit, factors, begin.nuisances))
-        result = solve(problem, _warm(begin, factors, earlier), progress, before)
-        end = predict(fit, result.point.factors, result.point.nuisances, result.point.nodes[problem.starts])
-        word, before = WORDS.get(result.word, "not converged"), result.iterations
-        if word == "ok" and not np.isfinite(end.r).all():
-            word = "diverged"
-        if word in ("ok", "stopped"):
+        factors = _factors(fit, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+        point = start.point if _fits(start.point, origin(fit)) else origin(fit)
+    else:
+        factors, point = _factors(fit, start or {}), origin(fit)
+    objective_start = evaluate(fit, factors, point).objective
+    ways = ORDER["base"] if start is not None else ORDER[fit.settings.start]
+    result, before = None, 0
+    for way in ways:
+        begin = factors
+        if way == "growing":
+            begin, before, stopped = grown(fit, dataset, factors, progress, before)
+            if stopped:
+                value = evaluate(fit, begin, point)
+                return Result(begin, value.at, value.objective, before, "stopped"), objective_start
+        elif way == "inverse":
+            begin = by_inverse_dynamics(fit, dataset)
+        found = search(fit, begin, point, progress, before=before)
+        before = found.iterations
+        if result is None or found.status in ("ok", "stopped") or found.objective < result.objective:
+            result = found
+        if found.status in ("ok", "stopped"):
             break
-    assert objective_start is not None
-    where = None
-    if word in ("not converged", "diverged"):
-        lost = problem.lost(begin)
-        word, where = ("diverged", fit.runs[problem.intervals.run[np.argmax(lost)]]) if lost.any() else (word, None)
-    return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
+    assert result is not None
+    return result, objective_start
 
 
-def _warm(begin: Point, factors: Array, earlier: Point | None) -> Point:
-    """Where an earlier solution ended, if it was of the same shape."""
-    if earlier is None or earlier.nodes.shape != begin.nodes.shape or earlier.nuisances.shape != begin.nuisances.shape:
-        return begin
-    return Point(factors, earlier.nuisances, earlier.nodes)
+def _factors(fit: Fit, start: Mapping[str, float]) -> Array:
+    """Factors to begin with (n,), within the bounds: those given, the others of the base."""
+    unknown = fit.unknown
+    factors = unknown.centre.copy()
+    for path, factor in start.items():
+        if path not in unknown.paths:
+            message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
+            raise DocumentError(message, file=fit.vessel.file, path=f"{BLOCK}.start")
+        factors[unknown.paths.index(path)] = factor
+    return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
 
-def _objective(fit: Fit, at: Prediction) -> float:
-    """Sum of squares, priors included; inf where a prediction diverges."""
-    threshold = fit.settings.threshold if fit.settings.loss == "huber" else np.inf
-    prior = (at.factors - fit.unknown.centre) / fit.unknown.prior
-    with np.errstate(all="ignore"):
-        squares = loss(at.r, threshold)[0].sum() + (prior**2).sum()
-        total = float(squares + (at.nuisances**2).sum() + (at.away**2).sum())
-    return total if np.isfinite(total) else float("inf")
+def _fits(point: Point, other: Point) -> bool:
+    """Whether the unknowns of the runs are as many."""
+    return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
-def _solution(
-    fit: Fit, result: Result, end: Prediction, objective_start: float, word: str, lost: str | None, seconds: float
-) -> Solution:
-    unknown, settings = fit.unknown, fit.settings
-    factors = result.point.factors
+def _point(result: Result) -> Point:
+    return Point(result.at.nuisances, result.at.away)
+
+
+def _solution(fit: Fit, result: Result, objective_start: float, seconds: float) -> Solution:
+    unknown, settings, end, word = fit.unknown, fit.settings, result.at, result.status
+    factors = result.factors
     threshold = settings.threshold if settings.loss == "huber" else np.inf
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
     residuals, jacobian, spent = end.marginal(threshold)
-    values, sentence = unknown.values(factors), _sentence(fit, result, word, lost, at_bound)
+    values, sentence = unknown.values(factors), _sentence(fit, result, at_bound)
     reason = _refusal(fit.vessel, values)
     if reason is not None:
         word, sentence = ("refused" if word == "ok" else word), f"{sentence}; {reason}"
@@ -235,7 +203,7 @@ def _solution(
         sentence=sentence,
         at_bound=at_bound,
         held=unknown.low == unknown.high,
-        point=result.point,
+        point=_point(result),
     )
 
 
@@ -248,22 +216,21 @@ def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
     return None
 
 
-def _sentence(fit: Fit, result: Result, word: str, lost: str | None, at_bound: NDArray[np.bool_]) -> str:
+def _sentence(fit: Fit, result: Result, at_bound: NDArray[np.bool_]) -> str:
     """What happened, and what to do about it."""
-    if word == "ok":
-        stand = [path for path, there in zip(fit.unknown.paths, at_bound, strict=True) if there]
-        tail = f"; at a bound, so without an interval: {', '.join(stand)}" if stand else ""
+    if result.status == "ok":
+        limited = [path for path, there in zip(fit.unknown.paths, at_bound, strict=True) if there]
+        tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
         return f"converged in {result.iterations} iterations{tail}"
-    if word == "diverged":
-        place = f"run {lost!r} diverges" if lost is not None else "a prediction diverges"
+    if result.status == "diverged":
+        bad = result.at.run[~np.isfinite(result.at.r)]
+        place = f"run {fit.runs[bad[0]]!r} diverges" if len(bad) else "a prediction diverges"
         return f"{place} within {fit.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
-    if word == "infeasible":
-        return "no factors within the bounds make the predictions hang together: widen the bounds, or start elsewhere"
-    if word == "stopped":
-        return f"stopped after {result.iterations} iterations: what stands here is not the optimum"
+    if result.status == "stopped":
+        return f"stopped after {result.iterations} iterations: this is not the optimum"
     return (
-        f"not converged after {result.iterations} iterations ({result.word}): give priors or bounds, fix or tie "
-        "parameters that the data cannot tell apart, or shorten the horizon"
+        f"not converged after {result.iterations} iterations: give priors or bounds, fix or tie parameters that the "
+        "data cannot tell apart, or shorten the horizon"
     )
 
 
