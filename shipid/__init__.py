@@ -16,7 +16,7 @@ _PUBLIC = {
     "import_log": "shipid.logs.importing",
     "cut_windows": "shipid.data.windows",
     "identify": "shipid.identification.solve",
-    "Identify": "shipid.identification.problem",
+    "Identify": "shipid.identification.settings",
     "Predictor": "shipid.predictor",
     "run_study": "shipid.study.run",
     "ShipidError": "shipid.errors",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import cores, integrate
 from shipid.engine.native import C, Target, compiled, head, target
 from shipid.engine.printing import Printed, print_function
-from shipid.identification.variation import Layout, Variation, variation
+from shipid.identification.sensitivities import Layout, Variation, variation
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
@@ -148,7 +148,7 @@ def pack(array: Array) -> Array:
 
 
 def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
-    """As `variation.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
+    """As `sensitivities.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
     run, model = _library(layout), variation(layout)
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]

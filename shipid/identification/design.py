@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
-from shipid.identification.problem import SIGNALS
+from shipid.identification.settings import SIGNALS
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import Excitation, Manoeuvre
 from shipid.simulation.perform import perform

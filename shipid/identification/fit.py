@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from shipid.identification.residuals import Fit, Prediction, predict
+from shipid.identification.residuals import Prediction, Problem, predict
 from shipid.interrupts import uninterrupted
 
 Array = NDArray[np.float64]
@@ -66,15 +66,15 @@ def loss(r: Array, threshold: float) -> tuple[Array, Array]:
         return np.where(inside, r**2, 2 * threshold * size - threshold**2), np.where(inside, 1.0, threshold / size)
 
 
-def origin(fit: Fit) -> Point:
+def origin(problem: Problem) -> Point:
     """Unknowns of the runs where nothing is wrong, but not where a slope vanishes."""
-    first = np.array([BEGIN.get(name, 0.0) for name in fit.names])
-    starts = (len(fit.segments), len(fit.model.node)) if fit.start_width is not None else (0, 0)
-    return Point(np.tile(first, (len(fit.runs), 1)), np.zeros(starts))
+    first = np.array([BEGIN.get(name, 0.0) for name in problem.names])
+    starts = (len(problem.segments), len(problem.model.node)) if problem.start_width is not None else (0, 0)
+    return Point(np.tile(first, (len(problem.runs), 1)), np.zeros(starts))
 
 
 def search(
-    fit: Fit,
+    problem: Problem,
     factors: Array,
     point: Point,
     progress: Progress | None = None,
@@ -94,9 +94,11 @@ def search(
     ------
     KeyboardInterrupt : Ctrl-C, after the iteration. Whatever `progress` raises.
     """
-    free = fit.unknown.low < fit.unknown.high
+    free = problem.unknown.low < problem.unknown.high
     with uninterrupted() as held, np.errstate(all="ignore"):
-        run = _Search(fit, np.clip(factors, fit.unknown.low, fit.unknown.high), point, free, progress, before, held)
+        run = _Search(
+            problem, np.clip(factors, problem.unknown.low, problem.unknown.high), point, free, progress, before, held
+        )
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.minimise(tolerance, most)
@@ -126,11 +128,11 @@ class _Search:
     """Evaluations of one search, and how far it has come."""
 
     def __init__(
-        self, fit: Fit, factors: Array, point: Point, free: NDArray[np.bool_], progress: Progress | None, before: int,
+        self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], progress: Progress | None, before: int,
         held: list[int],
     ) -> None:  # fmt: skip
-        self.fit, self.free, self.progress, self.held, self.iterations = fit, free, progress, held, before
-        self.last = self.best = self.start = evaluate(fit, factors, point)
+        self.problem, self.free, self.progress, self.held, self.iterations = problem, free, progress, held, before
+        self.last = self.best = self.start = evaluate(problem, factors, point)
         if np.isfinite(self.start.objective):
             self._report()
 
@@ -143,7 +145,7 @@ class _Search:
         factors = self.best.factors.copy()
         factors[self.free] = x
         if not np.array_equal(factors, self.last.factors):
-            self.last = evaluate(self.fit, factors, Point(self.best.at.nuisances, self.best.at.away))
+            self.last = evaluate(self.problem, factors, Point(self.best.at.nuisances, self.best.at.away))
             if self.last.objective < self.best.objective:
                 self.best = self.last
         return self.last
@@ -156,7 +158,7 @@ class _Search:
         """Search over the factors that are free; the word for how it ended."""
         if not self.free.any():
             return "ok"
-        low, high = self.fit.unknown.low[self.free], self.fit.unknown.high[self.free]
+        low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
         try:
             found = least_squares(
                 lambda x: self._at(x).f,
@@ -176,17 +178,17 @@ class _Search:
 
     def pushed(self) -> NDArray[np.bool_]:
         """Free factors near a bound (n,), towards which the objective falls."""
-        unknown, best = self.fit.unknown, self.best
+        unknown, best = self.problem.unknown, self.best
         slope = best.J.T @ best.f
         low, high = best.factors - unknown.low < NEAR, unknown.high - best.factors < NEAR
         return self.free & ((low & (slope > 0)) | (high & (slope < 0)))
 
     def settle(self, at_bound: NDArray[np.bool_], tolerance: float, most: int) -> str:
         """Put factors at their bounds, which the trust region only approaches, and search over the others."""
-        unknown, before = self.fit.unknown, self.best
+        unknown, before = self.problem.unknown, self.best
         nearer = np.where(before.factors - unknown.low < unknown.high - before.factors, unknown.low, unknown.high)
         there = evaluate(
-            self.fit, np.where(at_bound, nearer, before.factors), Point(before.at.nuisances, before.at.away)
+            self.problem, np.where(at_bound, nearer, before.factors), Point(before.at.nuisances, before.at.away)
         )
         if not np.isfinite(there.objective):
             return "ok"
@@ -195,14 +197,14 @@ class _Search:
         return self.minimise(tolerance, most)
 
 
-def evaluate(fit: Fit, factors: Array, point: Point) -> _Value:
+def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
     """Residuals and Jacobian at given factors, with the unknowns of the runs where they are best."""
-    at, parts = _eliminated(fit, factors, point), []
-    threshold = fit.settings.threshold if fit.settings.loss == "huber" else np.inf
-    n = fit.num_factors
+    at, parts = _eliminated(problem, factors, point), []
+    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    n = problem.num_factors
     f, J, A = _robust(at, threshold)
     if np.isfinite(f).all() and np.isfinite(J).all():
-        for run in range(len(fit.runs)):
+        for run in range(len(problem.runs)):
             rows = at.rows(run)
             both = np.column_stack([J[rows], f[rows]])
             slopes, xi = at.unknown(run, rows, A)
@@ -213,8 +215,10 @@ def evaluate(fit: Fit, factors: Array, point: Point) -> _Value:
             parts.append(np.linalg.qr(both, mode="r"))
     else:
         parts.append(np.full((1, n + 1), np.nan))
-    known = np.isfinite(fit.unknown.prior)
-    prior = np.column_stack([np.diag(1 / fit.unknown.prior), (factors - fit.unknown.centre) / fit.unknown.prior])
+    known = np.isfinite(problem.unknown.prior)
+    prior = np.column_stack(
+        [np.diag(1 / problem.unknown.prior), (factors - problem.unknown.centre) / problem.unknown.prior]
+    )
     whole = np.vstack([*parts, prior[known]])
     return _Value(factors, at, whole[:, n], whole[:, :n])
 
@@ -228,29 +232,29 @@ def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
     return f, slope[:, None] * at.by_factor, slope
 
 
-def _eliminated(fit: Fit, factors: Array, point: Point) -> Prediction:
+def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
     """The prediction with the unknowns of the runs where they are best, by Gauss-Newton steps that are halved at need."""
-    at = predict(fit, factors, point.nuisances, point.away)
+    at = predict(problem, factors, point.nuisances, point.away)
     if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
         return at
-    threshold = fit.settings.threshold if fit.settings.loss == "huber" else np.inf
-    costs = _costs(fit, at, threshold)
+    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    costs = _costs(problem, at, threshold)
     for _ in range(INNER):
-        step, fall = _steps(fit, at, threshold)
+        step, fall = _steps(problem, at, threshold)
         if (fall <= CLOSE * costs).all():
             break
         share = np.where(fall > CLOSE * costs, 1.0, 0.0)
         for _ in range(HALVINGS):
-            trial = predict(fit, factors, *_moved(fit, at, step, share))
-            after = _costs(fit, trial, threshold)
+            trial = predict(problem, factors, *_moved(problem, at, step, share))
+            after = _costs(problem, trial, threshold)
             worse = ~(after <= costs) & (share > 0)
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
         else:
             share = np.where(worse, 0.0, share)
-            trial = predict(fit, factors, *_moved(fit, at, step, share))
-            after = _costs(fit, trial, threshold)
+            trial = predict(problem, factors, *_moved(problem, at, step, share))
+            after = _costs(problem, trial, threshold)
         settled = (costs - after <= CLOSE * costs).all()
         at, costs = trial, after
         if settled:
@@ -258,19 +262,19 @@ def _eliminated(fit: Fit, factors: Array, point: Point) -> Prediction:
     return at
 
 
-def _costs(fit: Fit, at: Prediction, threshold: float) -> Array:
+def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
     """Objective of each run (R,) without the priors of the factors."""
-    total = np.bincount(at.run, loss(at.r, threshold)[0], len(fit.runs)) + (at.nuisances**2).sum(axis=1)
+    total = np.bincount(at.run, loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
     if at.away.size:
-        total += np.bincount(fit.whole.run, (at.away**2).sum(axis=1), len(fit.runs))
+        total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
     return np.asarray(total)
 
 
-def _steps(fit: Fit, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
+def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
     """Gauss-Newton step of the unknowns of each run, and by how much it lowers the linear objective (R,)."""
     f, _, root = _robust(at, threshold)
-    steps, fall = [], np.zeros(len(fit.runs))
-    for run in range(len(fit.runs)):
+    steps, fall = [], np.zeros(len(problem.runs))
+    for run in range(len(problem.runs)):
         rows = at.rows(run)
         A, xi = at.unknown(run, rows, root)
         slope = A.T @ f[rows] + xi
@@ -280,13 +284,13 @@ def _steps(fit: Fit, at: Prediction, threshold: float) -> tuple[list[Array], Arr
     return steps, fall
 
 
-def _moved(fit: Fit, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
+def _moved(problem: Problem, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
     """Nuisances and initial states after a share (R,) of each run's step, latencies within what is carried."""
-    nuisances, away, q = at.nuisances.copy(), at.away.copy(), len(fit.names)
+    nuisances, away, q = at.nuisances.copy(), at.away.copy(), len(problem.names)
     for run, step in enumerate(steps):
         nuisances[run] += share[run] * step[:q]
         if away.size:
-            away[fit.whole.run == run] += share[run] * step[q:].reshape(-1, away.shape[1])
-    for i in (i for i, name in enumerate(fit.names) if name == "latency"):
-        nuisances[:, i] = np.clip(nuisances[:, i], 0.0, fit.layout.lags * fit.layout.step / fit.widths[i])
+            away[problem.whole.run == run] += share[run] * step[q:].reshape(-1, away.shape[1])
+    for i in (i for i, name in enumerate(problem.names) if name == "latency"):
+        nuisances[:, i] = np.clip(nuisances[:, i], 0.0, problem.layout.lags * problem.layout.step / problem.widths[i])
     return nuisances, away

@@ -18,7 +18,9 @@ from shipid.data.dataset import Dataset
 from shipid.engine.native import compiler
 from shipid.errors import DataError, DocumentError
 from shipid.identification.compiled import pack, run_compiled
-from shipid.identification.problem import (
+from shipid.identification.segments import Segment, cut_segments
+from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
+from shipid.identification.settings import (
     BLOCK,
     ENVIRONMENT,
     MOVING,
@@ -28,8 +30,6 @@ from shipid.identification.problem import (
     overrides,
     unknowns,
 )
-from shipid.identification.segments import Segment, cut_segments
-from shipid.identification.variation import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -44,7 +44,7 @@ MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Problem:
     """All numbers of one fit.
 
     names, centres, widths : scalars of the per-run nuisances, (nq,) values where nothing is wrong and prior widths.
@@ -93,7 +93,7 @@ class Fit:
         return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
 
 
-def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Fit:
+def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
     """Everything that a fit needs; DocumentError or DataError says what is missing."""
     if not runs:
         raise DataError("no run to fit: name at least one", path="runs")
@@ -118,7 +118,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     if twice is not None:
         path = f"{BLOCK}.runs.{'.'.join(twice)}"
         raise DocumentError("is free in the fit: fix it, or set it in no run", file=vessel.file, path=path)
-    return Fit(
+    return Problem(
         vessel=vessel,
         runs=tuple(runs),
         settings=settings,
@@ -176,14 +176,16 @@ class Predictions:
     weight : (S, N, ny), 0 where nothing was measured. time : (S, N) [s] of each residual.
     """
 
-    def __init__(self, fit: Fit) -> None:
-        self.fit = fit
-        self.length = max(segment.num_steps for segment in fit.segments)
-        self.run = np.array([segment.run for segment in fit.segments])
-        self.log = np.array([self._log(segment) for segment in fit.segments])
-        known = np.array([self._known(segment) for segment in fit.segments])
-        seen, self.weight, self.time = (np.array(list(each)) for each in zip(*map(self._seen, fit.segments), strict=True))
-        self.native = known.shape[0] * self.length * fit.model.size > COMPILE_FROM and compiler() is not None
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.length = max(segment.num_steps for segment in problem.segments)
+        self.run = np.array([segment.run for segment in problem.segments])
+        self.log = np.array([self._log(segment) for segment in problem.segments])
+        known = np.array([self._known(segment) for segment in problem.segments])
+        seen, self.weight, self.time = (
+            np.array(list(each)) for each in zip(*map(self._seen, problem.segments), strict=True)
+        )
+        self.native = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and compiler() is not None
         self.known: Array = pack(known) if self.native else known
         self.seen: Array = pack(seen) if self.native else seen
 
@@ -191,15 +193,15 @@ class Predictions:
         return len(self.run)
 
     def _log(self, segment: Segment) -> list[float]:
-        columns = (segment.columns.get(COLUMNS.get(name, name)) for name in self.fit.model.entries)
+        columns = (segment.columns.get(COLUMNS.get(name, name)) for name in self.problem.model.entries)
         values = [0.0 if column is None else float(column[0]) for column in columns]
-        if self.fit.layout.carried:
-            values += [float(segment.memory[name][0]) for name in self.fit.layout.model.memory]
+        if self.problem.layout.carried:
+            values += [float(segment.memory[name][0]) for name in self.problem.layout.model.memory]
         return values
 
     def _known(self, segment: Segment) -> Array:
         """Inputs of every step (N, .), the last ones held where the prediction is shorter than the longest."""
-        layout = self.fit.layout
+        layout = self.problem.layout
         steps = np.minimum(np.arange(self.length), segment.num_steps - 1)
         commands = {
             name: np.concatenate([segment.earlier[name][::-1], segment.columns[name]]) for name in layout.model.commands
@@ -214,15 +216,15 @@ class Predictions:
 
     def _seen(self, segment: Segment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
-        layout, steps = self.fit.layout, 1 + np.arange(self.length)
+        layout, steps = self.problem.layout, 1 + np.arange(self.length)
         at = np.minimum(steps, segment.num_steps)
-        weight = ((steps <= segment.num_steps) & segment.measured[at])[:, None] / self.fit.deviations
+        weight = ((steps <= segment.num_steps) & segment.measured[at])[:, None] / self.problem.deviations
         y = np.array([segment.columns[name][at] for name in layout.signals]).T
         return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
         """Initial states that the log shows (S, nn), and their slopes in the nuisances (S, nn, nq), given those (R, nq)."""
-        model, count = self.fit.model, len(self)
+        model, count = self.problem.model, len(self)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
         slope = np.zeros((count, len(model.node), q.shape[1]))
@@ -233,9 +235,9 @@ class Predictions:
 
     def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
         """Run all from initial states (S, nn) with factors (n,) and nuisances (R, nq); what diverges is not finite."""
-        model, count = self.fit.model, len(self)
+        model, count = self.problem.model, len(self)
         num_nodes, num_states = len(model.node), len(model.states)
-        num_signals, split = len(self.fit.layout.signals), num_states * (1 + model.num_columns)
+        num_signals, split = len(self.problem.layout.signals), num_states * (1 + model.num_columns)
         x = np.zeros((count, model.size))
         x[:, :num_states], x[:, split : split + num_nodes - num_states] = nodes[:, :num_states], nodes[:, num_states:]
         entry = np.arange(num_nodes)
@@ -245,10 +247,10 @@ class Predictions:
             split + (num_nodes - num_states) * (1 + entry) + entry - num_states,
         )
         x[:, rows] = 1.0
-        fixed = self.fit.fixed(factors, nuisances)[self.run]
+        fixed = self.problem.fixed(factors, nuisances)[self.run]
         with np.errstate(all="ignore"):
             run = run_compiled if self.native else run_machine
-            record = run(self.fit.layout, x, fixed, self.known, self.seen)
+            record = run(self.problem.layout, x, fixed, self.known, self.seen)
         r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
         R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).swapaxes(3, 4)
         return Evaluation(r, R.reshape(-1, r.shape[1], R.shape[4])[:count])
@@ -263,7 +265,7 @@ class Prediction:
     their slopes. segment, run, time, signals : (m,) where each belongs.
     """
 
-    fit: Fit
+    problem: Problem
     factors: Array
     nuisances: Array
     away: Array
@@ -288,7 +290,7 @@ class Prediction:
         e, J, spent = root * self.r, root[:, None] * self.by_factor, np.zeros(len(self.r))
         if not (self.nuisances.size or self.away.size) or not np.isfinite(e).all():
             return e, J, spent
-        for run in range(len(self.fit.runs)):
+        for run in range(len(self.problem.runs)):
             rows = self.rows(run)
             A, xi = self.unknown(run, rows, root)
             U, s, _ = np.linalg.svd(A, full_matrices=False)
@@ -315,19 +317,19 @@ class Prediction:
 
     def named(self) -> dict[str, dict[str, float]]:
         """Run -> nuisance -> value [SI]; initial states as differences from the measured ones."""
-        fit, result = self.fit, dict[str, dict[str, float]]()
-        values = fit.centres + fit.widths * self.nuisances
-        for number, run in enumerate(fit.runs):
-            result[run] = dict(zip(fit.names, values[number].tolist(), strict=True))
-            own = [i for i, segment in enumerate(fit.segments) if segment.run == number] if self.away.size else []
+        problem, result = self.problem, dict[str, dict[str, float]]()
+        values = problem.centres + problem.widths * self.nuisances
+        for number, run in enumerate(problem.runs):
+            result[run] = dict(zip(problem.names, values[number].tolist(), strict=True))
+            own = [i for i, segment in enumerate(problem.segments) if segment.run == number] if self.away.size else []
             for place, i in enumerate(own):
-                for name, away, size in zip(fit.model.node, self.away[i], fit.node_scale, strict=True):
+                for name, away, size in zip(problem.model.node, self.away[i], problem.node_scale, strict=True):
                     key = f"initial_state.{name}" if len(own) == 1 else f"initial_state.{place + 1}.{name}"
-                    result[run][key] = float(away * size * (fit.start_width or 0.0))
+                    result[run][key] = float(away * size * (problem.start_width or 0.0))
         return result
 
 
-def predict(fit: Fit, factors: Array, nuisances: Array, away: Array | None = None) -> Prediction:
+def predict(problem: Problem, factors: Array, nuisances: Array, away: Array | None = None) -> Prediction:
     """Run every prediction from its start.
 
     Parameters
@@ -335,36 +337,36 @@ def predict(fit: Fit, factors: Array, nuisances: Array, away: Array | None = Non
     nuisances : (R, nq) in prior widths. away : (S, nn) initial states less those of the log, in prior widths of
         `initial_state`; default, or where those are not free: none.
     """
-    whole = fit.whole
-    q = fit.centres + fit.widths * nuisances
+    whole = problem.whole
+    q = problem.centres + problem.widths * nuisances
     measured, slope = whole.begin(q)
-    width, begun = fit.start_width or 0.0, measured
-    if fit.start_width is None:
+    width, begun = problem.start_width or 0.0, measured
+    if problem.start_width is None:
         away = np.zeros((0, 0))
     elif away is None:
         away = np.zeros_like(measured)
     if away.size:
-        begun = measured + width * fit.node_scale * away
+        begun = measured + width * problem.node_scale * away
     evaluation = whole.evaluate(begun, factors, q)
-    num_nodes, n, num_signals = len(fit.model.node), fit.num_factors, len(fit.layout.signals)
+    num_nodes, n, num_signals = len(problem.model.node), problem.num_factors, len(problem.layout.signals)
     keep = (whole.weight > 0).reshape(len(whole), -1)
     where, place = np.nonzero(keep)
     R = evaluation.R[keep]  # (m, nc)
     by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
     if by_q.size:
         with np.errstate(all="ignore"):
-            by_q = (by_q + np.einsum("mi,mij->mj", by_start, slope[where])) * fit.widths
+            by_q = (by_q + np.einsum("mi,mij->mj", by_start, slope[where])) * problem.widths
     return Prediction(
-        fit=fit,
+        problem=problem,
         factors=factors,
         nuisances=nuisances,
         away=away,
         r=evaluation.r[keep],
         by_factor=R[:, num_nodes : num_nodes + n],
         by_nuisance=by_q,
-        by_start=by_start * (fit.node_scale * width) if away.size else by_start[:, :0],
+        by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],
         segment=where,
         run=whole.run[where],
         time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole), -1)[keep],
-        signals=np.array(fit.layout.signals)[place % num_signals],
+        signals=np.array(problem.layout.signals)[place % num_signals],
     )

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.identification.problem import BLOCK, Identify
-from shipid.identification.residuals import Fit, build
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
+from shipid.identification.residuals import Problem, build
+from shipid.identification.settings import BLOCK, Identify
 from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import inverted
 from shipid.vessel.load import Vessel
@@ -99,46 +99,44 @@ def identify(
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
     begun = time.perf_counter()
-    fit = build(vessel, dataset, runs, settings)
-    result, objective_start = _searched(fit, dataset, start, progress)
-    solution = _solution(fit, result, objective_start, time.perf_counter() - begun)
+    problem = build(vessel, dataset, runs, settings)
+    result, objective_start = _searched(problem, dataset, start, progress)
+    solution = _solution(problem, result, objective_start, time.perf_counter() - begun)
     targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
     while settings.drop is not None and solution.status in ("ok", "refused"):
         weakest = _weakest(solution, settings.drop, targets)
         if weakest is None:
             break
-        fit = _without(fit, weakest, targets[weakest])
-        dropped = (*solution.dropped, fit.unknown.paths[weakest])
+        problem = _without(problem, weakest, targets[weakest])
+        dropped = (*solution.dropped, problem.unknown.paths[weakest])
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
-        result = search(fit, factors, _point(result), progress, before=result.iterations)
-        solution = replace(
-            _solution(fit, result, objective_start, time.perf_counter() - begun), dropped=dropped
-        )
+        result = search(problem, factors, _point(result), progress, before=result.iterations)
+        solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
     return solution
 
 
 def _searched(
-    fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
+    problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
 ) -> tuple[Result, float]:
     """The end of the first search that converges, and the objective where it all began."""
     if isinstance(start, Solution):
-        factors = _factors(fit, dict(zip(start.paths, start.factors.tolist(), strict=True)))
-        point = start.point if _fits(start.point, origin(fit)) else origin(fit)
+        factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+        point = start.point if _fits(start.point, origin(problem)) else origin(problem)
     else:
-        factors, point = _factors(fit, start or {}), origin(fit)
-    objective_start = evaluate(fit, factors, point).objective
-    ways = ORDER["base"] if start is not None else ORDER[fit.settings.start]
+        factors, point = _factors(problem, start or {}), origin(problem)
+    objective_start = evaluate(problem, factors, point).objective
+    ways = ORDER["base"] if start is not None else ORDER[problem.settings.start]
     result, before = None, 0
     for way in ways:
         begin = factors
         if way == "growing":
-            begin, before, stopped = grown(fit, dataset, factors, progress, before)
+            begin, before, stopped = grown(problem, dataset, factors, progress, before)
             if stopped:
-                value = evaluate(fit, begin, point)
+                value = evaluate(problem, begin, point)
                 return Result(begin, value.at, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
-            begin = by_inverse_dynamics(fit, dataset)
-        found = search(fit, begin, point, progress, before=before)
+            begin = by_inverse_dynamics(problem, dataset)
+        found = search(problem, begin, point, progress, before=before)
         before = found.iterations
         if result is None or found.status in ("ok", "stopped") or found.objective < result.objective:
             result = found
@@ -148,14 +146,14 @@ def _searched(
     return result, objective_start
 
 
-def _factors(fit: Fit, start: Mapping[str, float]) -> Array:
+def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
     """Factors to begin with (n,), within the bounds: those given, the others of the base."""
-    unknown = fit.unknown
+    unknown = problem.unknown
     factors = unknown.centre.copy()
     for path, factor in start.items():
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
-            raise DocumentError(message, file=fit.vessel.file, path=f"{BLOCK}.start")
+            raise DocumentError(message, file=problem.vessel.file, path=f"{BLOCK}.start")
         factors[unknown.paths.index(path)] = factor
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
@@ -169,19 +167,19 @@ def _point(result: Result) -> Point:
     return Point(result.at.nuisances, result.at.away)
 
 
-def _solution(fit: Fit, result: Result, objective_start: float, seconds: float) -> Solution:
-    unknown, settings, end, word = fit.unknown, fit.settings, result.at, result.status
+def _solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
+    unknown, settings, end, word = problem.unknown, problem.settings, result.at, result.status
     factors = result.factors
     threshold = settings.threshold if settings.loss == "huber" else np.inf
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
     residuals, jacobian, spent = end.marginal(threshold)
-    values, sentence = unknown.values(factors), _sentence(fit, result, at_bound)
-    reason = _refusal(fit.vessel, values)
+    values, sentence = unknown.values(factors), _sentence(problem, result, at_bound)
+    reason = _refusal(problem.vessel, values)
     if reason is not None:
         word, sentence = ("refused" if word == "ok" else word), f"{sentence}; {reason}"
     return Solution(
-        vessel=fit.vessel,
-        runs=fit.runs,
+        vessel=problem.vessel,
+        runs=problem.runs,
         settings=settings,
         paths=unknown.paths,
         factors=factors,
@@ -216,16 +214,18 @@ def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
     return None
 
 
-def _sentence(fit: Fit, result: Result, at_bound: NDArray[np.bool_]) -> str:
+def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
     """What happened, and what to do about it."""
     if result.status == "ok":
-        limited = [path for path, there in zip(fit.unknown.paths, at_bound, strict=True) if there]
+        limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
         tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
         return f"converged in {result.iterations} iterations{tail}"
     if result.status == "diverged":
         bad = result.at.run[~np.isfinite(result.at.r)]
-        place = f"run {fit.runs[bad[0]]!r} diverges" if len(bad) else "a prediction diverges"
-        return f"{place} within {fit.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
+        place = f"run {problem.runs[bad[0]]!r} diverges" if len(bad) else "a prediction diverges"
+        return (
+            f"{place} within {problem.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
+        )
     if result.status == "stopped":
         return f"stopped after {result.iterations} iterations: this is not the optimum"
     return (
@@ -248,8 +248,8 @@ def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None
     return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
 
 
-def _without(fit: Fit, number: int, target: float) -> Fit:
+def _without(problem: Problem, number: int, target: float) -> Problem:
     """The same fit with one factor held."""
-    low, high = fit.unknown.low.copy(), fit.unknown.high.copy()
+    low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
-    return replace(fit, unknown=replace(fit.unknown, low=low, high=high))
+    return replace(problem, unknown=replace(problem.unknown, low=low, high=high))

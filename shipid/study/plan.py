@@ -15,7 +15,7 @@ from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.recipe import Recipe
-from shipid.identification.problem import Identify, unknowns
+from shipid.identification.settings import Identify, unknowns
 from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.truth import Truth, check_truth

@@ -13,9 +13,9 @@ import numpy as np
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.agreement import agreement
-from shipid.identification.problem import Identify
+from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import Fit, Statistics, statistics
+from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
@@ -102,7 +102,7 @@ def _judged(vessel: Vessel, data: Dataset, horizon: float) -> Statistics | None:
     )
     begin = dict(zip(paths, (1 + 0.2 * np.sin(np.arange(len(paths)))).tolist(), strict=True))
     found = identify(vessel, data, data.runs, settings, start=begin)
-    return statistics(Fit.of(found)) if found.status == "ok" else None
+    return statistics(LinearFit.of(found)) if found.status == "ok" else None
 
 
 def _figures(judged: list[Statistics]) -> dict[str, Any]:

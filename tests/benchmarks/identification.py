@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shipid.data.dataset import Dataset
-from shipid.identification.problem import Identify
 from shipid.identification.residuals import Evaluation, Fit, Intervals, build
+from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel

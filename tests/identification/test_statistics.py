@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.identification.statistics import Fit, blocks, identifiable_subset, statistics
+from shipid.identification.statistics import LinearFit, blocks, identifiable_subset, statistics
 from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -16,7 +16,7 @@ JACOBIAN = design(RUNS, SAMPLES, COUNT)
 CLUSTERS, NAMES = labels(RUNS, SAMPLES)
 
 
-def one(phi: float = 0.0, seed: int = 3, **more: object) -> Fit:
+def one(phi: float = 0.0, seed: int = 3, **more: object) -> LinearFit:
     return fitted(JACOBIAN, noise(np.random.default_rng(seed), RUNS, SAMPLES, phi), CLUSTERS, NAMES, **more)
 
 
@@ -91,7 +91,7 @@ def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
     found = statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
-    moved = Fit(
+    moved = LinearFit(
         tuple(fit.paths[j] for j in columns),
         fit.factors[columns],
         fit.residuals[rows],

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate
-from shipid.identification.problem import MOVING
+from shipid.identification.settings import MOVING
 from shipid.interrupts import uninterrupted
 from shipid.simulation.truth import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics

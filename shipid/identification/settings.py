@@ -71,7 +71,8 @@ class Identify(BaseModel):
     nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
     runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
     start: Literal["growing", "inverse", "base"] = Field(
-        default="growing", description="factors to begin with: from ever longer horizons, from accelerations, the base's"
+        default="growing",
+        description="factors to begin with: from ever longer horizons, from accelerations, the base's",
     )
     drop: Positive | None = Field(
         default=None, description="standard errors under which a factor's distance from `drop_to` is dropped"
