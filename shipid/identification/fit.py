@@ -6,8 +6,8 @@ projected on what xi cannot explain. So the trust region sees the n factors alon
 
     minimise over f    sum over runs of min over xi of (|r(f, xi)|^2 + |xi|^2)    + |(f - centre) / prior|^2
 
-Residuals and Jacobian of a run, however long, go to SciPy as the (n + 1) rows of their triangular factor, which have the
-same squares and the same gradient.
+Residuals and Jacobian of a run, however long, go to SciPy as the (n + 1) rows of their triangular factor, which have
+the same squares and the same gradient.
 
 Sources: Branch, Coleman, Li, SIAM Journal on Scientific Computing 21 (1999) 1 (the trust region with bounds); Golub,
 Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian of Kaufman, BIT 15 (1975) 49.
@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from shipid.identification.residuals import Prediction, Problem, predict
 from shipid.interrupts import uninterrupted
@@ -96,9 +95,8 @@ def search(
     """
     free = problem.unknown.low < problem.unknown.high
     with uninterrupted() as held, np.errstate(all="ignore"):
-        run = _Search(
-            problem, np.clip(factors, problem.unknown.low, problem.unknown.high), point, free, progress, before, held
-        )
+        begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
+        run = _Search(problem, begin, point, free, _Watch(progress, held, before))
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.minimise(tolerance, most)
@@ -106,7 +104,7 @@ def search(
         if word == "ok" and at_bound.any():
             word = run.settle(at_bound, tolerance, most)
         best = run.best
-    return Result(best.factors, best.at, best.objective, run.iterations, word)
+    return Result(best.factors, best.at, best.objective, run.watch.iterations, word)
 
 
 @dataclass(frozen=True)
@@ -124,22 +122,27 @@ class _Value:
         return total if np.isfinite(total) else float("inf")
 
 
+@dataclass
+class _Watch:
+    """Who looks on: `progress`, Ctrl-C as `uninterrupted` holds it back, and the iterations so far."""
+
+    progress: Progress | None
+    held: list[int]
+    iterations: int
+
+    def stops(self, objective: float) -> bool:
+        """Report an iteration; whether to end here."""
+        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
+        return asked or bool(self.held)
+
+
 class _Search:
     """Evaluations of one search, and how far it has come."""
 
-    def __init__(
-        self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], progress: Progress | None, before: int,
-        held: list[int],
-    ) -> None:  # fmt: skip
-        self.problem, self.free, self.progress, self.held, self.iterations = problem, free, progress, held, before
+    def __init__(self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], watch: _Watch) -> None:
+        self.problem, self.free, self.watch = problem, free, watch
         self.last = self.best = self.start = evaluate(problem, factors, point)
-        if np.isfinite(self.start.objective):
-            self._report()
-
-    def _report(self) -> None:
-        stop = bool(self.progress(self.iterations, self.best.objective)) if self.progress is not None else False
-        if stop or self.held:
-            raise StopIteration
+        self.stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
 
     def _at(self, x: Array) -> _Value:
         factors = self.best.factors.copy()
@@ -150,31 +153,34 @@ class _Search:
                 self.best = self.last
         return self.last
 
-    def _after(self, intermediate_result: Any) -> None:
-        self.iterations += 1
-        self._report()
+    def _after(self, intermediate_result: OptimizeResult) -> None:
+        self.watch.iterations += 1
+        if self.watch.stops(2 * float(intermediate_result.cost)):
+            self.stopped = True
+            raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
         """Search over the factors that are free; the word for how it ended."""
+        if self.stopped:
+            return "stopped"
         if not self.free.any():
             return "ok"
         low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
-        try:
-            found = least_squares(
-                lambda x: self._at(x).f,
-                np.clip(self.best.factors[self.free], low, high),
-                jac=lambda x: self._at(x).J[:, self.free],
-                bounds=(low, high),
-                x_scale="jac",
-                ftol=tolerance,
-                xtol=tolerance,
-                gtol=tolerance,
-                max_nfev=most,
-                callback=self._after,
-            )
-        except StopIteration:
+        found = least_squares(
+            lambda x: self._at(x).f,
+            np.clip(self.best.factors[self.free], low, high),
+            jac=lambda x: self._at(x).J[:, self.free],
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=tolerance,
+            max_nfev=most,
+            callback=self._after,
+        )
+        if self.stopped:
             return "stopped"
-        return {0: "not converged", -2: "stopped"}.get(found.status, "ok")
+        return "not converged" if found.status == 0 else "ok"
 
     def pushed(self) -> NDArray[np.bool_]:
         """Free factors near a bound (n,), towards which the objective falls."""
@@ -233,7 +239,7 @@ def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
 
 
 def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
-    """The prediction with the unknowns of the runs where they are best, by Gauss-Newton steps that are halved at need."""
+    """The prediction with the unknowns of the runs where they are best, by Gauss-Newton steps, halved at need."""
     at = predict(problem, factors, point.nuisances, point.away)
     if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
         return at

@@ -1,7 +1,6 @@
 """A fit as numbers: weighted residuals of many predictions and their exact derivatives.
 
-Predictions are cut into intervals of equal length, each from a node, and all intervals run at once. One interval a
-prediction is single shooting; more of them, with their ends tied to the next nodes, are multiple shooting.
+Each prediction begins at a measured state of the log (or one to be found near it), and all of them run at once.
 """
 
 from __future__ import annotations
@@ -258,7 +257,7 @@ class Predictions:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Every prediction as a whole, from its own start: single shooting.
+    """Residuals of all predictions and their slopes.
 
     factors (n,), nuisances (R, nq) and away (S, nn): starts less what was measured, all in prior widths (away is empty
     where starts are as measured). r : (m,) weighted residuals; by_factor (m, n), by_nuisance (m, nq), by_start (m, nn)

@@ -72,7 +72,7 @@ class Identify(BaseModel):
     runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
     start: Literal["growing", "inverse", "base"] = Field(
         default="growing",
-        description="factors to begin with: from ever longer horizons, from accelerations, the base's",
+        description="where to begin: growing horizons, inverse dynamics, or the base",
     )
     drop: Positive | None = Field(
         default=None, description="standard errors under which a factor's distance from `drop_to` is dropped"

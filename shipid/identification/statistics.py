@@ -14,7 +14,7 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
 
 None of them sees a bias. Where every prediction has a start of its own to be found, coloured residuals pull the factors
 (incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is against what the
-residuals remember; `shipid.identification.agreement` tests for that with a second fit.
+residuals remember: compare with a fit over a longer one.
 
 Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169; Pustejovsky, Tipton,
 Journal of Business & Economic Statistics 36 (2018) 672 (also that nuisances may be projected out first); Tipton,
@@ -51,7 +51,6 @@ WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; rows of a run that tell any
 BLOCK = 10.0  # length of a block in integrated correlation times
-LEAST = 0.1  # weight under which a factor is left out of a direction
 KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
 
 
@@ -179,22 +178,6 @@ class Statistics:
         levels = np.array([self.whiteness[name].level for name in self.fit.signals])
         scaled = self.fit.jacobian / levels[:, None]
         return np.asarray(scaled.T @ scaled)
-
-    def directions(self) -> list[tuple[dict[str, float], float]]:
-        """Combinations of factors at right angles in what is seen, best known first: (path -> weight, standard error).
-
-        The weight of the greatest is 1 and those under 0.1 are left out; the error is how far factors may move along
-        it until the data object, priors not counted.
-        """
-        information, found = self.information, []
-        for direction in self.collinearity.directions:
-            weights = direction / direction[np.argmax(np.abs(direction))]
-            own = {self.collinearity.paths[j]: float(weights[j]) for j in np.flatnonzero(np.abs(weights) >= LEAST)}
-            full = np.zeros(len(self.fit.paths))
-            full[[self.fit.paths.index(path) for path in self.collinearity.paths]] = weights
-            seen = float(np.sqrt(full @ information @ full))
-            found.append((own, 1 / seen if seen > 0 else float("inf")))
-        return sorted(found, key=lambda one: one[1])
 
 
 def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
@@ -516,20 +499,3 @@ def _sentences(
         else:
             told.append(f"{name} is not identified: no effect of its own on what these data hold")
     return tuple(told)
-
-
-def identifiable_subset(fit: LinearFit, widest: float = WIDEST) -> tuple[str, ...]:
-    """Parameters that the data can carry at once, the others held: the longest run of the pivoted ones that is known.
-
-    Pivoted QR of the sensitivities puts first what adds most that is new (Golub, Klema, Stewart 1976; for parameters
-    Velez-Reyes, Verghese, CDC 1995); the run ends before the first set with an interval wider than `widest`.
-    """
-    from scipy.linalg import qr
-
-    free = _free_places(fit)
-    order = free[qr(fit.jacobian[:, free], mode="economic", pivoting=True)[2]] if len(free) else free
-    for count in range(len(order), 0, -1):
-        own = np.sort(order[:count])
-        if (statistics(_free(fit, own), widest).alone <= widest).all():
-            return tuple(fit.paths[j] for j in own)
-    return ()

@@ -12,7 +12,6 @@ import numpy as np
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.identification.agreement import agreement
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
@@ -35,7 +34,7 @@ MOST = 0.5  # share of the replicates
 
 
 def run(replicates: int = REPLICATES) -> dict[str, Any]:
-    """Coverage of the identifiable factors, how often the pair is named, how often two horizons disagree."""
+    """Coverage of the identifiable factors, and how often the pair is named."""
     vessel = load_vessel("gunnerus-28.9")
     result: dict[str, Any] = {"replicates": replicates}
     for noise, (strength, horizons) in CASES.items():
@@ -49,10 +48,6 @@ def run(replicates: int = REPLICATES) -> dict[str, Any]:
             found = [one for one in judged[horizon] if one is not None]
             result |= {f"{case}: {label}": value for label, value in _figures(found).items()}
             result[f"{case}: did not converge"] = replicates - len(found)
-            if horizon:
-                pairs = [(a, b) for a, b in zip(judged[WHOLE], judged[horizon], strict=True) if a and b]
-                told = float(np.mean([not agreement(a, b).agree for a, b in pairs]))
-                result[f"{case}: said to disagree with whole runs"] = round(told, 3)
     return result
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from shipid.identification.statistics import LinearFit
@@ -39,8 +41,8 @@ def noise(rng: np.random.Generator, runs: int, samples: int, phi: float) -> np.n
 
 
 def fitted(
-    jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signals: tuple[str, ...], **more
-) -> LinearFit:  # type: ignore[no-untyped-def]
+    jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signals: tuple[str, ...], **more: Any
+) -> LinearFit:
     """Least squares on J (x - truth) = error; the factors returned are 1 + estimate - truth."""
     widths = more.get("prior_widths")
     precision = np.zeros(jacobian.shape[1]) if widths is None else 1 / np.asarray(widths) ** 2
