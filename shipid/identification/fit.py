@@ -142,7 +142,11 @@ class _Search:
     def __init__(self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], watch: _Watch) -> None:
         self.problem, self.free, self.watch = problem, free, watch
         self.last = self.best = self.start = evaluate(problem, factors, point)
-        self.stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
+        self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
+
+    def stops(self) -> bool:
+        """Whether somebody asked to end here."""
+        return self._stopped
 
     def _at(self, x: Array) -> _Value:
         factors = self.best.factors.copy()
@@ -156,12 +160,12 @@ class _Search:
     def _after(self, intermediate_result: OptimizeResult) -> None:
         self.watch.iterations += 1
         if self.watch.stops(2 * float(intermediate_result.cost)):
-            self.stopped = True
+            self._stopped = True
             raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
         """Search over the factors that are free; the word for how it ended."""
-        if self.stopped:
+        if self.stops():
             return "stopped"
         if not self.free.any():
             return "ok"
@@ -178,7 +182,7 @@ class _Search:
             max_nfev=most,
             callback=self._after,
         )
-        if self.stopped:
+        if self.stops():
             return "stopped"
         return "not converged" if found.status == 0 else "ok"
 
@@ -205,7 +209,7 @@ class _Search:
 
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
     """Residuals and Jacobian at given factors, with the unknowns of the runs where they are best."""
-    at, parts = _eliminated(problem, factors, point), []
+    at, parts = _eliminated(problem, factors, point), list[Array]()
     threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
     n = problem.num_factors
     f, J, A = _robust(at, threshold)
@@ -218,7 +222,7 @@ def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
                 both = np.vstack([both, np.column_stack([np.zeros((len(xi), n)), xi])])
                 basis = np.linalg.qr(np.vstack([slopes, np.eye(len(xi))]))[0]
                 both[:, :n] -= basis @ (basis.T @ both[:, :n])
-            parts.append(np.linalg.qr(both, mode="r"))
+            parts.append(np.asarray(np.linalg.qr(both, mode="r")))
     else:
         parts.append(np.full((1, n + 1), np.nan))
     known = np.isfinite(problem.unknown.prior)
@@ -279,13 +283,13 @@ def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
 def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
     """Gauss-Newton step of the unknowns of each run, and by how much it lowers the linear objective (R,)."""
     f, _, root = _robust(at, threshold)
-    steps, fall = [], np.zeros(len(problem.runs))
+    steps, fall = list[Array](), np.zeros(len(problem.runs))
     for run in range(len(problem.runs)):
         rows = at.rows(run)
         A, xi = at.unknown(run, rows, root)
         slope = A.T @ f[rows] + xi
         step = -np.linalg.solve(A.T @ A + np.eye(len(xi)), slope)
-        steps.append(step)
+        steps.append(np.asarray(step, dtype=float))
         fall[run] = -slope @ step
     return steps, fall
 

@@ -222,7 +222,7 @@ class Predictions:
         return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
-        """Initial states that the log shows (S, nn), and their slopes in the nuisances (S, nn, nq), given those (R, nq)."""
+        """Initial states in the log (S, nn), and their slopes in the nuisances (S, nn, nq), given those (R, nq)."""
         model, count = self.problem.model, len(self)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T

@@ -26,7 +26,7 @@ ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "
 
 @dataclass(frozen=True)
 class Solution:
-    """What was found.
+    """The end of a fit: estimates, what remains of the residuals, and how it went.
 
     Parameters
     ----------
@@ -37,13 +37,13 @@ class Solution:
         time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
         With huber each is scaled by the square root of its weight, and their squares sum to less than that.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
-    prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) where they stand.
+    prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) their means.
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
     spent : (m,) share of each residual that the nuisances have taken.
     objective_start, objective : sum of squares at the start, from the measured states, and at the end.
     status, sentence : `ok`, `refused` (converged to values that the vessel's own checks refuse), `not converged`,
-        `infeasible`, `diverged` or `stopped`, and what that means here.
-    at_bound : (n,) whether the estimate stands at a bound. held : (n,) factors that are not free: dropped, or given
+        `diverged` or `stopped`, and what that means here.
+    at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     """
 
@@ -70,8 +70,8 @@ class Solution:
     sentence: str
     at_bound: NDArray[np.bool_]
     held: NDArray[np.bool_]
+    point: Point = field(repr=False)
     dropped: tuple[str, ...] = ()
-    point: Point | None = field(default=None, repr=False)
 
     @property
     def identified(self) -> Vessel:

@@ -18,6 +18,7 @@ from shipid.errors import DataError
 from shipid.identification.fit import Progress, Result, origin, search
 from shipid.identification.inverse import inverse_dynamics
 from shipid.identification.residuals import Problem, build
+from shipid.identification.segments import Segment
 from shipid.identification.settings import ENVIRONMENT, overrides
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def _at(
     return search(short, factors, origin(short), progress, before=before, tolerance=ROUGH, most=MOST)
 
 
-def _spread(problem: Problem) -> tuple[object, ...]:
+def _spread(problem: Problem) -> tuple[Segment, ...]:
     """Predictions at equal distances, of every run at least one, that have no more steps than are enough."""
     steps = sum(segment.num_steps for segment in problem.segments)
     every = max(1, round(steps / ENOUGH))
