@@ -249,7 +249,7 @@ def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None
 
 
 def _without(problem: Problem, number: int, target: float) -> Problem:
-    """The same fit with one factor held."""
+    """The problem with one factor held at a value."""
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))
