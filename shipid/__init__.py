@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.engine.rollout import rollout as rollout
     from shipid.errors import ShipidError as ShipidError
     from shipid.identification.outcome import run_identification as run_identification
-    from shipid.identification.problem import Identify as Identify
+    from shipid.identification.settings import Identify as Identify
     from shipid.identification.solve import identify as identify
     from shipid.logs.guess.columns import guess as guess
     from shipid.logs.importing import import_log as import_log
@@ -56,7 +56,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
 _PUBLIC = {
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
-    "Identify": "shipid.identification.problem",
+    "Identify": "shipid.identification.settings",
     "Perturbation": "shipid.vessel.perturb",
     "Plan": "shipid.study.plan",
     "Predictor": "shipid.predictor",

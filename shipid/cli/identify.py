@@ -95,7 +95,7 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     """Names, or names with widths; the ordinary width where only others have one."""
     if not any("=" in name for name in given):
         return given
-    from shipid.identification.problem import WIDE
+    from shipid.identification.settings import WIDE
 
     named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
     return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")

@@ -14,6 +14,8 @@ from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
+BLOCK = 256  # steps of one call of the function of `memory_along`: made once, whatever the lengths of the runs
+
 
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
     """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
@@ -101,6 +103,16 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
     return np.stack(records, axis=1), np.stack(worst)
 
 
+@lru_cache(maxsize=32)
+def _memory_scan(model: Dynamics) -> ca.Function:
+    """(memory, commands, dt, parameters) -> memory after each of `BLOCK` steps."""
+    memory, order = ca.MX.sym("memory", len(model.memory)), ca.MX.sym("order", len(model.commands))
+    dt, parameters = ca.MX.sym("dt"), ca.MX.sym("parameters", len(model.parameters))
+    still = ca.MX.zeros(len(model.state) + len(model.hidden)), ca.MX.zeros(len(model.environment))
+    after = model.advance(still[0], memory, order, still[1], parameters, dt)
+    return ca.Function("advance", [memory, order, dt, parameters], [after]).mapaccum(BLOCK)
+
+
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
     """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
 
@@ -114,27 +126,14 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     count = len(t) - 1
     if count == 0:
         return dict(zip(model.memory, first[:, None], strict=True))
-    scan = ca.Function(
-        "advance",
-        [
-            memory := ca.MX.sym("memory", len(model.memory)),
-            order := ca.MX.sym("order", len(model.commands)),
-            dt := ca.MX.sym("dt"),
-            parameters := ca.MX.sym("parameters", len(model.parameters)),
-        ],
-        [
-            model.advance(
-                ca.MX.zeros(len(model.state) + len(model.hidden)),
-                memory,
-                order,
-                ca.MX.zeros(len(model.environment)),
-                parameters,
-                dt,
-            )
-        ],
-    ).mapaccum(count)
-    values = np.array(list(vessel.parameters.values()))[:, None]
+    scan, parts = _memory_scan(model), []
+    values = np.tile(np.array(list(vessel.parameters.values()))[:, None], (1, BLOCK))
+    held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
+    reached, dt = first, np.diff(t)
     with uninterrupted():
-        after = np.array(scan(first, orders[:, :-1], np.diff(t)[None], np.tile(values, (1, count))))
+        for rows in held.reshape(-1, BLOCK):
+            parts.append(np.array(scan(reached, orders[:, rows], dt[None, rows], values)))
+            reached = parts[-1][:, -1]
+    after = np.concatenate(parts, axis=1)[:, :count]
     states = np.concatenate([first[:, None], after], axis=1)
     return dict(zip(model.memory, states, strict=True))

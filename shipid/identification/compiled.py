@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import cores, integrate
 from shipid.engine.native import C, Target, compiled, head, target
 from shipid.engine.printing import Printed, print_function
-from shipid.identification.variation import Layout, Variation, variation
+from shipid.identification.sensitivities import Layout, Variation, variation
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
@@ -147,14 +147,9 @@ def pack(array: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(filled.reshape(-1, lanes, *array.shape[1:]), 1, -1), dtype=float)
 
 
-def unpack(array: Array, count: int) -> Array:
-    """The reverse of `pack`: the first `count` intervals."""
-    return np.moveaxis(array, -1, 1).reshape(-1, *array.shape[1:-1])[:count]
-
-
-def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """As `variation.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
-    run, count, model = _library(layout), len(x), variation(layout)
+def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
+    """As `sensitivities.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
+    run, model = _library(layout), variation(layout)
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]
     records = np.empty((groups, num_steps, model.outputs.size1_out(0), target().lanes))
@@ -170,4 +165,4 @@ def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arr
         edges = np.linspace(0, groups, threads + 1).astype(int).tolist()
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(part, edges[:-1], edges[1:]))
-    return unpack(state, count), np.moveaxis(records, -1, 1)
+    return np.moveaxis(records, -1, 1)

@@ -9,11 +9,10 @@ The candidate adds J^T J to the information M that there is, and brings
 
 the expected information of a linear model with normal errors. It is local, right where the present values nearly are,
 and as good as the model: far from what it was fitted to (astern, in a stop) it promises what it cannot know. Bits per
-hour favour short runs, because the first bits cost least; `plan` weighs what is known by then.
+hour favour short runs, because the first bits cost least.
 
 Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Verdinelli, Statistical Science 10 (1995)
-273; Goodwin, Payne, Dynamic System Identification (1977), ch. 6; greedy choice is within 1 - 1/e of the best set:
-Nemhauser, Wolsey, Fisher, Mathematical Programming 14 (1978) 265.
+273; Goodwin, Payne, Dynamic System Identification (1977), ch. 6.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
-from shipid.identification.problem import SIGNALS
+from shipid.identification.settings import SIGNALS
 from shipid.simulation.approach import Controls
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
@@ -296,25 +295,6 @@ def rank(
     return table.sort_values(_criterion(by), ascending=False, ignore_index=True)
 
 
-def plan(
-    found: Sequence[Informed],
-    paths: Sequence[str],
-    count: int,
-    present: Array | None = None,
-    focus: Sequence[str] | None = None,
-    by: str = "per_hour",
-) -> pd.DataFrame:
-    """A programme of trials: the best manoeuvre, then the best after it, and so on; one row each, as `rank`."""
-    there = np.zeros((len(paths), len(paths))) if present is None else present
-    rows = []
-    for _ in range(count):
-        table = _table(found, paths, there, focus)
-        best = int(np.argmax(table[_criterion(by)]))
-        rows.append(table.iloc[[best]])
-        there = there + found[best].information
-    return pd.concat(rows, ignore_index=True)
-
-
 def _criterion(by: str) -> str:
     if by not in ("gain", "per_hour"):
         raise ShipidError(f"manoeuvres are ranked by gain or per_hour, not {by!r}")
@@ -324,7 +304,7 @@ def _criterion(by: str) -> str:
 def _table(
     found: Sequence[Informed], paths: Sequence[str], present: Array | None, focus: Sequence[str] | None
 ) -> pd.DataFrame:
-    """As `rank`, in the order of the candidates."""
+    """Gain, rate and standard errors before and after of each candidate, a row each, in the order given."""
     own = _focused(paths, focus)
     there = _present(present, len(paths))
     before, rows = _errors(there), []

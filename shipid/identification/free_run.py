@@ -13,10 +13,10 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
-from shipid.identification.problem import Identify
 from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, Segment
-from shipid.identification.variation import COLUMNS
+from shipid.identification.sensitivities import COLUMNS
+from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -52,17 +52,20 @@ def free_runs(
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
     own = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
-    fit = build(first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": own}))
-    changed = [dict(zip(first.parameters, values.tolist(), strict=True)) for values in fit.base]
+    problem = build(first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": own}))
+    given = np.array(list(first.parameters.values()))
+    predicted: dict[tuple[int, int], Array] = {}
+    for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
+        places = [i for i, one in enumerate(problem.segments) if np.array_equal(problem.base[one.run], values)]
+        rows = [np.where(values != given, values, list(vessel.parameters.values())) for vessel in vessels.values()]
+        found = _predicted(first, [problem.segments[i] for i in places], np.array(rows), settings)
+        predicted |= {(model, places[piece]): states for (model, piece), states in found.items()}
     frames = []
-    for number, run in enumerate(fit.runs):
-        segments = [segment for segment in fit.segments if segment.run == number]
-        away = {path: value for path, value in changed[number].items() if value != first.parameters[path]}
-        values = np.array([list({**vessel.parameters, **away}.values()) for vessel in vessels.values()])
-        predicted = _predicted(first, segments, values, settings)
+    for number, run in enumerate(problem.runs):
+        places = [i for i, one in enumerate(problem.segments) if one.run == number]
         frames += [
-            _series(run, piece, segment, name, predicted[model, piece])
-            for piece, segment in enumerate(segments)
+            _series(run, piece, problem.segments[place], name, predicted[model, place])
+            for piece, place in enumerate(places)
             for model, name in enumerate((MEASURED, *vessels))
         ]
     series = pd.concat(frames, ignore_index=True)

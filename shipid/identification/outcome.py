@@ -19,12 +19,12 @@ from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.collinearity import listed, short
+from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
-from shipid.identification.problem import BLOCK, Identify, overrides, unknowns
 from shipid.identification.profile import Profile, profile, variance_ratio
-from shipid.identification.shooting import Progress
+from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import Fit, Statistics, autocorrelation, statistics
+from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
 from shipid.interrupts import uninterrupted
 from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
@@ -216,7 +216,7 @@ def run_identification(
         if (solution.at_bound | solution.held).all():
             raise ShipidError("every parameter stands at a bound, is held or was dropped: nothing is left to be judged")
         _go_on(held)
-        found = statistics(Fit.of(solution))
+        found = statistics(LinearFit.of(solution))
         curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)

@@ -1,7 +1,6 @@
 """A fit as numbers: weighted residuals of many predictions and their exact derivatives.
 
-Predictions are cut into intervals of equal length, each from a node, and all intervals run at once. One interval a
-prediction is single shooting; more of them, with their ends tied to the next nodes, are multiple shooting.
+Each prediction begins at a measured state of the log (or one to be found near it), and all of them run at once.
 """
 
 from __future__ import annotations
@@ -18,7 +17,9 @@ from shipid.data.dataset import Dataset
 from shipid.engine.native import compiler
 from shipid.errors import DataError, DocumentError
 from shipid.identification.compiled import pack, run_compiled
-from shipid.identification.problem import (
+from shipid.identification.segments import Segment, cut_segments
+from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
+from shipid.identification.settings import (
     BLOCK,
     ENVIRONMENT,
     MOVING,
@@ -28,8 +29,6 @@ from shipid.identification.problem import (
     overrides,
     unknowns,
 )
-from shipid.identification.segments import Segment, cut_segments
-from shipid.identification.variation import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -44,7 +43,7 @@ MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Problem:
     """All numbers of one fit.
 
     names, centres, widths : scalars of the per-run nuisances, (nq,) values where nothing is wrong and prior widths.
@@ -77,9 +76,9 @@ class Fit:
         return np.array([own.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
 
     @cached_property
-    def whole(self) -> Intervals:
-        """Every prediction as one interval."""
-        return Intervals(self, 0)
+    def whole(self) -> Predictions:
+        """The predictions, packed."""
+        return Predictions(self)
 
     @property
     def num_factors(self) -> int:
@@ -93,7 +92,7 @@ class Fit:
         return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
 
 
-def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Fit:
+def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
     """Everything that a fit needs; DocumentError or DataError says what is missing."""
     if not runs:
         raise DataError("no run to fit: name at least one", path="runs")
@@ -118,7 +117,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     if twice is not None:
         path = f"{BLOCK}.runs.{'.'.join(twice)}"
         raise DocumentError("is free in the fit: fix it, or set it in no run", file=vessel.file, path=path)
-    return Fit(
+    return Problem(
         vessel=vessel,
         runs=tuple(runs),
         settings=settings,
@@ -160,62 +159,49 @@ def _with_weather(segment: Segment, weather: Sequence[str], own: Mapping[str, fl
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Intervals at one place: nn entries a node, nc columns (node, factors, nuisances).
+    """Predictions at one place: nn entries of an initial state, nc columns (initial state, factors, nuisances).
 
-    end : (K, nn). slope : (K, nn, nc) of the ends. r : (K, N ny) weighted residuals. R : (K, nc, N ny) their slopes.
+    r : (S, N ny) weighted residuals. R : (S, N ny, nc) their slopes.
     """
 
-    end: Array
-    slope: Array
     r: Array
     R: Array
 
 
-class Intervals:
-    """Predictions of a fit cut into intervals of `length` steps (0: each as a whole), packed for the engine.
+class Predictions:
+    """The predictions of a fit side by side, packed for the engine; shorter ones are padded without weight.
 
-    segment, run : (K,) of each interval; first : (K,) whether it begins its segment. guess : (K, nn) nodes as measured.
-    log : (K, columns) the log at the nodes, for the states there. weight : (K, N, ny), 0 where nothing was measured.
-    time : (K, N) [s] of each residual.
+    run : (S,) of each. log : (S, columns) the log where they begin, for the states there.
+    weight : (S, N, ny), 0 where nothing was measured. time : (S, N) [s] of each residual.
     """
 
-    def __init__(self, fit: Fit, length: int) -> None:
-        self.fit = fit
-        longest = max(segment.num_steps for segment in fit.segments)
-        self.length = min(length, longest) or longest
-        places = [
-            (number, first)
-            for number, segment in enumerate(fit.segments)
-            for first in range(0, segment.num_steps, self.length)
-        ]
-        self.segment = np.array([number for number, _ in places])
-        self.run = np.array([fit.segments[number].run for number, _ in places])
-        self.first = np.array([first == 0 for _, first in places])
-        self.inner = np.flatnonzero(~self.first) - 1  # intervals whose end is the next one's node
-        self.log = np.array([self._log(*place) for place in places])
-        known = np.array([self._known(*place) for place in places])
-        seen, self.weight, self.time = (np.array(list(each)) for each in zip(*map(self._seen, places), strict=True))
-        work = self.length * len(places) * fit.model.size
-        self.native = work > COMPILE_FROM and compiler() is not None
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.length = max(segment.num_steps for segment in problem.segments)
+        self.run = np.array([segment.run for segment in problem.segments])
+        self.log = np.array([self._log(segment) for segment in problem.segments])
+        known = np.array([self._known(segment) for segment in problem.segments])
+        seen, self.weight, self.time = (
+            np.array(list(each)) for each in zip(*map(self._seen, problem.segments), strict=True)
+        )
+        self.native = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and compiler() is not None
         self.known: Array = pack(known) if self.native else known
         self.seen: Array = pack(seen) if self.native else seen
-        self.guess = self.begin(np.tile(fit.centres, (len(fit.runs), 1)))[0]
 
     def __len__(self) -> int:
         return len(self.run)
 
-    def _log(self, number: int, first: int) -> list[float]:
-        segment = self.fit.segments[number]
-        found = (segment.columns.get(COLUMNS.get(name, name)) for name in self.fit.model.entries)
-        own = [0.0 if column is None else float(column[first]) for column in found]
-        if self.fit.layout.carried:
-            own += [float(segment.memory[name][first]) for name in self.fit.layout.model.memory]
-        return own
+    def _log(self, segment: Segment) -> list[float]:
+        columns = (segment.columns.get(COLUMNS.get(name, name)) for name in self.problem.model.entries)
+        values = [0.0 if column is None else float(column[0]) for column in columns]
+        if self.problem.layout.carried:
+            values += [float(segment.memory[name][0]) for name in self.problem.layout.model.memory]
+        return values
 
-    def _known(self, number: int, first: int) -> Array:
-        """Inputs of every step of an interval (N, .), the last ones held where it is longer than its segment."""
-        segment, layout = self.fit.segments[number], self.fit.layout
-        steps = np.minimum(first + np.arange(self.length), segment.num_steps - 1)
+    def _known(self, segment: Segment) -> Array:
+        """Inputs of every step (N, .), the last ones held where the prediction is shorter than the longest."""
+        layout = self.problem.layout
+        steps = np.minimum(np.arange(self.length), segment.num_steps - 1)
         commands = {
             name: np.concatenate([segment.earlier[name][::-1], segment.columns[name]]) for name in layout.model.commands
         }
@@ -227,66 +213,58 @@ class Intervals:
             columns += [segment.memory[name][steps] for name in layout.model.memory]
         return np.array(columns).reshape(-1, self.length).T
 
-    def _seen(self, place: tuple[int, int]) -> tuple[Array, Array, Array]:
+    def _seen(self, segment: Segment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
-        segment, layout = self.fit.segments[place[0]], self.fit.layout
-        steps = place[1] + 1 + np.arange(self.length)
-        inside = steps <= segment.num_steps
+        layout, steps = self.problem.layout, 1 + np.arange(self.length)
         at = np.minimum(steps, segment.num_steps)
-        weight = (inside & segment.measured[at])[:, None] / self.fit.deviations
+        weight = ((steps <= segment.num_steps) & segment.measured[at])[:, None] / self.problem.deviations
         y = np.array([segment.columns[name][at] for name in layout.signals]).T
         return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
-        """Nodes that the log shows (K, nn), and their slopes in the nuisances (K, nn, nq), given those (R, nq)."""
-        model, count = self.fit.model, len(self)
+        """Initial states in the log (S, nn), and their slopes in the nuisances (S, nn, nq), given those (R, nq)."""
+        model, count = self.problem.model, len(self)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
         slope = np.zeros((count, len(model.node), q.shape[1]))
         if q.shape[1]:
-            found = np.array(model.begin_slope.map(count)(self.log[:, :entries].T, q.T))
-            slope[:, :states] = found.reshape(states, count, -1).transpose(1, 0, 2)
+            slopes = np.array(model.begin_slope.map(count)(self.log[:, :entries].T, q.T))
+            slope[:, :states] = slopes.reshape(states, count, -1).transpose(1, 0, 2)
         return np.hstack([nodes, self.log[:, entries:]]), slope
 
     def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
-        """Run all intervals from nodes (K, nn) with factors (n,) and nuisances (R, nq); what diverges is not finite."""
-        model, count = self.fit.model, len(self)
-        num_nodes, num_states, width = len(model.node), len(model.states), model.num_columns
-        num_signals, split = len(self.fit.layout.signals), len(model.states) * (1 + model.num_columns)
+        """Run all from initial states (S, nn) with factors (n,) and nuisances (R, nq); what diverges is not finite."""
+        model, count = self.problem.model, len(self)
+        num_nodes, num_states = len(model.node), len(model.states)
+        num_signals, split = len(self.problem.layout.signals), num_states * (1 + model.num_columns)
         x = np.zeros((count, model.size))
         x[:, :num_states], x[:, split : split + num_nodes - num_states] = nodes[:, :num_states], nodes[:, num_states:]
-        own = np.arange(num_nodes)
+        entry = np.arange(num_nodes)
         rows = np.where(
-            own < num_states,
-            num_states + own * num_states + own,
-            split + (num_nodes - num_states) * (1 + own) + own - num_states,
+            entry < num_states,
+            num_states + entry * num_states + entry,
+            split + (num_nodes - num_states) * (1 + entry) + entry - num_states,
         )
         x[:, rows] = 1.0
-        fixed = self.fit.fixed(factors, nuisances)[self.run]
+        fixed = self.problem.fixed(factors, nuisances)[self.run]
         with np.errstate(all="ignore"):
             run = run_compiled if self.native else run_machine
-            end, record = run(self.fit.layout, x, fixed, self.known, self.seen)
-        parts = [
-            end[:, a:b].reshape(count, 1 + width, -1).transpose(0, 2, 1) for a, b in ((0, split), (split, model.size))
-        ]
-        both = np.concatenate(parts, axis=1)
-        slope = np.zeros((count, num_nodes, width + nuisances.shape[1] - self.fit.layout.num_moving))
-        slope[:, :, :width] = both[:, :, 1:]
+            record = run(self.problem.layout, x, fixed, self.known, self.seen)
         r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
-        R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).transpose(0, 1, 3, 2, 4)
-        return Evaluation(both[:, :, 0], slope, r, R.reshape(-1, R.shape[2], r.shape[1])[:count])
+        R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).swapaxes(3, 4)
+        return Evaluation(r, R.reshape(-1, r.shape[1], R.shape[4])[:count])
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Every prediction as a whole, from its own start: single shooting.
+    """Residuals of all predictions and their slopes.
 
     factors (n,), nuisances (R, nq) and away (S, nn): starts less what was measured, all in prior widths (away is empty
     where starts are as measured). r : (m,) weighted residuals; by_factor (m, n), by_nuisance (m, nq), by_start (m, nn)
     their slopes. segment, run, time, signals : (m,) where each belongs.
     """
 
-    fit: Fit
+    problem: Problem
     factors: Array
     nuisances: Array
     away: Array
@@ -311,10 +289,9 @@ class Prediction:
         e, J, spent = root * self.r, root[:, None] * self.by_factor, np.zeros(len(self.r))
         if not (self.nuisances.size or self.away.size) or not np.isfinite(e).all():
             return e, J, spent
-        for run in range(len(self.fit.runs)):
-            rows = np.flatnonzero(self.run == run)
-            A, xi = self._unknown(run, rows)
-            A *= root[rows, None]
+        for run in range(len(self.problem.runs)):
+            rows = self.rows(run)
+            A, xi = self.unknown(run, rows, root)
             U, s, _ = np.linalg.svd(A, full_matrices=False)
             shrunk = U * (1 / np.sqrt(1 + s**2) - 1)
             own = e[rows] - A @ xi
@@ -322,57 +299,73 @@ class Prediction:
             spent[rows] = (U**2) @ (s**2 / (1 + s**2))
         return e, J, spent
 
-    def _unknown(self, run: int, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Slopes (rows, nuisances and starts of the run's segments), and where those stand."""
+    def rows(self, run: int) -> slice:
+        """Rows of a run, which lie together."""
+        first, last = np.searchsorted(self.run, [run, run + 1])
+        return slice(int(first), int(last))
+
+    def unknown(self, run: int, rows: slice, root: Array) -> tuple[Array, Array]:
+        """Slopes (rows, k) in a run's nuisances and initial states, times `root` (m,), and the values of those (k,)."""
         parts, xi = [self.by_nuisance[rows]], [self.nuisances[run]]
         if self.away.size:
-            for segment in np.unique(self.segment[rows]):
-                parts.append(self.by_start[rows] * (self.segment[rows] == segment)[:, None])
-                xi.append(self.away[segment])
-        return np.hstack(parts), np.concatenate(xi)
+            segments = np.unique(self.segment[rows])
+            own = self.segment[rows][:, None] == segments  # (rows, segments)
+            parts.append((own[:, :, None] * self.by_start[rows][:, None]).reshape(len(own), -1))
+            xi.append(self.away[segments].ravel())
+        return np.hstack(parts) * root[rows, None], np.concatenate(xi)
 
     def named(self) -> dict[str, dict[str, float]]:
         """Run -> nuisance -> value [SI]; initial states as differences from the measured ones."""
-        fit, result = self.fit, dict[str, dict[str, float]]()
-        values = fit.centres + fit.widths * self.nuisances
-        for number, run in enumerate(fit.runs):
-            result[run] = dict(zip(fit.names, values[number].tolist(), strict=True))
-            own = [i for i, segment in enumerate(fit.segments) if segment.run == number] if self.away.size else []
+        problem, result = self.problem, dict[str, dict[str, float]]()
+        values = problem.centres + problem.widths * self.nuisances
+        for number, run in enumerate(problem.runs):
+            result[run] = dict(zip(problem.names, values[number].tolist(), strict=True))
+            own = [i for i, segment in enumerate(problem.segments) if segment.run == number] if self.away.size else []
             for place, i in enumerate(own):
-                for name, away, size in zip(fit.model.node, self.away[i], fit.node_scale, strict=True):
+                for name, away, size in zip(problem.model.node, self.away[i], problem.node_scale, strict=True):
                     key = f"initial_state.{name}" if len(own) == 1 else f"initial_state.{place + 1}.{name}"
-                    result[run][key] = float(away * size * (fit.start_width or 0.0))
+                    result[run][key] = float(away * size * (problem.start_width or 0.0))
         return result
 
 
-def predict(fit: Fit, factors: Array, nuisances: Array, nodes: Array | None = None) -> Prediction:
-    """Run every segment whole; nuisances (R, nq) in prior widths, nodes (S, nn) to begin from (default: the log)."""
-    intervals = fit.whole
-    q = fit.centres + fit.widths * nuisances
-    measured, slope = intervals.begin(q)
-    free = fit.start_width is not None and nodes is not None
-    begun = nodes if free and nodes is not None else measured
-    found = intervals.evaluate(begun, factors, q)
-    num_nodes, n, num_signals = len(fit.model.node), fit.num_factors, len(fit.layout.signals)
-    R = found.R.transpose(0, 2, 1)  # (S, N ny, nc)
-    by_node, by_factor, by_q = np.split(R, [num_nodes, num_nodes + n], axis=2)
-    width = fit.start_width or 0.0
-    with np.errstate(all="ignore"):
-        by_q, by_start = (by_q + by_node @ slope) * fit.widths, by_node * (fit.node_scale * width)
-    keep = (intervals.weight > 0).reshape(len(intervals), -1)
+def predict(problem: Problem, factors: Array, nuisances: Array, away: Array | None = None) -> Prediction:
+    """Run every prediction from its start.
+
+    Parameters
+    ----------
+    nuisances : (R, nq) in prior widths. away : (S, nn) initial states less those of the log, in prior widths of
+        `initial_state`; default, or where those are not free: none.
+    """
+    whole = problem.whole
+    q = problem.centres + problem.widths * nuisances
+    measured, slope = whole.begin(q)
+    width, begun = problem.start_width or 0.0, measured
+    if problem.start_width is None:
+        away = np.zeros((0, 0))
+    elif away is None:
+        away = np.zeros_like(measured)
+    if away.size:
+        begun = measured + width * problem.node_scale * away
+    evaluation = whole.evaluate(begun, factors, q)
+    num_nodes, n, num_signals = len(problem.model.node), problem.num_factors, len(problem.layout.signals)
+    keep = (whole.weight > 0).reshape(len(whole), -1)
     where, place = np.nonzero(keep)
-    away = (begun - measured) / (fit.node_scale * fit.start_width) if fit.start_width is not None else np.zeros((0, 0))
+    R = evaluation.R[keep]  # (m, nc)
+    by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
+    if by_q.size:
+        with np.errstate(all="ignore"):
+            by_q = (by_q + np.einsum("mi,mij->mj", by_start, slope[where])) * problem.widths
     return Prediction(
-        fit=fit,
+        problem=problem,
         factors=factors,
         nuisances=nuisances,
         away=away,
-        r=found.r[keep],
-        by_factor=by_factor[keep],
-        by_nuisance=by_q[keep],
-        by_start=by_start[keep],
+        r=evaluation.r[keep],
+        by_factor=R[:, num_nodes : num_nodes + n],
+        by_nuisance=by_q,
+        by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],
         segment=where,
-        run=intervals.run[where],
-        time=np.repeat(intervals.time, num_signals, axis=1).reshape(len(intervals), -1)[keep],
-        signals=np.array(fit.layout.signals)[place % num_signals],
+        run=whole.run[where],
+        time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole), -1)[keep],
+        signals=np.array(problem.layout.signals)[place % num_signals],
     )

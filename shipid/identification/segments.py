@@ -80,7 +80,7 @@ def cut_segments(
         half = f", half of {horizon:g} s" if horizon and wanted == horizon / 2 else ""
         message = f"{without!r} has no unbroken stretch of {wanted:g} s{half}: predict less far, or leave it out"
         raise DataError(message, path="runs")
-    return result
+    return sorted(result, key=lambda segment: segment.run)
 
 
 def _cut(

@@ -11,26 +11,22 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.identification.problem import BLOCK, Identify, overrides
-from shipid.identification.residuals import Fit, Prediction, build, predict
-from shipid.identification.shooting import Point, Progress, Result, loss, poses, solve
+from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
+from shipid.identification.residuals import Problem, build
+from shipid.identification.settings import BLOCK, Identify
+from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import inverted
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-NEAR = 1e-6  # of a factor: so close to a bound it stands at it
-WORDS = {
-    "Solve_Succeeded": "ok",
-    "Solved_To_Acceptable_Level": "ok",
-    "Infeasible_Problem_Detected": "infeasible",
-    "Invalid_Number_Detected": "diverged",
-    "User_Requested_Stop": "stopped",
-}
+NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
+ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
+"""Setting `start` -> beginnings in the order in which they are tried, until one converges."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What was found.
+    """The end of a fit: estimates, what remains of the residuals, and how it went.
 
     Parameters
     ----------
@@ -41,13 +37,13 @@ class Solution:
         time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
         With huber each is scaled by the square root of its weight, and their squares sum to less than that.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
-    prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) where they stand.
+    prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) their means.
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
     spent : (m,) share of each residual that the nuisances have taken.
     objective_start, objective : sum of squares at the start, from the measured states, and at the end.
     status, sentence : `ok`, `refused` (converged to values that the vessel's own checks refuse), `not converged`,
-        `infeasible`, `diverged` or `stopped`, and what that means here.
-    at_bound : (n,) whether the estimate stands at a bound. held : (n,) factors that are not free: dropped, or given
+        `diverged` or `stopped`, and what that means here.
+    at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     """
 
@@ -74,8 +70,8 @@ class Solution:
     sentence: str
     at_bound: NDArray[np.bool_]
     held: NDArray[np.bool_]
+    point: Point = field(repr=False)
     dropped: tuple[str, ...] = ()
-    point: Point | None = field(default=None, repr=False)
 
     @property
     def identified(self) -> Vessel:
@@ -103,117 +99,87 @@ def identify(
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
     begun = time.perf_counter()
-    fit = build(vessel, dataset, runs, settings)
-    factors = _start(fit, dataset, start)
-    solution = _solved(fit, factors, start.point if isinstance(start, Solution) else None, progress, begun)
+    problem = build(vessel, dataset, runs, settings)
+    result, objective_start = _searched(problem, dataset, start, progress)
+    solution = _solution(problem, result, objective_start, time.perf_counter() - begun)
     targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
     while settings.drop is not None and solution.status in ("ok", "refused"):
         weakest = _weakest(solution, settings.drop, targets)
         if weakest is None:
             break
-        fit = _without(fit, weakest, targets[weakest])
-        dropped = (*solution.dropped, fit.unknown.paths[weakest])
-        solution = _solved(fit, solution.factors, solution.point, progress, begun, solution.objective_start)
-        solution = replace(solution, dropped=dropped)
+        problem = _without(problem, weakest, targets[weakest])
+        dropped = (*solution.dropped, problem.unknown.paths[weakest])
+        factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
+        result = search(problem, factors, _point(result), progress, before=result.iterations)
+        solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
     return solution
 
 
-def _start(fit: Fit, dataset: Dataset, start: Mapping[str, float] | Solution | None) -> Array:
-    """Factors to begin with, within the bounds."""
-    unknown, settings = fit.unknown, fit.settings
+def _searched(
+    problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
+) -> tuple[Result, float]:
+    """The end of the first search that converges, and the objective where it all began."""
     if isinstance(start, Solution):
-        start = dict(zip(start.paths, start.factors.tolist(), strict=True))
-    factors = unknown.centre.copy()
-    if start is not None:
-        for path, factor in start.items():
-            if path not in unknown.paths:
-                message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
-                raise DocumentError(message, file=fit.vessel.file, path=f"{BLOCK}.start")
-            factors[unknown.paths.index(path)] = factor
-    elif settings.start == "inverse":
-        from shipid.identification.inverse import inverse_dynamics  # it needs all of this package
-
-        own = overrides(settings, fit.runs, fit.vessel, fit.layout.model.environment, dataset.runs)
-        weather = {
-            run: {key.split(".", 1)[1]: value for key, value in values.items() if key.startswith("environment.")}
-            for run, values in own.items()
-        }
-        found = inverse_dynamics(
-            fit.vessel, dataset, fit.runs, unknown.groups, scale=unknown.scale, prior=unknown.prior, environment=weather
-        )
-        return _better(fit, found.factors, factors)
-    return np.clip(factors, unknown.low, unknown.high)
-
-
-def _better(fit: Fit, first: Array, second: Array) -> Array:
-    """Whichever predicts better: what explains accelerations step by step may diverge in a long prediction."""
-    unknown = fit.unknown
-    starts = [np.clip(factors, unknown.low, unknown.high) for factors in (first, second)]
-    begun = [next(iter(poses(fit, factors)))[1] for factors in starts]
-    objectives = [_objective(fit, predict(fit, x, b.nuisances)) for x, b in zip(starts, begun, strict=True)]
-    return starts[int(np.argmin(objectives))]
-
-
-def _solved(
-    fit: Fit,
-    factors: Array,
-    earlier: Point | None,
-    progress: Progress | None,
-    begun: float,
-    objective_start: float | None = None,
-) -> Solution:
-    """One solve and what it says."""
-    before = 0
-    for problem, begin in poses(fit, factors):
-        if objective_start is None:
-            objective_start = _objective(fit, predict(fit, factors, begin.nuisances))
-        result = solve(problem, _warm(begin, factors, earlier), progress, before)
-        end = predict(fit, result.point.factors, result.point.nuisances, result.point.nodes[problem.starts])
-        word, before = WORDS.get(result.word, "not converged"), result.iterations
-        if word == "ok" and not np.isfinite(end.r).all():
-            word = "diverged"
-        if word in ("ok", "stopped"):
+        factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+        point = start.point if _fits(start.point, origin(problem)) else origin(problem)
+    else:
+        factors, point = _factors(problem, start or {}), origin(problem)
+    objective_start = evaluate(problem, factors, point).objective
+    ways = ORDER["base"] if start is not None else ORDER[problem.settings.start]
+    result, before = None, 0
+    for way in ways:
+        begin = factors
+        if way == "growing":
+            begin, before, stopped = grown(problem, dataset, factors, progress, before)
+            if stopped:
+                value = evaluate(problem, begin, point)
+                return Result(begin, value.at, value.objective, before, "stopped"), objective_start
+        elif way == "inverse":
+            begin = by_inverse_dynamics(problem, dataset)
+        found = search(problem, begin, point, progress, before=before)
+        before = found.iterations
+        if result is None or found.status in ("ok", "stopped") or found.objective < result.objective:
+            result = found
+        if found.status in ("ok", "stopped"):
             break
-    assert objective_start is not None
-    where = None
-    if word in ("not converged", "diverged"):
-        lost = problem.lost(begin)
-        word, where = ("diverged", fit.runs[problem.intervals.run[np.argmax(lost)]]) if lost.any() else (word, None)
-    return _solution(fit, result, end, objective_start, word, where, time.perf_counter() - begun)
+    assert result is not None
+    return result, objective_start
 
 
-def _warm(begin: Point, factors: Array, earlier: Point | None) -> Point:
-    """Where an earlier solution ended, if it was of the same shape."""
-    if earlier is None or earlier.nodes.shape != begin.nodes.shape or earlier.nuisances.shape != begin.nuisances.shape:
-        return begin
-    return Point(factors, earlier.nuisances, earlier.nodes)
+def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
+    """Factors to begin with (n,), within the bounds: those given, the others of the base."""
+    unknown = problem.unknown
+    factors = unknown.centre.copy()
+    for path, factor in start.items():
+        if path not in unknown.paths:
+            message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
+            raise DocumentError(message, file=problem.vessel.file, path=f"{BLOCK}.start")
+        factors[unknown.paths.index(path)] = factor
+    return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
 
-def _objective(fit: Fit, at: Prediction) -> float:
-    """Sum of squares, priors included; inf where a prediction diverges."""
-    threshold = fit.settings.threshold if fit.settings.loss == "huber" else np.inf
-    prior = (at.factors - fit.unknown.centre) / fit.unknown.prior
-    with np.errstate(all="ignore"):
-        squares = loss(at.r, threshold)[0].sum() + (prior**2).sum()
-        total = float(squares + (at.nuisances**2).sum() + (at.away**2).sum())
-    return total if np.isfinite(total) else float("inf")
+def _fits(point: Point, other: Point) -> bool:
+    """Whether the unknowns of the runs are as many."""
+    return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
-def _solution(
-    fit: Fit, result: Result, end: Prediction, objective_start: float, word: str, lost: str | None, seconds: float
-) -> Solution:
-    unknown, settings = fit.unknown, fit.settings
-    factors = result.point.factors
+def _point(result: Result) -> Point:
+    return Point(result.at.nuisances, result.at.away)
+
+
+def _solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
+    unknown, settings, end, word = problem.unknown, problem.settings, result.at, result.status
+    factors = result.factors
     threshold = settings.threshold if settings.loss == "huber" else np.inf
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
     residuals, jacobian, spent = end.marginal(threshold)
-    values, sentence = unknown.values(factors), _sentence(fit, result, word, lost, at_bound)
-    reason = _refusal(fit.vessel, values)
+    values, sentence = unknown.values(factors), _sentence(problem, result, at_bound)
+    reason = _refusal(problem.vessel, values)
     if reason is not None:
         word, sentence = ("refused" if word == "ok" else word), f"{sentence}; {reason}"
     return Solution(
-        vessel=fit.vessel,
-        runs=fit.runs,
+        vessel=problem.vessel,
+        runs=problem.runs,
         settings=settings,
         paths=unknown.paths,
         factors=factors,
@@ -235,7 +201,7 @@ def _solution(
         sentence=sentence,
         at_bound=at_bound,
         held=unknown.low == unknown.high,
-        point=result.point,
+        point=_point(result),
     )
 
 
@@ -248,22 +214,23 @@ def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
     return None
 
 
-def _sentence(fit: Fit, result: Result, word: str, lost: str | None, at_bound: NDArray[np.bool_]) -> str:
+def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
     """What happened, and what to do about it."""
-    if word == "ok":
-        stand = [path for path, there in zip(fit.unknown.paths, at_bound, strict=True) if there]
-        tail = f"; at a bound, so without an interval: {', '.join(stand)}" if stand else ""
+    if result.status == "ok":
+        limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
+        tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
         return f"converged in {result.iterations} iterations{tail}"
-    if word == "diverged":
-        place = f"run {lost!r} diverges" if lost is not None else "a prediction diverges"
-        return f"{place} within {fit.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
-    if word == "infeasible":
-        return "no factors within the bounds make the predictions hang together: widen the bounds, or start elsewhere"
-    if word == "stopped":
-        return f"stopped after {result.iterations} iterations: what stands here is not the optimum"
+    if result.status == "diverged":
+        bad = result.at.run[~np.isfinite(result.at.r)]
+        place = f"run {problem.runs[bad[0]]!r} diverges" if len(bad) else "a prediction diverges"
+        return (
+            f"{place} within {problem.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
+        )
+    if result.status == "stopped":
+        return f"stopped after {result.iterations} iterations: this is not the optimum"
     return (
-        f"not converged after {result.iterations} iterations ({result.word}): give priors or bounds, fix or tie "
-        "parameters that the data cannot tell apart, or shorten the horizon"
+        f"not converged after {result.iterations} iterations: give priors or bounds, fix or tie parameters that the "
+        "data cannot tell apart, or shorten the horizon"
     )
 
 
@@ -281,8 +248,8 @@ def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None
     return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
 
 
-def _without(fit: Fit, number: int, target: float) -> Fit:
-    """The same fit with one factor held."""
-    low, high = fit.unknown.low.copy(), fit.unknown.high.copy()
+def _without(problem: Problem, number: int, target: float) -> Problem:
+    """The problem with one factor held at a value."""
+    low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
-    return replace(fit, unknown=replace(fit.unknown, low=low, high=high))
+    return replace(problem, unknown=replace(problem.unknown, low=low, high=high))

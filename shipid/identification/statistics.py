@@ -14,7 +14,7 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
 
 None of them sees a bias. Where every prediction has a start of its own to be found, coloured residuals pull the factors
 (incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is against what the
-residuals remember; `shipid.identification.agreement` tests for that with a second fit.
+residuals remember: compare with a fit over a longer one.
 
 Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169; Pustejovsky, Tipton,
 Journal of Business & Economic Statistics 36 (2018) 672 (also that nuisances may be projected out first); Tipton,
@@ -51,12 +51,11 @@ WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; rows of a run that tell any
 BLOCK = 10.0  # length of a block in integrated correlation times
-LEAST = 0.1  # weight under which a factor is left out of a direction
 KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
 
 
 @dataclass(frozen=True)
-class Fit:
+class LinearFit:
     """What a fit leaves behind, as plain arrays; m residuals, n parameters.
 
     Parameters
@@ -86,7 +85,7 @@ class Fit:
     runs: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, solution: Solution) -> Fit:
+    def of(cls, solution: Solution) -> LinearFit:
         """What a solution of `identify` holds of it."""
         return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
 
@@ -160,7 +159,7 @@ class Statistics:
     sentences : why, for each parameter. correlations : (n, n).
     """
 
-    fit: Fit
+    fit: LinearFit
     covariances: Mapping[Kind, Covariance]
     chosen: Kind
     errors: Array
@@ -180,24 +179,8 @@ class Statistics:
         scaled = self.fit.jacobian / levels[:, None]
         return np.asarray(scaled.T @ scaled)
 
-    def directions(self) -> list[tuple[dict[str, float], float]]:
-        """Combinations of factors at right angles in what is seen, best known first: (path -> weight, standard error).
 
-        The weight of the greatest is 1 and those under 0.1 are left out; the error is how far factors may move along
-        it until the data object, priors not counted.
-        """
-        information, found = self.information, []
-        for direction in self.collinearity.directions:
-            weights = direction / direction[np.argmax(np.abs(direction))]
-            own = {self.collinearity.paths[j]: float(weights[j]) for j in np.flatnonzero(np.abs(weights) >= LEAST)}
-            full = np.zeros(len(self.fit.paths))
-            full[[self.fit.paths.index(path) for path in self.collinearity.paths]] = weights
-            seen = float(np.sqrt(full @ information @ full))
-            found.append((own, 1 / seen if seen > 0 else float("inf")))
-        return sorted(found, key=lambda one: one[1])
-
-
-def statistics(fit: Fit, widest: float = WIDEST) -> Statistics:
+def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
     """Judge a fit: covariances, 95 % intervals, identifiability.
 
     A factor is identified if the data alone, without its prior, put its 95 % interval within +-`widest` base values: by
@@ -248,7 +231,7 @@ def _last(found: Mapping[Kind, Covariance]) -> Kind:
     return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
 
 
-def _nothing(fit: Fit) -> Statistics:
+def _nothing(fit: LinearFit) -> Statistics:
     """What is known where no factor is free."""
     n, jacobian = len(fit.paths), fit.jacobian[:, :0]
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
@@ -261,7 +244,7 @@ def _nothing(fit: Fit) -> Statistics:
     )
 
 
-def _free_places(fit: Fit) -> Index:
+def _free_places(fit: LinearFit) -> Index:
     """Columns of the factors that are neither held nor at a bound."""
     fixed = np.zeros(len(fit.paths), dtype=bool)
     for own in (fit.at_bound, fit.held):
@@ -269,17 +252,17 @@ def _free_places(fit: Fit) -> Index:
     return np.flatnonzero(~fixed)
 
 
-def _free(fit: Fit, free: Index) -> Fit:
+def _free(fit: LinearFit, free: Index) -> LinearFit:
     """The fit of these columns, all others held."""
     widths = _widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
-    return Fit(
+    return LinearFit(
         paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent,
         runs=fit.runs,
     )  # fmt: skip
 
 
-def _widths(fit: Fit) -> Array:
+def _widths(fit: LinearFit) -> Array:
     return np.full(len(fit.paths), np.inf) if fit.prior_widths is None else np.asarray(fit.prior_widths, dtype=float)
 
 
@@ -305,7 +288,7 @@ class _Basis:
     held: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, fit: Fit) -> _Basis:
+    def of(cls, fit: LinearFit) -> _Basis:
         prior = 1 / _widths(fit) ** 2
         inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian + np.diag(prior))
         leverage = np.einsum("mi,ij,mj->m", fit.jacobian, inverse, fit.jacobian)
@@ -323,7 +306,7 @@ def inverted(information: Array) -> tuple[Array, NDArray[np.bool_]]:
     return inverse, np.asarray((np.abs(vectors[:, silent]) > np.sqrt(UNSEEN)).any(axis=1))
 
 
-def whiteness(fit: Fit, leverage: Array | None = None) -> dict[str, Whiteness]:
+def whiteness(fit: LinearFit, leverage: Array | None = None) -> dict[str, Whiteness]:
     """Colour and level of the residuals of each signal; `leverage` (m,) is what the parameters took of them."""
     taken = (np.zeros(len(fit.residuals)) if leverage is None else leverage) + (0.0 if fit.spent is None else fit.spent)
     labels = np.array(fit.signals)
@@ -380,7 +363,7 @@ def _lagged(run: Array) -> Array:
     return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(run, 2 * size)) ** 2)[:size]) if run.any() else np.zeros(size)
 
 
-def _covariances(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
+def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
     """Fisher and sandwich, and blocks where neither is to be trusted."""
     found: dict[Kind, Covariance] = {"fisher": fisher(fit, basis, colours)}
     found["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
@@ -390,7 +373,7 @@ def _covariances(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> d
     return found
 
 
-def fisher(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
+def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
     """Covariance for errors that are independent from sample to sample, each signal with its own level."""
     labels = np.array(fit.signals)
     parts, freedoms = [], []
@@ -406,7 +389,7 @@ def fisher(fit: Fit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covaria
     return Covariance("fisher", matrix, _freedom(total, np.asarray(squares)), not coloured, reason)
 
 
-def declared_error(fit: Fit, path: str) -> float:
+def declared_error(fit: LinearFit, path: str) -> float:
     """Standard error of one factor if residuals err independently, by the declared standard deviations."""
     inner = _free(fit, _free_places(fit))
     inverse = _Basis.of(inner).inverse
@@ -419,7 +402,7 @@ def _freedom(total: Array, squares: Array) -> Array:
     return np.asarray(np.where(squares > 0, total**2 / np.where(squares > 0, squares, 1.0), 1e9))
 
 
-def sandwich(fit: Fit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
+def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
     """Cluster-robust covariance (CR2) with Satterthwaite's degrees of freedom under independent errors."""
     n = len(fit.paths)
     root = _root(basis.inverse)
@@ -464,7 +447,7 @@ def _satterthwaite(own: Array, shared: Array) -> float:
     return float((own.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0
 
 
-def blocks(fit: Fit, length: float) -> Index:
+def blocks(fit: LinearFit, length: float) -> Index:
     """Clusters (m,) of about `length` samples each: runs cut into equal stretches of the same times for all signals."""
     labels, result, count = np.array(fit.signals), np.zeros(len(fit.residuals), dtype=np.int64), 0
     for run in np.unique(fit.clusters):
@@ -478,7 +461,7 @@ def blocks(fit: Fit, length: float) -> Index:
     return result
 
 
-def _alone(fit: Fit, best: Covariance, plain: Covariance, colours: Mapping[str, Whiteness]) -> Array:
+def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping[str, Whiteness]) -> Array:
     """Half-widths (n,) from the data alone: Fisher's without priors, widened as the chosen form widens it."""
     levels = np.array([colours[name].level for name in fit.signals])
     inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian)
@@ -489,7 +472,7 @@ def _alone(fit: Fit, best: Covariance, plain: Covariance, colours: Mapping[str, 
 
 
 def _sentences(
-    fit: Fit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
+    fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
 ) -> tuple[str, ...]:
     """One sentence for each parameter: how well it is known or why not."""
     free, told = _free_places(fit), list[str]()
@@ -516,20 +499,3 @@ def _sentences(
         else:
             told.append(f"{name} is not identified: no effect of its own on what these data hold")
     return tuple(told)
-
-
-def identifiable_subset(fit: Fit, widest: float = WIDEST) -> tuple[str, ...]:
-    """Parameters that the data can carry at once, the others held: the longest run of the pivoted ones that is known.
-
-    Pivoted QR of the sensitivities puts first what adds most that is new (Golub, Klema, Stewart 1976; for parameters
-    Velez-Reyes, Verghese, CDC 1995); the run ends before the first set with an interval wider than `widest`.
-    """
-    from scipy.linalg import qr
-
-    free = _free_places(fit)
-    order = free[qr(fit.jacobian[:, free], mode="economic", pivoting=True)[2]] if len(free) else free
-    for count in range(len(order), 0, -1):
-        own = np.sort(order[:count])
-        if (statistics(_free(fit, own), widest).alone <= widest).all():
-            return tuple(fit.paths[j] for j in own)
-    return ()

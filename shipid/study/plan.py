@@ -17,7 +17,7 @@ from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
-from shipid.identification.problem import Identify, unknowns
+from shipid.identification.settings import Identify, unknowns
 from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.physics.signals import SIGNALS, named

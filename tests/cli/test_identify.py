@@ -23,7 +23,7 @@ def test_options_are_read_before_anything_is_loaded(tmp_path: Path) -> None:
 
 def test_widths_of_nuisances() -> None:
     from shipid.cli.identify import _widths
-    from shipid.identification.problem import WIDE
+    from shipid.identification.settings import WIDE
 
     assert _widths(["current", "heading_bias"]) == ["current", "heading_bias"]
     assert _widths(["current=0.3", "heading_bias"]) == {"current": 0.3, "heading_bias": WIDE.get("heading_bias", 1.0)}

@@ -15,7 +15,7 @@ import numpy as np
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.identification.problem import Identify
+from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping

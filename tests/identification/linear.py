@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from shipid.identification.statistics import Fit
+from shipid.identification.statistics import LinearFit
 
 SIGNALS = ("u", "v", "r")
 LEVELS = {"u": 1.3, "v": 0.6, "r": 1.0}  # what the noise is, over what was declared
@@ -38,7 +40,9 @@ def noise(rng: np.random.Generator, runs: int, samples: int, phi: float) -> np.n
     return (error * np.array([LEVELS[name] for name in SIGNALS])[:, None]).ravel()
 
 
-def fitted(jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signals: tuple[str, ...], **more) -> Fit:  # type: ignore[no-untyped-def]
+def fitted(
+    jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signals: tuple[str, ...], **more: Any
+) -> LinearFit:
     """Least squares on J (x - truth) = error; the factors returned are 1 + estimate - truth."""
     widths = more.get("prior_widths")
     precision = np.zeros(jacobian.shape[1]) if widths is None else 1 / np.asarray(widths) ** 2
@@ -46,4 +50,4 @@ def fitted(jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signal
         np.vstack([jacobian, np.diag(np.sqrt(precision))]), np.append(error, 0 * precision), rcond=None
     )[0]
     paths = tuple(f"p{j}" for j in range(jacobian.shape[1]))
-    return Fit(paths, 1 + away, error - jacobian @ away, -jacobian, clusters, signals, **more)
+    return LinearFit(paths, 1 + away, error - jacobian @ away, -jacobian, clusters, signals, **more)

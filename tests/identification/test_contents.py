@@ -3,7 +3,7 @@ from pathlib import Path
 from shipid.data.dataset import Dataset
 from shipid.identification.contents import identification_content
 from shipid.identification.outcome import run_identification
-from shipid.identification.problem import Identify
+from shipid.identification.settings import Identify
 from shipid.simulation.measured import measure_standard
 from shipid.vessel.load import load_vessel
 

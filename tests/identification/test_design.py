@@ -7,7 +7,7 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
-from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, plan, rank
+from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, rank
 from shipid.simulation.manoeuvre import (
     Approached,
     CrashStop,
@@ -102,12 +102,6 @@ def test_sensitivities_are_those_of_the_trajectory() -> None:
     sharp = informed(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[0].information
     assert (np.diag(short) < np.diag(FOUND[0].information)).all()
     np.testing.assert_allclose(sharp, 4 * FOUND[0].information, rtol=1e-9)
-
-
-def test_a_programme_goes_on_from_what_is_known_by_then() -> None:
-    found = plan(FOUND, PATHS, 3, by="gain")
-    assert found["manoeuvre"][0] == rank(FOUND, PATHS, by="gain")["manoeuvre"][0]
-    assert (np.diff(found["gain"]) < 0).all()
 
 
 def test_limits_of_the_actuators_hold() -> None:

@@ -37,7 +37,7 @@ def without(dataset: Dataset, runs: list[str], others: list[str]) -> Dataset:
 
 def test_half_of_the_trials_predict_the_other(trials: Dataset) -> None:
     """Odd and even tests in turn, from the template, with the settings of the study `full-scale`: mean RMS of both."""
-    settings = next(model.identify for model in read_plan("full-scale").models if model.identify is not None)
+    settings = next(one.identify for one in read_plan("full-scale").foundations if one.identify is not None)
     template = load_vessel("gunnerus-33.9-template")
     odd, even = trials.runs[::2], trials.runs[1::2]
     errors = []

@@ -25,10 +25,10 @@ from shipid.identification.outcome import (
     run_identification,
     write_patch,
 )
-from shipid.identification.problem import Identify
 from shipid.identification.residuals import build, predict
+from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import Fit, autocorrelation, statistics
+from shipid.identification.statistics import LinearFit, autocorrelation, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -65,7 +65,7 @@ def test_it_tells_what_the_parts_tell(found: Identified, log: Dataset) -> None:
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert found.runs == alone.runs
     assert found.held_out == ("M05",)
-    known = statistics(Fit.of(alone))
+    known = statistics(LinearFit.of(alone))
     assert np.allclose(found.estimates["factor"], alone.factors, rtol=1e-6)
     assert np.allclose(found.estimates["factor_error"], known.errors, rtol=1e-4)
     for row in found.estimates.to_dict("records"):

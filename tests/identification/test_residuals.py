@@ -1,4 +1,4 @@
-"""Laws of the variational step: derivatives are differences, engines agree, single and multiple shooting meet."""
+"""Laws of the variational step: derivatives are differences, residuals are those of the rollout, engines agree."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 from shipid.engine.native import compiler
 from shipid.engine.rollout import rollout
 from shipid.identification import residuals
-from shipid.identification.problem import NUISANCES, Identify
-from shipid.identification.residuals import Intervals, build, predict
+from shipid.identification.residuals import Predictions, build, predict
+from shipid.identification.settings import NUISANCES, Identify
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED, variety
@@ -39,8 +39,8 @@ def test_slopes_are_differences(name: str) -> None:
     rng = np.random.default_rng(3)
     factors = fit.unknown.centre + rng.normal(0, 0.02, fit.num_factors)
     nuisances = np.abs(rng.normal(0.5, 0.1, (2, len(fit.names))))
-    start = Intervals(fit, 0).guess + rng.normal(0, 1e-3, (2, len(fit.model.node)))
-    here = predict(fit, factors, nuisances, start)
+    away = rng.normal(0, 1e-2, (2, len(fit.model.node)))
+    here = predict(fit, factors, nuisances, away)
     own = [(here.by_factor[:, i], _moved(i), 0) for i in range(fit.num_factors)]
     own += [(here.by_nuisance[:, i], 0, _moved(i)) for i in range(len(fit.names))]
     for slope, by_factor, by_nuisance in own:
@@ -52,17 +52,11 @@ def test_slopes_are_differences(name: str) -> None:
                 factor[by_factor - 1] += sense * 1e-5
             if by_nuisance:
                 other[:, by_nuisance - 1] += sense * 1e-5
-            # a start that is free stays as far from the measured one as it was
-            moved = start + Intervals(fit, 0).begin(fit.centres + fit.widths * other)[0]
-            moved -= Intervals(fit, 0).begin(fit.centres + fit.widths * nuisances)[0]
-            ends.append(predict(fit, factor, other, moved).r)
+            ends.append(predict(fit, factor, other, away).r)
         difference = (ends[0] - ends[1]) / 2e-5
         assert np.abs(slope - difference).max() < 1e-5 * (1 + np.abs(difference).max())
-    for i, size in enumerate(fit.node_scale):
-        ends = [
-            predict(fit, factors, nuisances, start + sense * 1e-5 * size * np.eye(len(fit.node_scale))[i]).r
-            for sense in (1, -1)
-        ]
+    for i, unit in enumerate(np.eye(len(fit.node_scale))):
+        ends = [predict(fit, factors, nuisances, away + sense * 1e-5 * unit).r for sense in (1, -1)]
         difference = (ends[0] - ends[1]) / 2e-5
         assert np.abs(here.by_start[:, i] - difference).max() < 1e-5 * (1 + np.abs(difference).max())
 
@@ -97,11 +91,12 @@ def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
     for least in (np.inf, 0.0):
         monkeypatch.setattr(residuals, "COMPILE_FROM", least)
-        intervals = Intervals(fit, 5)
-        assert intervals.native is (least == 0.0)
+        side_by_side = Predictions(fit)
+        assert side_by_side.native is (least == 0.0)
         nuisances = fit.centres + 0.5 * fit.widths * np.ones((3, 1))
-        found.append(intervals.evaluate(intervals.guess, np.full(fit.num_factors, 1.1), nuisances))
-    for key in ("end", "slope", "r", "R"):
+        begun = side_by_side.begin(nuisances)[0]
+        found.append(side_by_side.evaluate(begun, np.full(fit.num_factors, 1.1), nuisances))
+    for key in ("r", "R"):
         one, other = (getattr(each, key) for each in found)
         assert np.abs(one - other).max() <= 1e-12 * (1 + np.abs(one).max())
 

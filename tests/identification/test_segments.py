@@ -7,9 +7,9 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.problem import Identify
-from shipid.identification.residuals import Intervals, build, predict
+from shipid.identification.residuals import Predictions, build, predict
 from shipid.identification.segments import cut_segments
+from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import changed, trials
@@ -42,12 +42,11 @@ def test_what_was_not_measured_does_not_count() -> None:
     assert np.abs(at.r).max() < 1e-9  # orders are held over ten steps: nothing is lost with the rows
 
 
-def test_the_end_of_a_segment_is_padded_without_weight() -> None:
+def test_a_shorter_segment_is_padded_without_weight() -> None:
     fit = build(SHIP, DATA, DATA.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=30))
-    intervals = Intervals(fit, 20)
-    assert len(intervals) == 6  # 20 + 10 and 20, twice
-    assert int((intervals.weight > 0).sum()) == 2 * 50 * 3
-    assert intervals.first.tolist() == [True, False, True] * 2
+    side_by_side = Predictions(fit)
+    assert side_by_side.weight.shape == (4, 30, 3)  # 30 + 20 steps, twice
+    assert (side_by_side.weight > 0).all(axis=2).sum(axis=1).tolist() == [30, 20] * 2
 
 
 def test_wind_that_was_logged_is_felt() -> None:

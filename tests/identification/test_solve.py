@@ -9,11 +9,11 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
-from shipid.identification.problem import POSITIVE, Identify, unknowns
+from shipid.identification.fit import origin, search
 from shipid.identification.residuals import build, predict
-from shipid.identification.shooting import Problem, solve
-from shipid.identification.solve import WORDS, Solution, identify
-from shipid.identification.statistics import Fit, statistics
+from shipid.identification.settings import POSITIVE, Identify, unknowns
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
 
@@ -56,13 +56,12 @@ def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> N
 
 
 @pytest.mark.parametrize("seed", [3, 5])
-def test_it_converges_from_where_single_shooting_diverges(seed: int) -> None:
+def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
     dataset, rng = trials(SHIP, runs=4), np.random.default_rng(seed)
     wanted = settings(parameters=["hull.derivatives.*"])
     fit = build(SHIP, dataset, dataset.runs, wanted)
     begin = {path: 1 + 3 * rng.uniform(-1, 1) for path in fit.unknown.paths}
-    whole = Problem(fit, 0)
-    assert WORDS.get(solve(whole, whole.start(np.array(list(begin.values())))).word) != "ok"
+    assert search(fit, np.array(list(begin.values())), origin(fit)).status == "diverged"
     found = identify(SHIP, dataset, dataset.runs, wanted, start=begin)
     assert not np.isfinite(found.objective_start)
     assert found.status == "ok"
@@ -203,8 +202,7 @@ def test_the_nuisances_are_projected_out() -> None:
     assert np.abs(found.jacobian.T @ found.residuals).max() < 1e-3 * np.abs(found.jacobian).sum(axis=0).max()
     fit = build(SHIP, noisy, noisy.runs, wanted)
     assert found.point is not None
-    firsts = found.point.nodes[Problem(fit).starts]
-    whole = predict(fit, found.factors, found.point.nuisances, firsts)
+    whole = predict(fit, found.factors, found.point.nuisances, found.point.away)
     columns = [whole.by_factor]
     for run in range(3):
         mine = (whole.run == run)[:, None]
@@ -247,7 +245,7 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     assert [path for path, there in zip(found.paths, found.held, strict=True) if there] == [
         path for path in found.paths if path in found.dropped
     ]
-    judged = statistics(Fit.of(found))
+    judged = statistics(LinearFit.of(found))
     assert np.isinf(judged.errors[found.held]).all()
     assert "dropped" in judged.sentences[found.paths.index(found.dropped[0])]
     for path in found.dropped:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.identification.statistics import Fit, blocks, identifiable_subset, statistics
+from shipid.identification.statistics import LinearFit, blocks, statistics
 from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -16,7 +16,7 @@ JACOBIAN = design(RUNS, SAMPLES, COUNT)
 CLUSTERS, NAMES = labels(RUNS, SAMPLES)
 
 
-def one(phi: float = 0.0, seed: int = 3, **more: object) -> Fit:
+def one(phi: float = 0.0, seed: int = 3, **more: object) -> LinearFit:
     return fitted(JACOBIAN, noise(np.random.default_rng(seed), RUNS, SAMPLES, phi), CLUSTERS, NAMES, **more)
 
 
@@ -91,7 +91,7 @@ def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
     found = statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
-    moved = Fit(
+    moved = LinearFit(
         tuple(fit.paths[j] for j in columns),
         fit.factors[columns],
         fit.residuals[rows],
@@ -127,18 +127,6 @@ def test_a_pair_that_acts_as_one_is_named() -> None:
     found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
     assert found.identifiable.tolist() == [False, False, True, True, True, True]
     assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 is not seen" in found.sentences[0]
-
-
-def test_directions_say_how_well_combinations_are_known() -> None:
-    """Of p0 + p1 / 2 and p0 - p1 / 2, one is known and one is not; errors are those of a fit along each alone."""
-    jacobian = JACOBIAN[:, :2].copy()
-    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-4 * jacobian[:, 1]
-    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
-    (seen, small), (unseen, wide) = found.directions()
-    assert seen == pytest.approx({"p0": 1.0, "p1": 0.5}, rel=1e-3)
-    assert unseen == pytest.approx({"p0": 1.0, "p1": -0.5}, rel=1e-3)
-    assert small < 0.01
-    assert wide > 100
 
 
 def test_what_has_no_effect_is_named() -> None:
@@ -182,7 +170,6 @@ def test_what_is_held_counts_as_known() -> None:
     assert "p3 was dropped" in found.sentences[3]
     without = replace(one(), **{"paths": tuple("abcd"), "factors": np.ones(4), "jacobian": one().jacobian[:, ~held]})
     np.testing.assert_allclose(found.errors[~held], statistics(without).errors, rtol=1e-9)
-    assert set(identifiable_subset(found.fit)) == {"p0", "p2", "p4", "p5"}
 
 
 def test_nothing_free_is_nothing_known() -> None:
@@ -192,8 +179,6 @@ def test_nothing_free_is_nothing_known() -> None:
     assert (found.low, found.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
     assert not found.identifiable.any()
     assert len(found.sentences) == COUNT
-    assert found.directions() == []
-    assert identifiable_subset(fit) == ()
 
 
 def test_nuisances_cost_degrees_of_freedom() -> None:
@@ -220,13 +205,6 @@ def test_blocks_cut_all_signals_at_the_same_times() -> None:
         u, v, r = (own[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
         assert (u == v).all()
         assert (v == r).all()
-
-
-def test_the_subset_that_data_carry() -> None:
-    jacobian = JACOBIAN.copy()
-    jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
-    fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES)
-    assert identifiable_subset(fit) == ("p1", "p2", "p3", "p4", "p5")
 
 
 def test_fits_without_a_meaning_are_refused() -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate
-from shipid.identification.problem import MOVING
+from shipid.identification.settings import MOVING
 from shipid.interrupts import uninterrupted
 from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
@@ -307,20 +307,20 @@ def _needed(ship: _Ship) -> list[int]:
 
 @lru_cache(maxsize=32)
 def scan(layout: Layout, num_steps: int) -> ca.Function:
-    """One interval on CasADi's virtual machine: (x, fixed, known, seen) -> (x at the end, outputs of each step)."""
+    """One prediction on CasADi's virtual machine: (x, fixed, known, seen) -> outputs of each step."""
     model = variation(layout)
     one = model.step
     x, fixed = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("fixed", one.size1_in(1))
     known, seen = (ca.MX.sym(name, one.size1_in(i), num_steps) for i, name in ((2, "known"), (3, "seen")))
-    path, record = one.mapaccum(num_steps)(x, ca.repmat(fixed, 1, num_steps), known, seen)
-    return ca.Function("interval", [x, fixed, known, seen], [path[:, -1], record])
+    record = one.mapaccum(num_steps)(x, ca.repmat(fixed, 1, num_steps), known, seen)[1]
+    return ca.Function("prediction", [x, fixed, known, seen], [record])
 
 
-def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> tuple[Array, Array]:
-    """Ends (K, size) and outputs (1, K, N, .) of K intervals; x (K, size), fixed (K, .), known and seen (K, N, .)."""
+def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
+    """Outputs (1, K, N, .) of K predictions; x (K, size), fixed (K, .), known and seen (K, N, .)."""
     count, num_steps = known.shape[:2]
     with uninterrupted():
-        end, record = scan(layout, num_steps).map(count)(
+        record = scan(layout, num_steps).map(count)(
             x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
         )
-    return np.array(end).T, np.array(record).T.reshape(1, count, num_steps, -1)
+    return np.array(record).T.reshape(1, count, num_steps, -1)

@@ -70,7 +70,10 @@ class Identify(BaseModel):
     threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")
     nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
     runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
-    start: Literal["inverse", "base"] = "inverse"
+    start: Literal["growing", "inverse", "base"] = Field(
+        default="growing",
+        description="where to begin: growing horizons, inverse dynamics, or the base",
+    )
     drop: Positive | None = Field(
         default=None, description="standard errors under which a factor's distance from `drop_to` is dropped"
     )

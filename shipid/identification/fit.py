@@ -1,0 +1,306 @@
+"""Nonlinear least squares: the factors that predict the runs best, by SciPy's trust region (`least_squares`, trf).
+
+What each run has unknown of itself, xi (nuisances and initial states, with a prior of width 1), is eliminated at every
+evaluation: variable projection. For given factors xi is found by Gauss-Newton steps, run by run, and the Jacobian is
+projected on what xi cannot explain. So the trust region sees the n factors alone, however many runs there are:
+
+    minimise over f    sum over runs of min over xi of (|r(f, xi)|^2 + |xi|^2)    + |(f - centre) / prior|^2
+
+Residuals and Jacobian of a run, however long, go to SciPy as the (n + 1) rows of their triangular factor, which have
+the same squares and the same gradient.
+
+Sources: Branch, Coleman, Li, SIAM Journal on Scientific Computing 21 (1999) 1 (the trust region with bounds); Golub,
+Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian of Kaufman, BIT 15 (1975) 49.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares
+
+from shipid.identification.residuals import Prediction, Problem, predict
+from shipid.interrupts import uninterrupted
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, float], object]
+TOLERANCE = 1e-10  # relative change of objective and factors at which the search ends
+MOST_EVALUATIONS = 200
+INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
+BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
+NEAR = 1e-3  # of a factor: so near a bound and pushed towards it, it is put at the bound
+
+
+@dataclass(frozen=True)
+class Point:
+    """Unknowns of the runs in prior widths: nuisances (R, q), and initial states less the measured ones (S, nn)."""
+
+    nuisances: Array
+    away: Array
+
+
+@dataclass(frozen=True)
+class Result:
+    """The end of a search.
+
+    factors : (n,). at : the prediction there. objective : sum of squares, priors included; inf where it diverges.
+    iterations : of the trust region. status : `ok`, `not converged`, `diverged` or `stopped`.
+    """
+
+    factors: Array
+    at: Prediction
+    objective: float
+    iterations: int
+    status: str
+
+
+def loss(r: Array, threshold: float) -> tuple[Array, Array]:
+    """What each residual adds to the objective, and its weight: r^2 and 1, linear beyond the threshold (Huber)."""
+    size = np.abs(r)
+    inside = size <= threshold
+    with np.errstate(all="ignore"):
+        return np.where(inside, r**2, 2 * threshold * size - threshold**2), np.where(inside, 1.0, threshold / size)
+
+
+def origin(problem: Problem) -> Point:
+    """Unknowns of the runs where nothing is wrong, but not where a slope vanishes."""
+    first = np.array([BEGIN.get(name, 0.0) for name in problem.names])
+    starts = (len(problem.segments), len(problem.model.node)) if problem.start_width is not None else (0, 0)
+    return Point(np.tile(first, (len(problem.runs), 1)), np.zeros(starts))
+
+
+def search(
+    problem: Problem,
+    factors: Array,
+    point: Point,
+    progress: Progress | None = None,
+    *,
+    before: int = 0,
+    tolerance: float = TOLERANCE,
+    most: int = MOST_EVALUATIONS,
+) -> Result:
+    """Minimise from a start.
+
+    Parameters
+    ----------
+    factors, point : where to begin. progress : called with the iteration and the objective; what is true stops there.
+    before : iterations counted already. tolerance : relative change at which to end. most : evaluations.
+
+    Raises
+    ------
+    KeyboardInterrupt : Ctrl-C, after the iteration. Whatever `progress` raises.
+    """
+    free = problem.unknown.low < problem.unknown.high
+    with uninterrupted() as held, np.errstate(all="ignore"):
+        begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
+        run = _Search(problem, begin, point, free, _Watch(progress, held, before))
+        if not np.isfinite(run.start.objective):
+            return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
+        word = run.minimise(tolerance, most)
+        at_bound = run.pushed()
+        if word == "ok" and at_bound.any():
+            word = run.settle(at_bound, tolerance, most)
+        best = run.best
+    return Result(best.factors, best.at, best.objective, run.watch.iterations, word)
+
+
+@dataclass(frozen=True)
+class _Value:
+    """One evaluation: residuals (m,) and Jacobian (m, n) as SciPy is to see them."""
+
+    factors: Array
+    at: Prediction
+    f: Array
+    J: Array
+
+    @property
+    def objective(self) -> float:
+        total = float(self.f @ self.f)
+        return total if np.isfinite(total) else float("inf")
+
+
+@dataclass
+class _Watch:
+    """Who looks on: `progress`, Ctrl-C as `uninterrupted` holds it back, and the iterations so far."""
+
+    progress: Progress | None
+    held: list[int]
+    iterations: int
+
+    def stops(self, objective: float) -> bool:
+        """Report an iteration; whether to end here."""
+        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
+        return asked or bool(self.held)
+
+
+class _Search:
+    """Evaluations of one search, and how far it has come."""
+
+    def __init__(self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], watch: _Watch) -> None:
+        self.problem, self.free, self.watch = problem, free, watch
+        self.last = self.best = self.start = evaluate(problem, factors, point)
+        self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
+
+    def stops(self) -> bool:
+        """Whether somebody asked to end here."""
+        return self._stopped
+
+    def _at(self, x: Array) -> _Value:
+        factors = self.best.factors.copy()
+        factors[self.free] = x
+        if not np.array_equal(factors, self.last.factors):
+            self.last = evaluate(self.problem, factors, Point(self.best.at.nuisances, self.best.at.away))
+            if self.last.objective < self.best.objective:
+                self.best = self.last
+        return self.last
+
+    def _after(self, intermediate_result: OptimizeResult) -> None:
+        self.watch.iterations += 1
+        if self.watch.stops(2 * float(intermediate_result.cost)):
+            self._stopped = True
+            raise StopIteration
+
+    def minimise(self, tolerance: float, most: int) -> str:
+        """Search over the factors that are free; the word for how it ended."""
+        if self.stops():
+            return "stopped"
+        if not self.free.any():
+            return "ok"
+        low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
+        found = least_squares(
+            lambda x: self._at(x).f,
+            np.clip(self.best.factors[self.free], low, high),
+            jac=lambda x: self._at(x).J[:, self.free],
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=tolerance,
+            max_nfev=most,
+            callback=self._after,
+        )
+        if self.stops():
+            return "stopped"
+        return "not converged" if found.status == 0 else "ok"
+
+    def pushed(self) -> NDArray[np.bool_]:
+        """Free factors near a bound (n,), towards which the objective falls."""
+        unknown, best = self.problem.unknown, self.best
+        slope = best.J.T @ best.f
+        low, high = best.factors - unknown.low < NEAR, unknown.high - best.factors < NEAR
+        return self.free & ((low & (slope > 0)) | (high & (slope < 0)))
+
+    def settle(self, at_bound: NDArray[np.bool_], tolerance: float, most: int) -> str:
+        """Put factors at their bounds, which the trust region only approaches, and search over the others."""
+        unknown, before = self.problem.unknown, self.best
+        nearer = np.where(before.factors - unknown.low < unknown.high - before.factors, unknown.low, unknown.high)
+        there = evaluate(
+            self.problem, np.where(at_bound, nearer, before.factors), Point(before.at.nuisances, before.at.away)
+        )
+        if not np.isfinite(there.objective):
+            return "ok"
+        self.free = self.free & ~at_bound
+        self.last = self.best = there
+        return self.minimise(tolerance, most)
+
+
+def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
+    """Residuals and Jacobian at given factors, with the unknowns of the runs where they are best."""
+    at, parts = _eliminated(problem, factors, point), list[Array]()
+    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    n = problem.num_factors
+    f, J, A = _robust(at, threshold)
+    if np.isfinite(f).all() and np.isfinite(J).all():
+        for run in range(len(problem.runs)):
+            rows = at.rows(run)
+            both = np.column_stack([J[rows], f[rows]])
+            slopes, xi = at.unknown(run, rows, A)
+            if len(xi):
+                both = np.vstack([both, np.column_stack([np.zeros((len(xi), n)), xi])])
+                basis = np.linalg.qr(np.vstack([slopes, np.eye(len(xi))]))[0]
+                both[:, :n] -= basis @ (basis.T @ both[:, :n])
+            parts.append(np.asarray(np.linalg.qr(both, mode="r")))
+    else:
+        parts.append(np.full((1, n + 1), np.nan))
+    known = np.isfinite(problem.unknown.prior)
+    prior = np.column_stack(
+        [np.diag(1 / problem.unknown.prior), (factors - problem.unknown.centre) / problem.unknown.prior]
+    )
+    whole = np.vstack([*parts, prior[known]])
+    return _Value(factors, at, whole[:, n], whole[:, :n])
+
+
+def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
+    """Residuals whose squares are the loss, their slopes in the factors, and what multiplies other slopes (m,)."""
+    if not np.isfinite(threshold):
+        return at.r, at.by_factor, np.ones(len(at.r))
+    f = np.sign(at.r) * np.sqrt(loss(at.r, threshold)[0])
+    slope = np.where(np.abs(at.r) <= threshold, 1.0, threshold / np.maximum(np.abs(f), threshold))
+    return f, slope[:, None] * at.by_factor, slope
+
+
+def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
+    """The prediction with the unknowns of the runs where they are best, by Gauss-Newton steps, halved at need."""
+    at = predict(problem, factors, point.nuisances, point.away)
+    if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
+        return at
+    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    costs = _costs(problem, at, threshold)
+    for _ in range(INNER):
+        step, fall = _steps(problem, at, threshold)
+        if (fall <= CLOSE * costs).all():
+            break
+        share = np.where(fall > CLOSE * costs, 1.0, 0.0)
+        for _ in range(HALVINGS):
+            trial = predict(problem, factors, *_moved(problem, at, step, share))
+            after = _costs(problem, trial, threshold)
+            worse = ~(after <= costs) & (share > 0)
+            if not worse.any():
+                break
+            share = np.where(worse, share / 2, share)
+        else:
+            share = np.where(worse, 0.0, share)
+            trial = predict(problem, factors, *_moved(problem, at, step, share))
+            after = _costs(problem, trial, threshold)
+        settled = (costs - after <= CLOSE * costs).all()
+        at, costs = trial, after
+        if settled:
+            break
+    return at
+
+
+def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
+    """Objective of each run (R,) without the priors of the factors."""
+    total = np.bincount(at.run, loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
+    if at.away.size:
+        total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
+    return np.asarray(total)
+
+
+def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
+    """Gauss-Newton step of the unknowns of each run, and by how much it lowers the linear objective (R,)."""
+    f, _, root = _robust(at, threshold)
+    steps, fall = list[Array](), np.zeros(len(problem.runs))
+    for run in range(len(problem.runs)):
+        rows = at.rows(run)
+        A, xi = at.unknown(run, rows, root)
+        slope = A.T @ f[rows] + xi
+        step = -np.linalg.solve(A.T @ A + np.eye(len(xi)), slope)
+        steps.append(np.asarray(step, dtype=float))
+        fall[run] = -slope @ step
+    return steps, fall
+
+
+def _moved(problem: Problem, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
+    """Nuisances and initial states after a share (R,) of each run's step, latencies within what is carried."""
+    nuisances, away, q = at.nuisances.copy(), at.away.copy(), len(problem.names)
+    for run, step in enumerate(steps):
+        nuisances[run] += share[run] * step[:q]
+        if away.size:
+            away[problem.whole.run == run] += share[run] * step[q:].reshape(-1, away.shape[1])
+    for i in (i for i, name in enumerate(problem.names) if name == "latency"):
+        nuisances[:, i] = np.clip(nuisances[:, i], 0.0, problem.layout.lags * problem.layout.step / problem.widths[i])
+    return nuisances, away

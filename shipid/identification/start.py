@@ -1,0 +1,94 @@
+"""Where a fit begins: a horizon that grows, and inverse dynamics.
+
+A long prediction from poor factors diverges, and its objective has many minima. Over two steps it is nearly linear in
+the factors. So the same fit is solved for short horizons first, each from the factors of the one before: continuation.
+A start need not be exact: a share of the data and a rough tolerance are enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError
+from shipid.identification.fit import Progress, Result, origin, search
+from shipid.identification.inverse import inverse_dynamics
+from shipid.identification.residuals import Problem, build
+from shipid.identification.segments import Segment
+from shipid.identification.settings import ENVIRONMENT, overrides
+
+Array = NDArray[np.float64]
+HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
+ENOUGH = 20000  # steps of all predictions of a short horizon: more take time and change a start little
+ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon
+
+
+def grown(
+    problem: Problem, dataset: Dataset, factors: Array, progress: Progress | None = None, before: int = 0
+) -> tuple[Array, int, bool]:
+    """Factors that predict best over horizons that grow up to that of the fit.
+
+    Returns
+    -------
+    Factors (n,), iterations counted on from those `before`, and whether `progress` asked to stop.
+    """
+    longest = max(segment.num_steps for segment in problem.segments) * problem.settings.step
+    iterations = before
+    for horizon in HORIZONS:
+        steps = max(2, round(horizon / problem.settings.step))
+        if steps * problem.settings.step >= longest:
+            break
+        found = _at(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
+        if found is None or not np.isfinite(found.objective):
+            continue
+        factors, iterations = found.factors, found.iterations
+        if found.status == "stopped":
+            return factors, iterations, True
+    return factors, iterations, False
+
+
+def _at(
+    problem: Problem, dataset: Dataset, factors: Array, horizon: float, progress: Progress | None, before: int
+) -> Result | None:
+    """The fit with a shorter horizon; None where the runs cannot be cut so."""
+    widths = {name: width for name, width in problem.settings.widths.items() if name != "initial_state"}
+    settings = problem.settings.model_copy(update={"horizon": horizon, "nuisance": widths})
+    try:
+        short = build(problem.vessel, dataset, problem.runs, settings)
+    except DataError:
+        return None
+    short = replace(short, unknown=problem.unknown, segments=_spread(short))
+    return search(short, factors, origin(short), progress, before=before, tolerance=ROUGH, most=MOST)
+
+
+def _spread(problem: Problem) -> tuple[Segment, ...]:
+    """Predictions at equal distances, of every run at least one, that have no more steps than are enough."""
+    steps = sum(segment.num_steps for segment in problem.segments)
+    every = max(1, round(steps / ENOUGH))
+    runs = [[one for one in problem.segments if one.run == run] for run in range(len(problem.runs))]
+    return tuple(one for of_run in runs for one in of_run[::every])
+
+
+def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
+    """Factors (n,) that explain the accelerations, within the bounds."""
+    unknown = problem.unknown
+    given = overrides(problem.settings, problem.runs, problem.vessel, problem.layout.model.environment, dataset.runs)
+    head = f"{ENVIRONMENT}."
+    weather: Mapping[str, Mapping[str, float]] = {
+        run: {key.removeprefix(head): value for key, value in values.items() if key.startswith(head)}
+        for run, values in given.items()
+    }
+    found = inverse_dynamics(
+        problem.vessel,
+        dataset,
+        problem.runs,
+        unknown.groups,
+        scale=unknown.scale,
+        prior=unknown.prior,
+        environment=weather,
+    )
+    return np.asarray(np.clip(found.factors, unknown.low, unknown.high))

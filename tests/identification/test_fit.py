@@ -1,0 +1,79 @@
+"""Laws of the search: eliminated unknowns are optimal, gradients are exact, bounds hold, progress can end it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.identification.fit import Point, evaluate, loss, origin, search
+from shipid.identification.residuals import Problem, build
+from shipid.identification.settings import Identify
+from shipid.vessel.load import load_vessel
+from tests.identification.trials import changed, trials
+
+SHIP = load_vessel("gunnerus-28.9")
+PATHS = ["hull.derivatives.Y_uv", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
+
+
+def problem(**more: object) -> Problem:
+    data, rng = trials(SHIP, runs=3, steps=30), np.random.default_rng(4)
+    noisy = changed(
+        data, **{k: data.frame[k] + rng.normal(0, s, len(data.frame)) for k, s in (("u", 0.05), ("r", 3e-3))}
+    )
+    settings = Identify(**{"parameters": PATHS, "horizon": 0, "weights": {"u": 0.05, "v": 0.05, "r": 0.003}, **more})
+    return build(SHIP, noisy, noisy.runs, settings)
+
+
+@pytest.mark.parametrize("loss_kind", ["squared", "huber"])
+@pytest.mark.parametrize("nuisance", [[], ["initial_state"], ["velocity_bias", "current"]])
+def test_the_gradient_is_that_of_the_objective(nuisance: list[str], loss_kind: str) -> None:
+    """With the unknowns of the runs eliminated anew at each place, priors of the factors included."""
+    own = problem(nuisance=nuisance, loss=loss_kind, prior={"hull.*": 0.5})
+    factors = np.array([1.1, 0.9, 1.05])
+    here = evaluate(own, factors, origin(own))
+    point = Point(here.at.nuisances, here.at.away)
+    for j, unit in enumerate(np.eye(3)):
+        ends = [evaluate(own, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
+        assert 2 * (here.J.T @ here.f)[j] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-2)
+
+
+def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:
+    own, rng = problem(nuisance=["initial_state", "velocity_bias"]), np.random.default_rng(1)
+    factors = np.array([1.1, 0.9, 1.05])
+    best = evaluate(own, factors, origin(own))
+    for _ in range(5):
+        moved = own.whole, rng.normal(0, 0.05, best.at.nuisances.shape), rng.normal(0, 0.05, best.at.away.shape)
+        again = evaluate(own, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
+        assert again.objective == pytest.approx(best.objective, rel=1e-8)
+
+
+def test_rows_that_scipy_sees_do_not_grow_with_the_log() -> None:
+    own = problem()
+    value = evaluate(own, np.ones(3), origin(own))
+    assert value.f.shape == (3 * 4,)  # of each run one row a factor and one for what is left
+    assert value.objective == pytest.approx(float((value.at.r**2).sum()), rel=1e-12)
+
+
+def test_the_loss_is_linear_beyond_its_threshold() -> None:
+    r = np.array([-5.0, -1.0, 0.0, 2.0, 3.0])
+    value, weight = loss(r, 2.0)
+    assert value.tolist() == [16.0, 1.0, 0.0, 4.0, 8.0]
+    np.testing.assert_allclose(weight, [0.4, 1.0, 1.0, 1.0, 2 / 3])
+
+
+def test_a_factor_that_is_pushed_ends_at_its_bound() -> None:
+    own = problem(bounds={PATHS[0]: (1.2, 3.0)})
+    found = search(own, np.array([2.0, 1.0, 1.0]), origin(own))
+    assert found.status == "ok"
+    assert found.factors[0] == 1.2
+    slope = evaluate(own, found.factors, origin(own)).J.T @ evaluate(own, found.factors, origin(own)).f
+    assert slope[0] > 0
+    assert np.abs(slope[1:]).max() < 1e-3 * slope[0]
+
+
+def test_it_ends_where_whoever_looks_on_asks() -> None:
+    own, begin = problem(), np.array([1.5, 0.5, 1.5])
+    found = search(own, begin, origin(own), progress=lambda iteration, _: iteration == 4, before=3)
+    assert (found.status, found.iterations) == ("stopped", 4)
+    none = search(own, begin, origin(own), progress=lambda *_: True)
+    assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
