@@ -44,7 +44,8 @@ from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 
-MEASURED = ("north", "east", "psi", "u", "v", "r")
+Motion = Literal["north", "east", "psi", "u", "v", "r"]
+MEASURED: tuple[Motion, ...] = ("north", "east", "psi", "u", "v", "r")
 STATES = (*MEASURED, "a_u", "a_v", "a_r", "current_north", "current_east", "x_w", "y_w", "psi_w", "u_w", "v_w", "r_w")
 LOW = 11  # states before those of the waves
 NUMBERS = (
@@ -67,12 +68,12 @@ class Observer(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    measured: tuple[Literal["north", "east", "psi", "u", "v", "r"], ...] = MEASURED
+    measured: tuple[Motion, ...] = MEASURED
     force: Annotated[NotNegative, Field(description="standard deviation of the slow force at first, x m g")] = 3e-3
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
-    ] = (1e-4, 3e-4)
+    ] = (3e-4,)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
     ] = 10.0
@@ -81,7 +82,7 @@ class Observer(BaseModel):
     current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
     waves: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
-    ] = (0.0, 1e-2)
+    ] = (0.0, 2e-2)
     period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.2
     noise: Annotated[
@@ -142,13 +143,13 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
         q = (settings.model_error * x for x in a)
         numbers.append(
-            [*q, *a, current / 300 * speed, settings.jump, settings.settle * time, settings.memory * time, *w]
-            + [omega, settings.damping]
+            [*q, *a, current / 300 * speed, settings.jump]
+            + [settings.settle * time, settings.memory * time, *w, omega, settings.damping]  # noqa: RUF005
         )
         slow = [settings.force * linear, settings.force * linear, settings.moment * yaw]
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
-    noise = np.array([settings.noise.get(name, 1e-4 * size) for name, size in sizes.items()])
+    noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
     fade = np.inf if settings.fade is None else settings.fade * time
     return Bank(vessel, settings, np.array(numbers), noise, np.array(first), fade, _mass(vessel))
 
@@ -203,7 +204,7 @@ def filter_function(model: Dynamics) -> ca.Function:
     after, left, likelihood = ahead, predicted, likelihood * ca.exp(-dt / number["memory"])
     innovations, spreads = [], []
     for i in range(6):  # one at a time: independent noise, and no matrix to invert
-        given = measured[i] == measured[i]
+        given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
         innovation = ca.if_else(given, measured[i], output[i]) - output[i]
         innovations.append(innovation)
         spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
@@ -214,11 +215,11 @@ def filter_function(model: Dynamics) -> ca.Function:
         after, left = after + column * (share * surprise), _symmetric(left - column @ column.T * share)
         likelihood -= ca.if_else(given, (surprise**2 / variance + ca.log(variance)) / 2, 0)
     left = ca.reshape(ca.densify(left), -1, 1)
+    packed_after = ca.vertcat(after, left, reached, restless, commands, likelihood)
     return ca.Function(
         "observer_filter",
         [state, commands, environment, parameters, measured, noise, numbers, dt],
-        [ca.vertcat(after, left, reached, restless, commands, likelihood), after[:LOW]]
-        + [ca.vertcat(*innovations), ca.vertcat(*spreads)],
+        [packed_after, after[:LOW], ca.vertcat(*innovations), ca.vertcat(*spreads)],
         ["state", "commands", "environment", "parameters", "measured", "noise", "numbers", "dt"],
         ["after", "estimate", "innovation", "spread"],
         {"cse": True},
@@ -455,8 +456,10 @@ def observed_paths(
         method=method, memory=memory, tau_extra=tau_extra(filters, columns, horizon, step), keep=("north", "east"),
     )  # fmt: skip
     ages = step * np.arange(1, horizon + 1)[:, None]
-    origin = (zero, zero) if path == "velocity" else (columns["north"], columns["east"])
-    x, y = to_frame(found["north"][1:, 0] + ages * north, found["east"][1:, 0] + ages * east, *origin, columns["psi"])
+    north0, east0 = (zero, zero) if path == "velocity" else (columns["north"], columns["east"])
+    x, y = to_frame(
+        found["north"][1:, 0] + ages * north, found["east"][1:, 0] + ages * east, north0, east0, columns["psi"]
+    )
     return np.stack([x, y], axis=-1), found.diverged[0]
 
 
@@ -486,8 +489,8 @@ def tune_observer(
 ) -> tuple[Observer, dict[str, float]]:
     """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.
 
-    In turn: whether there is a current, how fast the force changes, and how it fades. Returns the settings and the mean error [m] of
-    each that was tried, by what was changed. Windows that diverge count as twice the worst that does not.
+    In turn: whether there is a current, how fast the force changes, and how it fades. Returns the settings and the mean
+    error [m] of each that was tried, by what was changed. Windows that diverge count as twice the worst that does not.
     """
     best = settings or Observer()
     windows = cut_windows(dataset, horizon=horizon, step=step, interval=interval, path=path)
