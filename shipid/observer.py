@@ -73,7 +73,7 @@ class Observer(BaseModel):
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
-    ] = (3e-4,)
+    ] = (2e-4,)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
     ] = 10.0
@@ -92,7 +92,7 @@ class Observer(BaseModel):
     fade: Annotated[
         NotNegative | None,
         Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; none: never"),
-    ] = 20.0
+    ] = 12.0
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,10 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
         q = (settings.model_error * x for x in a)
         numbers.append(
-            [*q, *a, current / 300 * speed, settings.jump]
-            + [settings.settle * time, settings.memory * time, *w, omega, settings.damping]  # noqa: RUF005
+            [
+                *(*q, *a, current / 300 * speed, settings.jump),
+                *(settings.settle * time, settings.memory * time, *w, omega, settings.damping),
+            ]
         )
         slow = [settings.force * linear, settings.force * linear, settings.moment * yaw]
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])

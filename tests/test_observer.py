@@ -32,12 +32,12 @@ from tests.benchmarks.observer import World, errors, physics, world
 
 @cache
 def sea() -> World:
-    return world("gunnerus-28.9-6dof", 5, runs=6, duration=180.0, waves=True, current=True, changing=True)
+    return world("gunnerus-28.9-6dof", 15, runs=6, duration=180.0, waves=True, current=True, changing=True)
 
 
 @cache
 def calm() -> World:
-    return world("gunnerus-28.9-6dof", 6, runs=6, duration=180.0, waves=False, current=False, changing=True)
+    return world("gunnerus-28.9-6dof", 16, runs=6, duration=180.0, waves=False, current=False, changing=True)
 
 
 def test_moving_water_gives_the_equations_of_the_current_block() -> None:

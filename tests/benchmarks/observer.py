@@ -1,4 +1,4 @@
-"""What the observer buys in seeded worlds with waves, wind, current and orders; `python -m tests.benchmarks.observer`."""
+"""What the observer buys in seeded worlds with waves, wind and current; `python -m tests.benchmarks.observer`."""
 
 from __future__ import annotations
 
@@ -91,15 +91,16 @@ def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, cu
 
 def physics(names: tuple[str, ...]) -> dict[str, Vessel]:
     """Nominal model and perturbed variants of it, by name."""
-    models = read_plan("simulation").models
-    return {one.name: one.vessel for one in models if one.name in names and one.vessel is not None}
+    variants = [one.variant for one in read_plan("simulation").models if one.variant is not None]
+    base = load_vessel("gunnerus-28.9")
+    return {one.name: base.with_values(one.values) for one in variants if one.name in names}
 
 
 def smoothed(data: Dataset) -> Dataset:
     """The same runs without motion at wave frequency; it looks ahead."""
     frame, weight = data.frame.copy(), np.hanning(SMOOTH + 2)[1:-1]
     half, weight = SMOOTH // 2, weight / weight.sum()
-    for _, rows in data.frame.groupby("run", sort=False).indices.items():
+    for rows in data.frame.groupby("run", sort=False).indices.values():
         for name in MEASURED:
             x = frame[name].to_numpy()[rows]
             padded = np.concatenate([2 * x[0] - x[half:0:-1], x, 2 * x[-1] - x[-2 : -half - 2 : -1]])
@@ -138,9 +139,9 @@ def run() -> dict[str, float]:
     """Figures of one vessel in three worlds; printed as a table by `python -m tests.benchmarks.observer`."""
     vessels = physics(("nominal", "moderate-3", "moderate-10", "high-3", "high-4"))
     how = {
-        "waves, current, changing": dict(runs=16, duration=210.0, waves=True, current=True, changing=True),
-        "waves, constant orders": dict(runs=16, duration=210.0, waves=True, current=False, changing=False),
-        "calm": dict(runs=16, duration=210.0, waves=False, current=False, changing=True),
+        "waves, current, changing": {"runs": 16, "duration": 210.0, "waves": True, "current": True, "changing": True},
+        "waves, constant orders": {"runs": 16, "duration": 210.0, "waves": True, "current": False, "changing": False},
+        "calm": {"runs": 16, "duration": 210.0, "waves": False, "current": False, "changing": True},
     }
     figures: dict[str, float] = {}
     for label, given in how.items():
