@@ -372,8 +372,8 @@ def study_new(
     _print(_table(["choice", "value", "because"], rows))
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    names = ", ".join(model.name for model in draft.plan.models)
-    typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.models)} models ({names}) -> {file}")
+    names = ", ".join(model.name for model in draft.plan.foundations)
+    typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.foundations)} foundations ({names}) -> {file}")
     typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
 
 
@@ -384,15 +384,15 @@ def study_variants(
     accuracy: Annotated[bool, typer.Option(help="also simulate or import the data, and show A")] = True,
     changes: Changes = None,
 ) -> None:
-    """Show the models of a study with their factors and accuracy A; save patches that rebuild them exactly."""
+    """Show the foundations of a study with their factors and accuracy A; save patches that rebuild them exactly."""
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain, prepare
 
     plan = read_plan(study, _parsed(changes))
-    models, scores = plan.models, {}
+    models, scores = plan.foundations, {}
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
         prepared = prepare(plan, obtain(plan))
-        models = prepared.models
+        models = prepared.foundations
         known = [model.name for model in models if model.vessel and model.identify is None]
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
     rows = []
@@ -405,7 +405,7 @@ def study_variants(
         shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)
         score = scores.get(model.name)
         rows.append((model.name, "-" if score is None else f"{score:.2f}", str(len(factors)), shown))
-    _print(_table(["model", "A [m]", "changed", "factors"], rows))
+    _print(_table(["foundation", "A [m]", "changed", "factors"], rows))
     if save is not None:
         from shipid.study.store import write_patches
 
@@ -476,7 +476,7 @@ def study_rotate(
     check_table(file)
     dataset = obtain(plan)
     wanted = rotate.turns(plan, dataset, tests)
-    cells = len(wanted) * len(plan.models) * len(set(plan.study.grid.seeds))
+    cells = len(wanted) * len(plan.pairs) * len(set(plan.study.grid.seeds))
     import pandas as pd
 
     frame = pd.concat(list(_counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
@@ -485,8 +485,9 @@ def study_rotate(
     columns, rows = ["A", "H", "least", "greatest", "H_90"], []
     for row in rotate.spread(frame).to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
-        rows.append([row["model"], *(_digits(row[name]) for name in columns), better])
-    _print(_table(["model", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
+        name = plan.label(row["foundation"], row["method"])
+        rows.append([name, *(_digits(row[column]) for column in columns), better])
+    _print(_table(["foundation", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
     typer.echo(f"naive floor {_digits(frame.groupby('test')['naive'].first().mean())} m")
     found = rotate.contrasts(frame, plan).to_dict("records")
     if found:

@@ -186,7 +186,8 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
             elif get_args(kind):
                 inner += _alternatives(get_args(kind)[-1])
         kinds = inner or kinds  # the name of a union member is no key
-    return [name for kind in kinds if hasattr(kind, "model_fields") for name in kind.model_fields]
+    models = [kind for kind in kinds if hasattr(kind, "model_fields")]
+    return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
 
 
 def _alternatives(annotation: Any) -> list[Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -97,6 +99,15 @@ def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bo
     """Write arrays by name as one `.npz` without pickles."""
     with whole(file) as temporary, temporary.open("wb") as stream:
         (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
+
+
+def read_arrays(file: str | os.PathLike[str]) -> dict[str, np.ndarray]:
+    """Read all arrays of a `.npz`, never a pickle: OSError if it cannot be opened, ValueError for anything else."""
+    try:
+        with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
+        raise ValueError(f"{file} is not a whole .npz") from error
 
 
 def _plain(value: Any) -> Any:

@@ -25,12 +25,19 @@ ROLL = {"inertia.I_x": 4.8e6, "inertia.z_G": -0.9, "added_mass.K_pdot": -2.3e6, 
 PITCH = {"inertia.I_y": 3.8e7, "added_mass.Z_wdot": -1.2e6, "added_mass.M_qdot": -8e7, "added_mass.K_vdot": -1e5}
 PRIME = {"L_pp": 28.9, "Y_v": -0.03, "Y_r": 0.008, "N_v": -0.01, "N_r": -0.006, "X_vv": -0.004, "Y_v|r|": -0.03}
 
+WEIGHTS = {
+    **{"u_scale": 5.0, "v_scale": 1.0, "r_scale": 0.1, "X_max": 2e4, "Y_max": 3e4, "N_max": 4e5},
+    **{"w_u": [0.8, -0.3, 0.5], "w_v": [0.4, 1.1, -0.6], "w_r": [-0.7, 0.2, 0.9], "w_0": [0.1, -0.4, 0.3]},
+    **{"c_X": [-0.5, 0.2, 0.4], "c_Y": [-0.6, -0.3, 0.1], "c_N": [0.2, -0.1, -0.4]},
+}
+
 #: name -> base and what is added: structures that no bundled vessel has (yet)
 PATCHED: dict[str, tuple[str, Mapping[str, Any]]] = {
     "actuators": ("gunnerus-28.9", {"thruster.port.actuator": LAG, "thruster.starboard.actuator": LAG}),
     "tunnel": ("gunnerus-28.9", {"thruster.bow.off": False}),
     "current": ("gunnerus-28.9", {"current.kind": "uniform"}),
     "prime": ("gunnerus-28.9", {"hull.prime_derivatives": PRIME}),
+    "learned": ("gunnerus-28.9", {"hull.learned": WEIGHTS}),
     "many-strips": ("gunnerus-33.9", {"hull.crossflow.strips": 40}),
     "roll": ("gunnerus-33.9", {"dof": 4, **ROLL}),
     "six": ("gunnerus-33.9", {"dof": 6, "current.kind": "uniform", **ROLL, **PITCH}),

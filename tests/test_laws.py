@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 
 from shipid import document as documents
 from shipid.engine.lowering import lower
-from shipid.physics import SIGNALS, TERMS
+from shipid.physics import GIVEN, MOTION, TERMS
 from shipid.physics.grammar import Grammar
+from shipid.physics.signals import SIGNALS, named
 from shipid.simulation.sea import wave_loads
 from shipid.vessel.bindings import bindings
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
@@ -32,14 +33,11 @@ VECTORS = ("eta", "nu", "nu_r")
 WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of what a rudder stands in
 STATE = 0.5  # range of what a term remembers
 MOTION_RANGE = np.array([6.0, 1.5, 0.3, 0.1, 0.05, 0.15])  # m/s, rad/s; surge is drawn from -1/3 of it
-RANGES = {
-    **{"psi": (-np.pi, np.pi), "n": (-3.5, 3.5), "alpha": (-np.pi, np.pi), "delta": (-0.7, 0.7)},
-    **{"V_w": (0.0, 20.0), "beta_w": (-np.pi, np.pi), "V_c": (0.0, 2.0), "beta_c": (-np.pi, np.pi)},
-}
+RANGES = {name: row.reach for name, row in SIGNALS.items()}
 MIRROR = {  # port <-> starboard: sign of each signal, then of each wrench entry
     "eta": np.array([1, -1, 1, -1, 1, -1]),
     **dict.fromkeys(("nu", "nu_r"), np.array([1, -1, 1, -1, 1, -1])),
-    **dict.fromkeys(("psi", "alpha", "delta", "beta_w", "beta_c"), -1),
+    **{name: row.mirror for name, row in SIGNALS.items()},
 }
 MIRRORED_WRENCH = np.array([1, -1, 1, -1, 1, -1])
 MIRROR_OF_A_TERM = {  # a tunnel's shaft drives sideways, so the mirrored unit turns the other way
@@ -215,16 +213,16 @@ def jacobian_at(key: str, drawn: Mapping[str, Any]) -> np.ndarray:
 
 
 def test_the_signals_of_every_term_are_declared() -> None:
-    declared = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment, *SIGNALS.given}
+    declared = {*MOTION, *named("command"), *named("environment"), *GIVEN}
     assert {name for key in TERMS for name in example(key).signals} <= declared
-    assert declared <= {*VECTORS, *RANGES, "state", "wash"}, "a new signal needs a range here"
+    assert declared <= {*VECTORS, *RANGES, "state", "wash"}
 
 
 @pytest.mark.parametrize("key", [key for key, term in TERMS.items() if term.gives])
 def test_what_a_term_gives_takes_its_own_signals_and_parameters(key: str) -> None:
     term = TERMS[key]
     for name, function in term.gives.items():
-        assert name in SIGNALS.given
+        assert name in GIVEN
         assert set(signals(function)) <= set(signals(term.function))
         assert set(parameters(function)) <= set(parameters(term.function))
 

@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, unit_of
+from shipid.physics.signals import row_of
 
-RANGES = {"u": 25.0, "v": 10.0, "r": 0.6, "phi": 1.0, "theta": 0.5, "V_w": 60.0, "n": 40.0, "alpha": 12.6, "delta": 1.6}
-"""Largest plausible magnitude in SI units, by column or by signal of a command: past it a unit is wrong."""
 GAP, JITTER, FROZEN, OVERLAP = 3.0, 0.05, 0.02, 0.5
 CORRELATION, SCALE_ERROR, RATE_ERROR, PATH_ERROR = 0.8, 0.1, 0.5, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
@@ -54,11 +53,13 @@ def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
 
 def _ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     for name in map(str, stretches[0].columns):
-        limit = RANGES.get(name.rpartition(".")[2])
-        if limit is not None:
+        row = row_of(name)
+        if row is not None and row.plausible is not None:
             largest = max(float(rows[name].abs().max()) for rows in stretches)
             unit = unit_of(name) or ""
-            yield _row(f"range {name}", largest, unit, limit, f"{name} reaches {largest:.3g} {unit}: right unit?")
+            yield _row(
+                f"range {name}", largest, unit, row.plausible, f"{name} reaches {largest:.3g} {unit}: right unit?"
+            )
 
 
 def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,25 +18,15 @@ from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
 from shipid.files import whole
+from shipid.physics.signals import SIGNALS, is_command, named, signal_of
 
 Array = NDArray[np.float64]
 
-REQUIRED = {"t": "s", "north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
-OPTIONAL = {"z": "m", "phi": "rad", "theta": "rad", "w": "m/s", "p": "rad/s", "q": "rad/s"} | {
-    "V_w": "m/s",
-    "beta_w": "rad",
-    "std_u": "m/s",
-    "std_v": "m/s",
-    "std_r": "rad/s",
-}
 STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
 """State -> column of its standard deviation, where it was estimated instead of measured."""
-SIGNALS = {"n": "rev/s", "alpha": "rad", "delta": "rad"}
-ANGLES = ("psi", "phi", "theta", "beta_w")
 BREAK = "break"
 """Name of the flag on a row that nothing connects to the row before it."""
 
-_COMMAND = re.compile(r"[A-Za-z_]\w*\.(" + "|".join(SIGNALS) + ")")
 _KEY = b"shipid"
 
 
@@ -49,7 +38,7 @@ class Dataset:
     ----------
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w` and the
-        rest of `OPTIONAL`. SI units, radians; time increases within a run; no NaN.
+        rest of `optional()`. SI units, radians; time increases within a run; no NaN.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
         has a clock of its own (simulation) and `"shared"` where all lie on one recording (the default).
     """
@@ -81,16 +70,22 @@ class Dataset:
         return found.hexdigest()[:16]
 
 
-def is_command(name: str) -> bool:
-    """Tell whether a column is a command, `<component>.<signal>`."""
-    return _COMMAND.fullmatch(name) is not None
+def required() -> dict[str, str]:
+    """Columns that every dataset has beside `run` and `flags`, with their SI units: the clock, position and motion."""
+    return {"t": "s"} | {name: row.unit for name, row in SIGNALS.items() if row.column == "required"}
+
+
+def optional() -> dict[str, str]:
+    """Columns that a dataset may have beside its commands, with their SI units."""
+    measured = {name: row.unit for name, row in SIGNALS.items() if row.column == "optional"}
+    return measured | {column: SIGNALS[name].unit for name, column in STANDARD_DEVIATIONS.items()}
 
 
 def unit_of(name: str) -> str | None:
     """SI unit of a column by its name; None if no column may have this name."""
     if is_command(name):
-        return SIGNALS[name.rpartition(".")[2]]
-    return (REQUIRED | OPTIONAL).get(name)
+        return SIGNALS[signal_of(name)].unit
+    return (required() | optional()).get(name)
 
 
 def units_of(names: Iterable[str]) -> dict[str, str]:
@@ -151,8 +146,13 @@ def sample(rows: pd.DataFrame | Mapping[str, NDArray[Any]], instants: Array) -> 
         if name == "flags" or is_command(name):
             result[name] = values[last]
         else:
-            result[name] = np.interp(instants, t, np.unwrap(values) if name in ANGLES else values)
+            result[name] = np.interp(instants, t, np.unwrap(values) if wraps(name) else values)
     return result
+
+
+def wraps(name: str) -> bool:
+    """Whether a column is an angle of the ship or the weather, unwrapped before it is interpolated."""
+    return name in SIGNALS and SIGNALS[name].angle
 
 
 def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
@@ -160,7 +160,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     if len(frame) == 0:
         raise DataError("the dataset has no rows")
     names = [str(name) for name in frame.columns]
-    for name in ("run", "flags", *REQUIRED):
+    for name in ("run", "flags", *required()):
         if name not in names:
             raise DataError(f"missing column; there are: {', '.join(names)}", path=name)
     for name in names:
@@ -191,8 +191,8 @@ def _check_column(name: str, column: pd.Series[Any]) -> None:
         right, wanted = pd.api.types.is_integer_dtype(column.dtype), "integers"
     elif unit is None:
         raise DataError(
-            f"unknown column: {choices(name, [*REQUIRED, *OPTIONAL, 'run', 'flags'])} "
-            f"(or a command, <component>.<signal>, signals {', '.join(SIGNALS)})",
+            f"unknown column: {choices(name, [*required(), *optional(), 'run', 'flags'])} "
+            f"(or a command, <component>.<signal>, signals {', '.join(named('command'))})",
             path=name,
         )
     else:

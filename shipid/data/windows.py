@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +17,39 @@ Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each an order of its own."""
-PARTS = 3  # of the horizon, in which the compensator sees planned commands
+STATES = ("u", "v", "r", "psi")
+"""True states that a window holds over its horizon, beside the path."""
+
+
+@dataclass(frozen=True)
+class Instants:
+    """What is known at S instants of prediction; every array is in SI units, time first.
+
+    Parameters
+    ----------
+    columns : every measured column at the instant, name -> (S,); angles unwrapped within the run.
+    past : the same columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty where no method
+        needs them.
+    planned : command in force from step i-1 to i of the horizon, i = 1..T, name -> (T, S); None where commands are held
+        at their value at the instant.
+    hidden : states of actuators at the instant, name -> (S,); None takes each actuator as having reached its order.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    past: Mapping[str, Array] = field(default_factory=dict)
+    planned: Mapping[str, Array] | None = None
+    hidden: Mapping[str, Array] | None = None
+
+    def __len__(self) -> int:
+        return len(self.columns["u"])
+
+    def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Instants:
+        """Choose instants by a mask, by indices or by a slice."""
+
+        def last(values: Mapping[str, Array] | None) -> dict[str, Array] | None:
+            return None if values is None else {name: array[..., chosen] for name, array in values.items()}
+
+        return Instants(last(self.columns) or {}, last(self.past) or {}, last(self.planned), last(self.hidden))
 
 
 @dataclass(frozen=True)
@@ -33,6 +65,8 @@ class Windows:
     planned : command in force from step i-1 to i, i = 1..T, name -> (T, S).
     horizon, step : T, and its step [s].
     shared_clock : whether all runs lie on one clock; if not, equal times of two runs are different moments.
+    past : the columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty for P = 0.
+    states : true u, v, r [m/s, rad/s] and psi [rad] after 1..T steps, name -> (T, S).
     """
 
     run: NDArray[np.str_]
@@ -43,21 +77,37 @@ class Windows:
     horizon: int
     step: float
     shared_clock: bool = True
+    past: dict[str, Array] = field(default_factory=dict)
+    states: dict[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @property
+    def num_past(self) -> int:
+        """Number P of past steps that every window holds."""
+        return len(next(iter(self.past.values()), ()))
+
+    @property
+    def begin(self) -> Array:
+        """First instant of every past [s], (S,): the instant of prediction itself where there is no past."""
+        return self.t - self.num_past * self.step
 
     @property
     def end(self) -> Array:
         """Last instant of every future [s], (S,)."""
         return self.t + self.horizon * self.step
 
+    def instants(self, *, known: bool = False, hidden: Mapping[str, Array] | None = None) -> Instants:
+        """What a predictor knows: no future, but for the commands where they are `known` over the horizon."""
+        return Instants(self.columns, self.past, self.planned if known else None, hidden)
+
     @property
     def spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant [s] that the windows of every run see, futures included."""
+        """First and last instant [s] that the windows of every run see, pasts and futures included."""
         names, index = np.unique(self.run, return_inverse=True)
         first, last = np.full(len(names), np.inf), np.full(len(names), -np.inf)
-        np.minimum.at(first, index, self.t)
+        np.minimum.at(first, index, self.begin)
         np.maximum.at(last, index, self.end)
         return {str(name): (float(a), float(b)) for name, a, b in zip(names, first, last, strict=True)}
 
@@ -72,28 +122,16 @@ class Windows:
             horizon=self.horizon,
             step=self.step,
             shared_clock=self.shared_clock,
+            past={name: values[:, chosen] for name, values in self.past.items()},
+            states={name: values[:, chosen] for name, values in self.states.items()},
         )
 
     def touching(self, intervals: Iterable[tuple[float, float]]) -> Mask:
-        """Windows whose [t, t + T step] shares a moment with any closed interval of the recording clock, (S,)."""
+        """Windows that share a moment, past and future included, with any closed interval of the recording, (S,)."""
         touched = np.zeros(len(self), dtype=bool)
         for start, end in intervals:
-            touched |= (self.t <= end) & (self.end >= start)
+            touched |= (self.begin <= end) & (self.end >= start)
         return touched
-
-
-def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
-    """What is planned, as few numbers: the mean command less the present one in each part of the horizon.
-
-    The parts are nearly equal, `PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
-    ..., so that what is known of sides and signs of the command holds for its plan.
-    """
-    means: dict[str, Array] = {}
-    for name, values in planned.items():
-        component, _, signal = name.rpartition(".")
-        for number, part in enumerate(np.array_split(values, min(PARTS, len(values))), start=1):
-            means[f"{component}.planned-{number}.{signal}"] = part.mean(axis=0) - columns[name]
-    return means
 
 
 def to_frame(north: Any, east: Any, north0: Any, east0: Any, psi0: Any) -> tuple[Any, Any]:
@@ -118,8 +156,9 @@ def cut_windows(
     step: float = 1.0,
     interval: float = 1.0,
     path: Literal["position", "velocity"] = "position",
+    past: int = 0,
 ) -> Windows:
-    """Cut a window every `interval` [s], its whole future inside one unbroken stretch of one run.
+    """Cut a window every `interval` [s], its whole past and future inside one unbroken stretch of one run.
 
     Parameters
     ----------
@@ -128,10 +167,12 @@ def cut_windows(
     interval : time between instants of prediction [s].
     path : the true path: recorded north, east; or the integral (trapezoid on the clock of the dataset) of u, v, psi
         from the start of the window, where positions are coarser than velocities.
+    past : number P of steps before the instant that a window holds. The first instant of a run is P steps after its
+        first row.
 
     Raises
     ------
-    DataError : if no run is as long as the horizon.
+    DataError : if no run is as long as past and horizon together.
     """
     if horizon < 1 or step <= 0 or interval <= 0:
         raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must all be positive")
@@ -139,9 +180,10 @@ def cut_windows(
     parts = []
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()
-        last = np.floor((t[-1] - t[0] - horizon * step + clock_slack(t)) / interval)
+        first = t[0] + past * step
+        last = np.floor((t[-1] - first - horizon * step + clock_slack(t)) / interval)
         if last >= 0:
-            instants = t[0] + interval * np.arange(int(last) + 1)
+            instants = first + interval * np.arange(int(last) + 1)
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
             values = sample(rows, grid)
             north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
@@ -156,11 +198,34 @@ def cut_windows(
                     horizon=horizon,
                     step=step,
                     shared_clock=shared,
+                    past=past_of(rows, instants, past, step, path),
+                    states={name: values[name][1:] for name in STATES},
                 )
             )
     if not parts:
-        raise DataError(f"no run is as long as the horizon of {horizon * step:g} s")
+        history = f" and the past of {past * step:g} s" if past else ""
+        raise DataError(f"no run is as long as the horizon of {horizon * step:g} s{history}")
     return concatenate(parts)
+
+
+def past_of(
+    rows: pd.DataFrame, instants: Array, past: int, step: float, path: Literal["position", "velocity"]
+) -> dict[str, Array]:
+    """Columns of one unbroken stretch at P, ..., 1 steps before the instants (S,) [s], name -> (P, S); none for P = 0.
+
+    x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future; the columns
+    north and east and the flags are left out.
+    """
+    if not past:
+        return {}
+    t = rows["t"].to_numpy()
+    grid = np.concatenate([instants - step * np.arange(past, 0, -1)[:, None], instants[None]])  # (P + 1, S)
+    grid = np.clip(grid, t[0], t[-1])
+    values = sample(rows, grid)
+    north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
+    x, y = to_frame(north[:-1], east[:-1], north[-1], east[-1], values["psi"][-1])
+    kept = {name: column[:-1] for name, column in values.items() if name not in ("flags", "north", "east")}
+    return {**kept, "x": x, "y": y}
 
 
 def _integral(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
@@ -180,8 +245,8 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
     """All windows of several sets with the same horizon, step, clock and columns, in order."""
     first = parts[0]
     for part in parts[1:]:
-        if (part.horizon, part.step, part.shared_clock) != (first.horizon, first.step, first.shared_clock):
-            raise DataError("windows with different horizons, steps or clocks cannot be joined")
+        if any(getattr(part, name) != getattr(first, name) for name in ("horizon", "step", "shared_clock", "num_past")):
+            raise DataError("windows with different horizons, steps, clocks or pasts cannot be joined")
         if part.columns.keys() != first.columns.keys():
             raise DataError(f"windows differ in columns: {', '.join(part.columns.keys() ^ first.columns.keys())}")
     return Windows(
@@ -193,15 +258,17 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
         horizon=first.horizon,
         step=first.step,
         shared_clock=first.shared_clock,
+        past={name: np.concatenate([part.past[name] for part in parts], axis=1) for name in first.past},
+        states={name: np.concatenate([part.states[name] for part in parts], axis=1) for name in first.states},
     )
 
 
 def covered(windows: Windows) -> float:
-    """Recorded time [s] that windows see, futures included: the length of the union of all [t, t + T step].
+    """Recorded time [s] that windows see, pasts and futures included: the length of the union of their intervals.
 
     Runs with clocks of their own are added up; on a shared clock a moment that two runs hold counts once.
     """
-    length = windows.horizon * windows.step
+    length = (windows.num_past + windows.horizon) * windows.step
     runs = [windows.t] if windows.shared_clock else [windows.t[windows.run == run] for run in windows.spans]
     # intervals of one length: each adds what lies after the start of the one before, at most all of itself
     return sum((length + float(np.minimum(np.diff(np.sort(t)), length).sum()) for t in runs if len(t)), 0.0)
@@ -237,13 +304,13 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
         folds = []
         for part in np.array_split(order, count):
             if len(part):
-                touched = windows.touching([(float(windows.t[part].min()), float(windows.end[part].max()))])
+                touched = windows.touching([(float(windows.begin[part].min()), float(windows.end[part].max()))])
                 folds.append((np.flatnonzero(~touched), np.sort(part)))
         if all(len(training) for training, _ in folds):
             return folds
     (run,) = windows.spans
-    length = windows.horizon * windows.step
-    raise DataError(f"run {run!r} is too short to train and validate on with a horizon of {length:g} s")
+    length = (windows.num_past + windows.horizon) * windows.step
+    raise DataError(f"run {run!r} is too short to train and validate on with windows of {length:g} s")
 
 
 def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.engine.integrate import Array, Batch, Method, cores, integrate
+from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
@@ -75,12 +75,11 @@ def casadi_scan(
     return ca.Function("rollout", [x, c, e, t, fixed], [path])
 
 
-def run_casadi(
-    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
-) -> tuple[Array, Array]:
+def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
-    scan = casadi_scan(model, step, num_steps, method, every, tuple(drawn.shape[2] for drawn in batch.components))
-    num_samples, num_records = batch.state.shape[1], num_steps // every
+    num_steps, counts = job.num_steps, tuple(drawn.shape[2] for drawn in batch.components)
+    scan = casadi_scan(model, job.step, num_steps, job.method, job.every, counts)
+    num_samples, num_records = batch.state.shape[1], num_steps // job.every
     greatest = np.abs(batch.state[model.num_dof : 2 * model.num_dof]).max(axis=0, keepdims=True)
     start = np.concatenate([batch.state, batch.memory, greatest])
 
@@ -97,7 +96,7 @@ def run_casadi(
             found = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
         path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
-        records.append(path[:, :, rows])
+        records.append(path[:, :, list(job.rows)])
         worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so
     return np.stack(records, axis=1), np.stack(worst)
 

@@ -31,6 +31,22 @@ class Batch:
     components: tuple[Array, ...] = ()
 
 
+@dataclass(frozen=True)
+class Job:
+    """What an engine shall do with a batch.
+
+    step : seconds of one step. num_steps : steps of the rollout. every : steps from record to record.
+    rows : channels to record, as places in state and memory, one after the other. device : a PyTorch device.
+    """
+
+    step: float
+    num_steps: int
+    method: Method
+    every: int
+    rows: tuple[int, ...]
+    device: str = "cpu"
+
+
 def cores() -> int:
     """Cores that this process may use: those it has, no more than `OMP_NUM_THREADS` says."""
     found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -115,15 +115,21 @@ def lower(function: ca.Function, stages: Sequence[Sequence[str]] = STAGES) -> Lo
     """
     printed = print_function(function, stages, PYTORCH)
     last = len(stages)
-    space: dict[str, Any] = {**_NAMES, "_stack": _stack}
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack, "_channels": _channels}
     for number in range(last + 1):
         arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])
         saved = "" if number == last else ", ".join(printed.saved[number])
         end = f"[{', '.join(printed.outputs)}]" if number == last else f"_stack([{arguments}], [{saved}])"
-        source = [f"def stage{number}({arguments}):", *printed.lines[number], f"    return {end}"]
+        split = [f"    s{earlier} = _channels(s{earlier})" for earlier in range(number) if number == last]
+        source = [f"def stage{number}({arguments}):", *split, *printed.lines[number], f"    return {end}"]
         exec(compile("\n".join(source), f"<lowered {function.name()}>", "exec"), space)
     early = tuple(space[f"stage{number}"] for number in range(last))
     return Lowered(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
+
+
+def _channels(saved: torch.Tensor) -> Any:
+    """Saved channels, taken apart at once where they are differentiated: each index would make a gradient of all."""
+    return saved.unbind(0) if saved.requires_grad else saved
 
 
 def _stack(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:

@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import tempfile
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -26,7 +26,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.engine.integrate import Array, Batch, Method, cores, integrate
+from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.errors import ShipidError
 from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
@@ -174,14 +174,10 @@ def _vector_functions(wanted: Target) -> str:
     return "\n".join(lines)
 
 
-class _Source:
-    """Writes the C of one model: parameters once, held inputs once while held, rates and advance at every stage."""
+class Parts:
+    """Functions that are printed in stages and share where the early stages save: one place after another."""
 
-    def __init__(self, model: Dynamics, step: float, method: Method) -> None:
-        self.model, self.step, self.method = model, step, method
-        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
-        self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
-        self.all = [*self.own, *self.sums]
+    all: Sequence[Printed]
 
     def offset(self, stage: int, printed: Printed) -> int:
         """Where a function's saved values of a stage begin."""
@@ -201,6 +197,16 @@ class _Source:
         """Lines that read what the named stages saved."""
         heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
+
+
+class _Source(Parts):
+    """Writes the C of one model: parameters once, held inputs once while held, rates and advance at every stage."""
+
+    def __init__(self, model: Dynamics, step: float, method: Method) -> None:
+        self.model, self.step, self.method = model, step, method
+        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+        self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
+        self.all = [*self.own, *self.sums]
 
     def sum(self, i: int) -> str:
         """The loop over components of one sum."""
@@ -353,11 +359,16 @@ def _folder(wanted: str) -> Path:
 
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method) -> Any:
-    """The `run` of a model, compiled or from the cache; ShipidError if there is no compiler or it fails."""
+    """The `run` of a model, compiled or from the cache."""
+    return compiled_for(lambda: _Source(model, step, method).text(target()))
+
+
+def compiled_for(source: Callable[[], str]) -> Any:
+    """The `run` of C source that is written on demand; ShipidError if there is no compiler or it fails."""
     if compiler() is None:
         raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
     try:
-        return compiled(_Source(model, step, method).text(target()))
+        return compiled(source())
     except ShipidError as error:
         raise ShipidError(f"{error.message}: use engine 'torch'") from None
 
@@ -389,9 +400,9 @@ def head(wanted: Target) -> str:
     return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
 
 
-def _padded(array: Array, width: int) -> Array:
-    """(..., S) -> (..., width), the last sample repeated."""
-    fill = width - array.shape[-1]
+def padded(array: Array, wide: int) -> Array:
+    """(..., S) -> (..., wide), the last sample repeated."""
+    fill = wide - array.shape[-1]
     filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
     return np.ascontiguousarray(filled, dtype=float)
 
@@ -400,92 +411,94 @@ def _packed(array: Array, lanes: int) -> Array:
     """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
     count, entries, num_samples = array.shape
     groups = -(-num_samples // lanes)
-    filled = _padded(array, groups * lanes).reshape(count, entries, groups, lanes)
+    filled = padded(array, groups * lanes).reshape(count, entries, groups, lanes)
     return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
 
 
-def run_native(
-    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, every: int, rows: list[int]
-) -> tuple[Array, Array]:
+def run_native(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S)."""
-    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
-    records = np.empty((num_variants, num_steps // every + 1, len(rows), width))
-    worst = np.empty((num_variants, width))
-    _run(model, batch, step, num_steps, method, every, rows, worst, records=records)
+    num_samples = batch.state.shape[1]
+    records, worst = packed_records(model, batch, job)
     return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
 
 
-def measure_native(
-    model: Dynamics, batch: Batch, step: float, num_steps: int, method: Method, rows: list[int], goal: Array
-) -> tuple[Array, Array, Array]:
+def packed_records(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+    """Records (V, R, C, width) and the greatest speed (V, width) as C writes them, whole vectors of samples."""
+    num_variants, wide = len(batch.parameters), width(batch)
+    records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide))
+    worst = np.empty((num_variants, wide))
+    _run(model, batch, job, worst, records=records)
+    return records, worst
+
+
+def measure_native(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
     """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
 
-    The distances are those of the two channels `rows` to `goal` (T, 2, S), after every step.
+    The distances are those of the job's two channels to `goal` (T, 2, S), after every step.
     """
-    num_samples, num_variants, width = batch.state.shape[1], len(batch.parameters), _width(batch)
-    sums, worst = np.empty((num_variants, width)), np.empty((num_variants, width))
-    tally = np.zeros((_parts(batch), num_variants, BINS), dtype=np.uint32)
+    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch)
+    sums, worst = np.empty((num_variants, wide)), np.empty((num_variants, wide))
+    tally = np.zeros((num_parts(batch), num_variants, BINS), dtype=np.uint32)
     there = _packed(goal, target().lanes)
-    _run(model, batch, step, num_steps, method, 1, rows, worst, goal=there, sums=sums, tally=tally)
+    _run(model, batch, job, worst, goal=there, sums=sums, tally=tally)
     return sums[:, :num_samples], tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
 
 
-def _width(batch: Batch) -> int:
+def width(batch: Batch) -> int:
     """Samples, filled up to whole vectors."""
     lanes = target().lanes
     return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
-def _parts(batch: Batch) -> int:
+def num_parts(batch: Batch) -> int:
     """Into how many parts the samples go, so that all threads are busy to the end."""
-    num_variants, groups = len(batch.parameters), _width(batch) // target().lanes
+    num_variants, groups = len(batch.parameters), width(batch) // target().lanes
     return min(-(-4 * cores() // num_variants), groups)
 
 
-def _run(
-    model: Dynamics,
-    batch: Batch,
-    step: float,
-    num_steps: int,
-    method: Method,
-    every: int,
-    rows: list[int],
-    worst: Array,
-    **wanted: Array,
-) -> None:
+def _run(model: Dynamics, batch: Batch, job: Job, worst: Array, **wanted: Array) -> None:
     """Fill the arrays that are wanted; parts of the samples on threads, variants one after another."""
-    run, lanes, width, parts = _library(model, step, method), target().lanes, _width(batch), _parts(batch)
-    series = [_padded(part, width) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    run, lanes, wide, parts = _library(model, job.step, job.method), target().lanes, width(batch), num_parts(batch)
+    series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
     lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
     drawn = [_packed(part.transpose(2, 0, 1), lanes) for part in batch.components]
     counts = (ctypes.c_long * max(1, len(drawn)))(*(part.shape[1] for part in drawn))
     pointers = (ctypes.c_void_p * max(1, len(drawn)))(*(part.ctypes.data for part in drawn))
-    places = (ctypes.c_long * len(rows))(*rows)
-    inputs = [_padded(batch.state, width), _padded(batch.memory, width), *series]
+    places = (ctypes.c_long * len(job.rows))(*job.rows)
+    inputs = [padded(batch.state, wide), padded(batch.memory, wide), *series]
     values = np.ascontiguousarray(batch.parameters, dtype=float)
-    edges = np.linspace(0, width // lanes, parts + 1).astype(int).tolist()
+    edges = np.linspace(0, wide // lanes, parts + 1).astype(int).tolist()
     records, goal, sums, tally = (wanted.get(name) for name in ("records", "goal", "sums", "tally"))
-
-    def longs(*numbers: int) -> list[Any]:
-        return [ctypes.c_long(number) for number in numbers]
-
-    def address(array: Array | None, *place: int) -> Any:
-        return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
 
     def work(variant: int, part: int) -> None:
         run(
-            *longs(edges[part], edges[part + 1], width, batch.state.shape[1], num_steps, every),
+            *longs(edges[part], edges[part + 1], wide, batch.state.shape[1], job.num_steps, job.every),
             lengths,
             *(address(array) for array in (values[variant], *inputs)),
             pointers,
             counts,
             places,
-            *longs(len(rows)),
+            *longs(len(job.rows)),
             *(address(records, variant), address(goal), address(sums, variant), address(tally, part, variant)),
             address(worst, variant),
         )
 
-    waiting = product(range(len(values)), range(parts))
+    spread(work, product(range(len(values)), range(parts)))
+
+
+def longs(*numbers: int) -> list[Any]:
+    """Whole numbers as C takes them."""
+    return [ctypes.c_long(number) for number in numbers]
+
+
+def address(array: Array | None, *place: int) -> Any:
+    """Where an array's entry at a place begins, as C takes it."""
+    return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
+
+
+def spread(work: Callable[..., None], tasks: Iterable[tuple[int, ...]]) -> None:
+    """Do the work on each task, on as many threads as there are cores; an interrupt begins no new task."""
+    waiting = iter(tasks)
 
     def drain() -> None:
         for task in waiting:

@@ -8,27 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 
-from shipid.engine.casadi import run_casadi
-from shipid.engine.integrate import Array, Batch, Method
-from shipid.engine.native import compiler, measure_native, run_native
+from shipid.engine.engines import chosen, named
+from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
-Engine = Literal["auto", "casadi", "torch", "compiled", "native"]
-
 SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
-COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
-NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
-COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
-BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 
 @dataclass(frozen=True)
@@ -67,7 +59,7 @@ def rollout(
     components: Mapping[str, Array] | None = None,
     helmsman: Helmsman | None = None,
     keep: Sequence[str] | None = None,
-    engine: Engine = "auto",
+    engine: str = "auto",
     device: str = "cpu",
 ) -> Trajectories:
     """Open-loop prediction of many samples by many variants of one vessel structure.
@@ -88,26 +80,17 @@ def rollout(
         (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
     """
-    _check(engine, device, num_steps, every)
+    asked = named(engine, device)
+    if num_steps < 1 or every < 1 or num_steps % every:
+        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, found {num_steps} and {every}")
     given = start, commands, environment or {}, components or {}
-    model, batch = _prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
-    names = (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
+    model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
+    names = channels(model)
     kept = tuple(names if keep is None else keep)
-    unknown = next((name for name in kept if name not in names), None)
-    if unknown is not None:
-        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
-    rows = [names.index(name) for name in kept]
-    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
+    job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
     with np.errstate(all="ignore"):
-        if chosen == "casadi":
-            records, worst = run_casadi(model, batch, step, num_steps, method, every, rows)
-        elif chosen == "native":
-            records, worst = run_native(model, batch, step, num_steps, method, every, rows)
-        else:
-            from shipid.engine.torch import run_torch
-
-            records, worst = run_torch(model, batch, step, num_steps, method, every, rows, chosen == "compiled", device)
-    return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~_finite(batch), step * every)
+        records, worst = (asked or chosen(batch, job)).run(model, batch, job)
+    return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~finite(batch), step * every)
 
 
 @dataclass(frozen=True)
@@ -135,7 +118,7 @@ def distances(
     method: Method = "euler",
     parameters: Array | None = None,
     memory: Mapping[str, Array] | None = None,
-    engine: Engine = "auto",
+    engine: str = "auto",
     device: str = "cpu",
 ) -> Distances:
     """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
@@ -144,28 +127,29 @@ def distances(
     the paths of a few variants at a time.
     """
     num_steps = len(goal)
-    _check(engine, device, num_steps, 1)
-    model, batch = _prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
-    chosen = _by_size(batch, num_steps, method, device) if engine == "auto" else engine
-    rows = [model.state.index("north"), model.state.index("east")]
-    if chosen == "native":
-        there = goal.transpose(0, 2, 1)
-        total, counts, worst = measure_native(model, batch, step, num_steps, method, rows, there)
-        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~_finite(batch))
+    asked = named(engine, device)
+    if num_steps < 1:
+        raise ShipidError("goal holds no step: give one position or more for each sample")
+    model, batch = prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
+    rows = model.state.index("north"), model.state.index("east")
+    job = Job(step, num_steps, method, 1, rows, device)
+    way = asked or chosen(batch, job)
+    if way.measure is not None:
+        total, counts, worst = way.measure(model, batch, job, goal.transpose(0, 2, 1))
+        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~finite(batch))
     few = max(1, PATHS_KEPT // goal.size)
     found = []
     for first in range(0, len(batch.parameters), few):
-        part = rollout(
-            vessel, start, commands, environment, step=step, num_steps=num_steps, method=method, memory=memory,
-            parameters=batch.parameters[first : first + few], keep=("north", "east"), engine=chosen, device=device,
-        )  # fmt: skip
+        part = replace(batch, parameters=batch.parameters[first : first + few])
         with np.errstate(all="ignore"):
-            apart = [position_error(part.states[1:, own], goal) for own in range(part.states.shape[1])]
-        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), part.diverged))
+            records, worst = way.run(model, part, job)
+            apart = [position_error(records[1:, v], goal) for v in range(records.shape[1])]
+        diverged = ~(worst <= SPEED_LIMIT) | ~finite(part)
+        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), diverged))
     return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _prepared(
+def prepared(
     vessel: Vessel,
     start: Mapping[str, Array],
     commands: Mapping[str, Array],
@@ -200,32 +184,25 @@ def _prepared(
     return model, replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
 
 
-def _check(engine: str, device: str, num_steps: int, every: int) -> None:
-    if engine not in get_args(Engine):
-        raise ShipidError(f"there is no engine {engine!r}: {choices(engine, get_args(Engine))}")
-    if engine in ("native", "casadi") and device != "cpu":
-        raise ShipidError(f"engine {engine!r} runs on the CPU: use 'torch' or 'compiled' on {device!r}")
-    if num_steps < 1 or every < 1 or num_steps % every:
-        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, found {num_steps} and {every}")
+def channels(model: Dynamics) -> tuple[str, ...]:
+    """Names of what a rollout can record: states, hidden states of terms, what actuators have reached."""
+    return (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
 
 
-def _finite(batch: Batch) -> Array:
+def places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:
+    """Places of the channels to keep; ShipidError for one that the vessel does not have."""
+    unknown = next((name for name in kept if name not in names), None)
+    if unknown is not None:
+        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
+    return tuple(names.index(name) for name in kept)
+
+
+def finite(batch: Batch) -> Array:
     """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
     drawn = (part.swapaxes(1, 2) for part in batch.components)
     inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
     samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
-
-
-def _by_size(batch: Batch, num_steps: int, method: Method, device: str) -> Engine:
-    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
-    width = batch.state.shape[1] * len(batch.parameters)
-    work = num_steps * width * (4 if method == "rk4" else 1) * weight
-    if device != "cpu":
-        return "compiled" if work > COMPILE_FROM else "torch"
-    if work > NATIVE_FROM and compiler() is not None:
-        return "native"
-    return "casadi" if width < BATCH_FROM else "torch"
 
 
 def _channels(

@@ -12,7 +12,8 @@ import torch
 import torch._inductor
 from torch.fx.experimental.proxy_tensor import make_fx
 
-from shipid.engine.integrate import Batch, Method, integrate
+from shipid.engine.adjoint import Adjoint, Loss, checked_loss
+from shipid.engine.integrate import Batch, Job, Method, integrate
 from shipid.engine.lowering import lower
 from shipid.vessel.dynamics import Dynamics
 
@@ -153,24 +154,15 @@ def _sum(value: Any, count: int) -> Any:
     return value.expand(*value.shape[:-1], count).sum(-1)
 
 
-def run_torch(
-    model: Dynamics,
-    batch: Batch,
-    step: float,
-    num_steps: int,
-    method: Method,
-    every: int,
-    rows: list[int],
-    compiled: bool,
-    device: str,
-) -> tuple[np.ndarray, np.ndarray]:
+def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[np.ndarray, np.ndarray]:
     """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
 
     Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
     a family of any size needs one compilation and a block stays in the cache.
     """
+    num_steps, every, rows, device = job.num_steps, job.every, list(job.rows), job.device
     varying = len(batch.commands) > 1 or len(batch.environment) > 1
-    program = _program(model, method, step, tuple(rows), varying)
+    program = _program(model, job.method, job.step, job.rows, varying)
     num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
     most_components = max((part.shape[2] for part in batch.components), default=1)
     width = _width(num_samples, num_variants, most_components, compiled, device)
@@ -209,13 +201,45 @@ def run_torch(
                         known = [_at(commands, k), _at(environment, k), *saved]
                     inputs = [x, m, greatest, _at(tau, k), *own, *known]
                     if compiled and k == 0:
-                        advance = _runner(program, method, inputs, len(own))
+                        advance = _runner(program, job.method, inputs, len(own))
                     x, m, greatest, record = advance(*inputs)
                     if (k + 1) % every == 0:
                         target[(k + 1) // every] = record
                 worst[group, block] = greatest
     result = records.permute(0, 2, 3, 1)[:, :, :num_samples]
     return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
+
+
+def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+    """A loss on the job's channels and its derivatives, by PyTorch's reverse mode; as `gradient_native`."""
+    program = _program(model, job.method, job.step, job.rows, True)
+    place, num_samples = torch.device(job.device), batch.state.shape[1]
+
+    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, S)
+        return torch.tensor(array, dtype=torch.float64, device=place).unsqueeze(-2)
+
+    start, memory = tensor(batch.state).requires_grad_(), tensor(batch.memory)
+    commands, environment = tensor(batch.commands), tensor(batch.environment)
+    force = tensor(np.repeat(batch.tau_extra, job.num_steps // len(batch.tau_extra), axis=0)).requires_grad_()
+    values = tensor(np.repeat(batch.parameters.T, num_samples, axis=1)).requires_grad_()
+    saved = program.parameters_stage(values)
+    x, m, both = start, memory, torch.cat([start, memory])
+    worst = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
+    records = [both[list(job.rows)]]
+    for k in range(job.num_steps):
+        known = [_at(commands, k), _at(environment, k), *saved]
+        x, m, worst, record = _whole(program)(x, m, worst.detach(), force[k], *known)
+        records.append(record)
+    path = torch.stack(records)[:, :, 0].transpose(1, 2)  # (T + 1, S, C)
+    found = path.detach().cpu().numpy()
+    losses, slopes = checked_loss(loss, found)
+    inputs = [start, values, force]
+    gradients = torch.autograd.grad(path, inputs, torch.tensor(slopes, device=place), allow_unused=True)
+    state, parameters, tau = (
+        (torch.zeros_like(one) if gradient is None else gradient).squeeze(-2).cpu().numpy()
+        for one, gradient in zip(inputs, gradients, strict=True)
+    )
+    return Adjoint(losses, found, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
 
 
 def _at(series: torch.Tensor, k: int) -> torch.Tensor:

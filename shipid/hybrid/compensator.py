@@ -14,70 +14,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.physics import Physics
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Layers = tuple[tuple[Array, Array], ...]
-MOTIONS = ("u", "v", "r")
-TOLERANCE = 1e-9  # two columns that differ by less, relative to their size, are one column written twice
-
-
-def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict[str, Array]:
-    """Name every candidate input: u, v, r, the commands and, where wind was measured, the relative wind.
-
-    u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7). What is not measured is no input.
-
-    Parameters
-    ----------
-    columns : quantities (S,) at the instants of prediction, SI and radians.
-    commands : names of the command columns, `<component>.<signal>`.
-
-    Raises
-    ------
-    DataError : a motion or a command is missing.
-    """
-    for name in (*MOTIONS, *commands):
-        if name not in columns:
-            raise DataError(f"the compensator needs this column; there are {', '.join(sorted(columns))}", path=name)
-    table = {name: np.asarray(columns[name], dtype=float) for name in (*MOTIONS, *commands)}
-    if "V_w" in columns and "beta_w" in columns:
-        angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
-        table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
-        table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
-    return table
-
-
-def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
-    """Merge columns that are equal and drop those that are constant: (12) becomes (13) where both azimuths act as one.
-
-    Parameters
-    ----------
-    table : features (S,), training samples only.
-
-    Returns
-    -------
-    dict : name of each feature that stays -> all the columns it stands for, itself first.
-
-    Raises
-    ------
-    DataError : none of them varies.
-    """
-    chosen: dict[str, tuple[str, ...]] = {}
-    for name, values in table.items():
-        tolerance = TOLERANCE * max(1e-300, float(np.abs(values).max(initial=0.0)))
-        if np.ptp(values) <= tolerance:
-            continue
-        twin = next((kept for kept in chosen if "." in name and np.allclose(table[kept], values, 0.0, tolerance)), None)
-        if twin is None:
-            chosen[name] = (name,)
-        else:
-            chosen[twin] += (name,)
-    if not chosen:
-        raise DataError(
-            f"none of {', '.join(table)} varies over the training windows: nothing can be learned from them"
-        )
-    return chosen
 
 
 @dataclass(frozen=True)
@@ -133,22 +76,30 @@ class Network:
 
 @dataclass(frozen=True)
 class Compensator:
-    """The mean of some networks: measured quantities at an instant -> compensation of the path after it.
+    """The mean of some networks: what is known at an instant -> compensation of the path after it.
 
     Parameters
     ----------
-    commands : names of the command columns.
-    networks : one per fold (recipe `paper`), or those of the best trials (`fast`).
-    hyperparameters : what tuning chose, for the record.
+    inputs : which quantities the networks may take.
+    networks : one per fold (`path-trained`), or those of the best trials (`path-drawn`).
+    hyperparameters : what the search chose, for the record.
     """
 
-    commands: tuple[str, ...]
+    inputs: Inputs
     networks: tuple[Network, ...]
     hyperparameters: Mapping[str, float]
 
-    def predict(self, columns: Mapping[str, Array]) -> Array:
-        """Return the compensation (T, S, 2) [m] in the frame (11) of the instant of prediction, from columns (S,)."""
-        table = feature_table(columns, self.commands)
+    @property
+    def past(self) -> float:
+        """Length of the past that a prediction needs [s]."""
+        return self.inputs.memory.past
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
+        """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
+        return paths + self.compensation(self.inputs.table(physics, instants))
+
+    def compensation(self, table: Mapping[str, Array]) -> Array:
+        """Return the compensation (T, S, 2) [m] in the frame (11) of the instant, from inputs (S,) by name."""
         for network in self.networks:
             for name in network.normaliser.names:
                 if name not in table:
@@ -156,12 +107,12 @@ class Compensator:
                         "the compensator was trained with this input; measure wind (V_w, beta_w)", path=name
                     )
         total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
-        return total / len(self.networks)
+        return np.asarray(total / len(self.networks))
 
     def header(self) -> dict[str, Any]:
         """Return all that is not an array, as plain JSON."""
         return {
-            "commands": list(self.commands),
+            "inputs": self.inputs.header(),
             "hyperparameters": dict(self.hyperparameters),
             "networks": [
                 {"features": {k: list(v) for k, v in n.features.items()}, "layers": len(n.layers)}
@@ -193,25 +144,9 @@ class Compensator:
                 normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])
                 networks.append(Network(features, normaliser, arrays[f"{i}.basis"], layers))
                 _check(networks[-1], i)
-            return cls(tuple(header["commands"]), tuple(networks), dict(header["hyperparameters"]))
+            return cls(Inputs.from_header(header["inputs"]), tuple(networks), dict(header["hyperparameters"]))
         except KeyError as error:
             raise ResultError("missing in the saved compensator", path=str(error.args[0])) from None
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """What tuning found for one model.
-
-    Parameters
-    ----------
-    compensator : the best; None where every trial diverged (targets that are not numbers).
-    trials : a row each: number, params, value [m^2], epochs, seconds, state (`complete` or `diverged`).
-    seconds : time spent on this model, its share of each stack.
-    """
-
-    compensator: Compensator | None
-    trials: list[dict[str, Any]]
-    seconds: float
 
 
 def _check(network: Network, index: int) -> None:

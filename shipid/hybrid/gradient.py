@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
@@ -12,59 +12,47 @@ import numpy as np
 import optuna
 from optuna.trial import Trial, TrialState
 
-from shipid.hybrid.compensator import (
-    Array,
-    Compensator,
-    Index,
-    Network,
-    Normaliser,
-    Tuned,
-    choose_features,
-    feature_table,
-    flatten,
-)
-from shipid.hybrid.recipe import GradientRecipe, seed_of
+from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
+from shipid.hybrid.features import Inputs, choose_features
+from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.settings import seed_of
 from shipid.hybrid.training import Settings, train
 
 Parameters = dict[str, float]
 
 
-def tune_gradient(
-    columns: Mapping[str, Array],
-    commands: Sequence[str],
-    targets: Mapping[str, Array],
-    folds: Sequence[tuple[Index, Index]],
-    recipe: GradientRecipe,
-    seed: int,
-    *,
-    on_trial: Callable[[int, int], None] | None = None,
-    device: str = "cpu",
-) -> dict[str, Tuned]:
-    """Train networks for each model: arguments and result as those of `tune`.
+def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
+    """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
-    best trial.
+    best trial. Foundations with the same inputs and the same architecture in a trial train as one stack.
     """
-    table = feature_table(columns, commands)
-    outputs = {key: flatten(paths) for key, paths in targets.items()}
-    data = [_prepare(table, outputs, training, validation) for training, validation in folds]
-    runs = {key: _Run(_study(seed_of(seed, key))) for key in targets}
+    inputs = Inputs(task.commands, method.memory)
+    tables = shared_tables(task, inputs)
+    outputs = {key: flatten(paths) for key, paths in task.targets.items()}
+    data = {key: [_prepare(tables[key], training, validation) for training, validation in task.folds] for key in tables}
+    runs = {key: _Run(_study(seed_of(task.seed, key))) for key in outputs}
 
-    for number in range(recipe.trials):
+    for number in range(method.trials):
         trials = {key: run.study.ask() for key, run in runs.items()}
-        asked = {key: _suggest(trial, recipe) for key, trial in trials.items()}
-        for stack in _stacks(asked):
+        asked = {key: _suggest(trial, method) for key, trial in trials.items()}
+        for stack in _stacks(asked, tables):
             start = time.perf_counter()
-            results = [_fit(fold, stack, recipe, (seed, number, i), device) for i, fold in enumerate(data)]
+            some = next(iter(stack))
+            results = [
+                _fit(fold, {key: outputs[key] for key in stack}, stack, method, (task.seed, number, i), task.device)
+                for i, fold in enumerate(data[some])
+            ]
             seconds = (time.perf_counter() - start) / len(stack)
             for key, parameters in stack.items():
                 runs[key].record(parameters, [result[key] for result in results], seconds)
         for key, run in runs.items():
             run.tell(trials[key])
-        if on_trial is not None:
-            on_trial(number + 1, recipe.trials)
+        if task.on_trial is not None:
+            task.on_trial(number + 1, method.trials)
 
-    return {key: run.tuned(tuple(commands)) for key, run in runs.items()}
+    return {key: run.fitted(inputs) for key, run in runs.items()}
 
 
 @dataclass(frozen=True)
@@ -74,7 +62,6 @@ class _Data:
     features: dict[str, tuple[str, ...]]
     normaliser: Normaliser
     inputs: Array
-    outputs: dict[str, Array]
     train_idx: Index
     val_idx: Index
 
@@ -117,21 +104,26 @@ class _Run:
         else:
             self.study.tell(trial, state=TrialState.FAIL)
 
-    def tuned(self, commands: tuple[str, ...]) -> Tuned:
-        found = Compensator(commands, self.best_networks, self.best_parameters) if self.best_networks else None
-        return Tuned(found, self.rows, self.seconds)
+    def fitted(self, inputs: Inputs) -> Fitted:
+        found = Compensator(inputs, self.best_networks, self.best_parameters) if self.best_networks else None
+        return Fitted(found, self.rows, self.seconds)
 
 
-def _prepare(table: Mapping[str, Array], outputs: dict[str, Array], training: Index, validation: Index) -> _Data:
+def _prepare(table: Mapping[str, Array], training: Index, validation: Index) -> _Data:
     """Choose and normalise the inputs by the training windows alone."""
     seen = {name: values[training] for name, values in table.items()}
     features = choose_features(seen)
     normaliser = Normaliser.fit(seen, tuple(features))
-    return _Data(features, normaliser, normaliser.apply(table), outputs, training, validation)
+    return _Data(features, normaliser, normaliser.apply(table), training, validation)
 
 
 def _fit(
-    data: _Data, stack: Mapping[str, Parameters], recipe: GradientRecipe, entropy: tuple[int, ...], device: str
+    data: _Data,
+    targets: Mapping[str, Array],
+    stack: Mapping[str, Parameters],
+    recipe: PathTrained,
+    entropy: tuple[int, ...],
+    device: str,
 ) -> dict[str, _Result]:
     """Train one network per model of a stack on one fold."""
     first = next(iter(stack.values()))
@@ -146,7 +138,7 @@ def _fit(
         batch=recipe.batch,
         patience=recipe.patience,
     )
-    outputs = np.stack([data.outputs[key] for key in stack])
+    outputs = np.stack([targets[key] for key in stack])
     basis = np.eye(outputs.shape[-1] // 2)
     trained = train(
         data.inputs,
@@ -169,11 +161,12 @@ def _fit(
     }
 
 
-def _stacks(asked: Mapping[str, Parameters]) -> list[dict[str, Parameters]]:
-    """Group models by architecture, in the order of their first member."""
-    stacks: dict[tuple[float, ...], dict[str, Parameters]] = {}
+def _stacks(asked: Mapping[str, Parameters], tables: Mapping[str, Mapping[str, Array]]) -> list[dict[str, Parameters]]:
+    """Group models by inputs and architecture, in the order of their first member."""
+    stacks: dict[tuple[object, ...], dict[str, Parameters]] = {}
     for key, parameters in asked.items():
-        stacks.setdefault(tuple(parameters[name] for name in GradientRecipe.COUNTS), {})[key] = parameters
+        alike = (same_table(tables[key]), *(parameters[name] for name in PathTrained.COUNTS))
+        stacks.setdefault(alike, {})[key] = parameters
     return list(stacks.values())
 
 
@@ -184,7 +177,7 @@ def _study(seed: int) -> optuna.Study:
     return optuna.create_study(direction="minimize", sampler=sampler)
 
 
-def _suggest(trial: Trial, recipe: GradientRecipe) -> Parameters:
+def _suggest(trial: Trial, recipe: PathTrained) -> Parameters:
     """Take each hyperparameter from the trial where the recipe has a range, else from the recipe."""
     parameters: Parameters = {name: getattr(recipe, name) for name in recipe.SEARCHED}
     for name, (low, high) in recipe.ranges().items():

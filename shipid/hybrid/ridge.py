@@ -22,22 +22,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shipid.hybrid.compensator import (
-    MOTIONS,
-    Array,
-    Compensator,
-    Index,
-    Network,
-    Normaliser,
-    Tuned,
-    choose_features,
-    feature_table,
-)
-from shipid.hybrid.recipe import RidgeRecipe, seed_of
+from shipid.hybrid.compensator import Compensator, Network, Normaliser
+from shipid.hybrid.features import Inputs, choose_features, group_of
+from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.settings import seed_of
+from shipid.physics.signals import mirror_sign, orders_thrust, steers
 
 SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
 ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
-ODD = {"v", "r", "v_rw", "alpha", "delta"}  # change sign in the mirror: motions, relative wind, angles of actuators
 
 
 @dataclass(frozen=True)
@@ -83,66 +76,107 @@ class _Search:
         if len(self.kept) < self.most or value < self.kept[-1][0]:
             self.kept = sorted([*self.kept, (value, params, network())], key=lambda kept: kept[0])[: self.most]
 
-    def tuned(self, commands: tuple[str, ...]) -> Tuned:
+    def fitted(self, inputs: Inputs) -> Fitted:
         """Average the best networks."""
-        compensator = Compensator(commands, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Tuned(compensator, self.rows, sum(row["seconds"] for row in self.rows))
+        compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
+        return Fitted(compensator, self.rows, sum(row["seconds"] for row in self.rows))
 
 
-def tune_ridge(
-    columns: Mapping[str, Array],
-    commands: Sequence[str],
-    targets: Mapping[str, Array],
-    folds: Sequence[tuple[Index, Index]],
-    recipe: RidgeRecipe,
-    seed: int,
-    *,
-    on_trial: Callable[[int, int], None] | None = None,
-    device: str = "cpu",
-) -> dict[str, Tuned]:
-    """Solve networks for each model: arguments and result as those of `tune`.
+@dataclass(frozen=True)
+class _Group:
+    """Foundations whose inputs are the same arrays in a trial: one decomposition serves them all.
+
+    names : the foundations. outputs : x and y of their targets on the basis, (S, K r) each.
+    plain, mirrored : the inputs without and with the mirror; None where a column has no image in it.
+    """
+
+    names: tuple[str, ...]
+    outputs: list[Tensor]
+    plain: _Inputs
+    mirrored: _Inputs | None
+
+
+def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
+    """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
     predicted by the solution without any window outside its training part. The compensator is the mean of the networks
     of the best trials, solved with all windows of the folds.
     """
-    windows = np.unique(np.concatenate([part for fold in folds for part in fold]))
-    table = {name: values[windows] for name, values in feature_table(columns, commands).items()}
-    blocks = _blocks(folds, windows, device)
+    inputs = Inputs(task.commands, method.memory)
+    windows = np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+    tables, device = _of_windows(shared_tables(task, inputs), windows), task.device
+    blocks = _blocks(task.folds, windows, device)
+    targets = task.targets
     names = [key for key, paths in targets.items() if np.isfinite(paths[:, windows]).all()]
-    basis = smooth_basis(len(next(iter(targets.values()))), recipe.terms)
-    paths = [np.tensordot(basis.T, targets[key][:, windows], 1) for key in names]
-    judged = np.concatenate([validation for _, validation in folds])
-    faster = [_faster(targets[key][:, judged], basis) for key in names]
-    outputs = [_side(paths, axis, len(windows), device) for axis in (0, 1)]
-    plain, mirrored = _inputs(table, device), _mirrored(table, device)
-    searches = {key: _Search(recipe.averaged) for key in names}
-    ridges = recipe.path()
+    basis = smooth_basis(task.windows.horizon, method.terms)
+    terms = basis.shape[1]
+    paths = {key: np.tensordot(basis.T, targets[key][:, windows], 1) for key in names}
+    judged = np.concatenate([validation for _, validation in task.folds])
+    faster = {key: _faster(targets[key][:, judged], basis) for key in names}
+    searches = {key: _Search(method.averaged) for key in names}
+    ridges = method.path()
+    groups: dict[frozenset[str], list[_Group]] = {}
 
-    for number, point in enumerate(recipe.points()):
-        start = time.perf_counter()
-        seen = mirrored if point["mirror"] and mirrored is not None else plain
-        hidden = _draw(seen, point, recipe.units, seed_of(seed, number))
-        parts = _parts(seen, hidden, outputs, device)
-        errors = _left_out(parts, ridges, blocks, basis.shape[1])
-        for k, key in enumerate(names):
-            ridge = ridges[errors[:, k].argmin()]
-            params = {**point, "mirror": float(seen is mirrored), "ridge": ridge}
-            value = float(errors[:, k].min() + faster[k]) / (2 * len(basis) * len(judged))
-            mine = slice(k * basis.shape[1], (k + 1) * basis.shape[1])
-            searches[key].record(number, params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
-        seconds = (time.perf_counter() - start) / max(1, len(names))
-        for search in searches.values():
-            search.rows[-1] |= {"seconds": seconds, "epochs": 0}
-        if on_trial is not None:
-            on_trial(number + 1, recipe.trials)
-    return {key: searches[key].tuned(tuple(commands)) if key in searches else _unsolvable(recipe) for key in targets}
+    for number, point in enumerate(method.points()):
+        left_out = method.left_out(point)
+        if left_out not in groups:
+            groups[left_out] = _groups({key: tables[key] for key in names}, paths, left_out, len(windows), device)
+        for group in groups[left_out]:
+            start = time.perf_counter()
+            seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
+            hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
+            parts = _parts(seen, hidden, group.outputs, device)
+            errors = _left_out(parts, ridges, blocks, terms)
+            for k, key in enumerate(group.names):
+                ridge = ridges[errors[:, k].argmin()]
+                params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
+                value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
+                mine = slice(k * terms, (k + 1) * terms)
+                searches[key].record(number, params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
+            seconds = (time.perf_counter() - start) / len(group.names)
+            for key in group.names:
+                searches[key].rows[-1] |= {"seconds": seconds, "epochs": 0}
+        if task.on_trial is not None:
+            task.on_trial(number + 1, method.trials)
+    return {key: searches[key].fitted(inputs) if key in searches else _unsolvable(method) for key in targets}
 
 
-def _unsolvable(recipe: RidgeRecipe) -> Tuned:
-    """What is found where targets are not numbers: nothing, in every trial."""
+def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
+    """Tables with the chosen windows alone; arrays that several tables share stay shared."""
+    chosen: dict[int, Array] = {}
+    for table in tables.values():
+        for values in table.values():
+            chosen.setdefault(id(values), values[windows])
+    return {key: {name: chosen[id(values)] for name, values in table.items()} for key, table in tables.items()}
+
+
+def _groups(
+    tables: Mapping[str, Mapping[str, Array]],
+    paths: Mapping[str, Array],
+    left_out: frozenset[str],
+    num_windows: int,
+    device: str,
+) -> list[_Group]:
+    """Foundations with the same inputs together; `left_out` names kinds of memory that the trial does not take."""
+    alike: dict[Any, list[str]] = {}
+    seen: dict[Any, dict[str, Array]] = {}
+    for key, table in tables.items():
+        taken = {name: values for name, values in table.items() if group_of(name) not in left_out}
+        alike.setdefault(same_table(taken), []).append(key)
+        seen[same_table(taken)] = taken
+    found = []
+    for table_key, keys in alike.items():
+        outputs = [_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
+        table = seen[table_key]
+        found.append(_Group(tuple(keys), outputs, _inputs(table, device), _mirrored(table, device)))
+    return found
+
+
+def _unsolvable(method: PathDrawn) -> Fitted:
+    """The result where targets are not numbers: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    return Tuned(None, [{"number": i, "params": point, **blank} for i, point in enumerate(recipe.points())], 0.0)
+    return Fitted(None, [{"number": i, "params": point, **blank} for i, point in enumerate(method.points())], 0.0)
 
 
 def smooth_basis(horizon: int, terms: int) -> Array:
@@ -176,7 +210,7 @@ def _inputs(table: Mapping[str, Array], device: str, reflection: Array | None = 
     seen = np.stack([table[name] for name in names], axis=1)
     both = seen if reflection is None else np.concatenate([seen, seen @ reflection])
     normaliser = Normaliser(names, both.mean(axis=0), both.std(axis=0))
-    groups = tuple("motion" if name in MOTIONS else "wind" if name.endswith("_rw") else "command" for name in names)
+    groups = tuple(group_of(name) for name in names)
     return _Inputs(features, normaliser, _tensor(normaliser.apply(table), device), reflection, groups)
 
 
@@ -194,10 +228,11 @@ def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ..
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
         words = re.split("([^a-z]+)", component)
-        if signal == "n" and ACROSS & set(words) and f"{component}.alpha" not in table:
+        turns = any(steers(other) for other in table if other.startswith(f"{component}."))
+        if orders_thrust(column) and ACROSS & set(words) and not turns:
             return None
         partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
-        sign = -1.0 if signal in ODD else 1.0
+        sign = mirror_sign(column)
         if column in standing and partner in standing:
             matrix[names.index(standing[partner]), names.index(standing[column])] = sign
         elif column in standing or partner not in table or not np.allclose(values, sign * table[partner]):

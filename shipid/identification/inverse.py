@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import ANGLES, Dataset, pieces
+from shipid.data.dataset import Dataset, pieces, wraps
 from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
@@ -315,7 +315,7 @@ def _stretch(
     """One stretch; None if it holds no bump."""
     t = rows["t"].to_numpy(dtype=float)
     columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
-    columns |= {name: np.unwrap(columns[name]) for name in ANGLES if name in columns}
+    columns |= {name: np.unwrap(columns[name]) for name in columns if wraps(name)}
     if noise is not None:
         smoothed = smooth(t, {name: columns[name] for name in STATES}, noise)
         columns |= {name: smoothed.state(name) for name in STATES}

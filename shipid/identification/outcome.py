@@ -30,6 +30,7 @@ from shipid.interrupts import uninterrupted
 from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.rows import measure_rows
+from shipid.physics.signals import is_shaft
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import length_of, standard
 from shipid.vessel.dynamics import dynamics
@@ -359,7 +360,7 @@ def _programme(
     """What to run next, at the median speed of the fitted runs and at half of it, no shaft faster than logged."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = float(np.median(np.hypot(rows["u"], rows["v"])))
-    shafts = [name for name in dynamics(vessel).commands if name.endswith(".n")]
+    shafts = [name for name in dynamics(vessel).commands if is_shaft(name)]
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))

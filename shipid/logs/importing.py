@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import (
     BREAK,
-    OPTIONAL,
-    REQUIRED,
     STANDARD_DEVIATIONS,
     Dataset,
     clock_slack,
-    is_command,
+    optional,
     pieces,
+    required,
     sample,
     units_of,
 )
@@ -29,6 +28,7 @@ from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, TextFormat, read_table, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
+from shipid.physics.signals import is_command
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
@@ -142,7 +142,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
         rows = _true_wind(rows)
-    known = [name for name in (*REQUIRED, *OPTIONAL) if name in rows]
+    known = [name for name in (*required(), *optional()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
     order = [*known, *commands, "flags"] if mapping.resamples or "latitude" in mapping.columns else list(rows.columns)
     return Imported(rows[order], first + records + gaps + more + estimated, read, origin)

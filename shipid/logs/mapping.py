@@ -9,9 +9,9 @@ from typing import Any, Literal
 from pydantic import Field, SerializeAsAny
 
 from shipid import document
-from shipid.data.dataset import OPTIONAL, REQUIRED, SIGNALS, STANDARD_DEVIATIONS, is_command, unit_of
+from shipid.data.dataset import STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import FORMATS, Format, TextFormat
+from shipid.logs.readers import READERS, Format, TextFormat
 from shipid.logs.repairs import (
     REPAIRS,
     Break,
@@ -23,14 +23,17 @@ from shipid.logs.repairs import (
     Strict,
     WrapInterpolation,
 )
+from shipid.physics.signals import is_command, named
+from shipid.units import DEGREE, KNOT, RPM
 
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "date": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
-    "m/s": {"m/s": 1.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6},
-    "rad": {"rad": 1.0, "deg": 0.017453292519943295},
-    "rad/s": {"rad/s": 1.0, "deg/s": 0.017453292519943295, "deg/min": 0.017453292519943295 / 60.0},
-    "rev/s": {"rev/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.15915494309189535},
+    "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6},
+    "rad": {"rad": 1.0, "deg": DEGREE},
+    "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
+    "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
+    "-": {"-": 1.0, "%": 1e-2},
 }
 """SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8).
 
@@ -218,9 +221,9 @@ def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
 
 def _format(raw: Any, file: Path, path: str) -> Format:
     kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
-    if kind not in FORMATS:
-        raise DocumentError(f"unknown kind {kind!r}: {choices(kind, FORMATS)}", file=file, path=f"{path}.kind")
-    found: Format = document.parse(FORMATS[kind][0], raw, file, prefix=path)
+    if kind not in READERS:
+        raise DocumentError(f"unknown kind {kind!r}: {choices(kind, READERS)}", file=file, path=f"{path}.kind")
+    found: Format = document.parse(READERS[kind].options, raw, file, prefix=path)
     return found
 
 
@@ -238,11 +241,11 @@ def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
 def _check_columns(mapping: Mapping, file: Path) -> None:
     _factor(mapping.clock.unit, "s", file, "clock.unit")
     columns = mapping.columns
-    mapped = (*REQUIRED.keys() - {"t"}, *OPTIONAL.keys() - set(STANDARD_DEVIATIONS.values()), *INPUTS)
+    mapped = (*required().keys() - {"t"}, *optional().keys() - set(STANDARD_DEVIATIONS.values()), *INPUTS)
     for name, column in columns.items():
         unit, path = INPUTS.get(name) or unit_of(name), f"columns.{name}"
         if unit is None or not (name in mapped or is_command(name)):
-            hint = f"or a command, <component>.<signal> with a signal of {', '.join(SIGNALS)}"
+            hint = f"or a command, <component>.<signal> with a signal of {', '.join(named('command'))}"
             raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
         _factor(column.unit, unit, file, f"{path}.unit")
         if (column.direction is None) == (name == "beta_w"):
@@ -274,12 +277,12 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
             message = f"missing: {' and '.join(pair)} belong together"
             if pair != ("u", "v"):
                 raise DocumentError(message, file=file, path=f"columns.{missing.pop()}")
-    for name in sorted(REQUIRED.keys() - {"t"} - columns.keys()):
+    for name in sorted(required().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
         remedy = ", or [estimate]" if name in ESTIMATED else ""
         raise DocumentError(
-            f"missing: a dataset needs {', '.join(list(REQUIRED)[1:])}{remedy}", file=file, path=f"columns.{name}"
+            f"missing: a dataset needs {', '.join(list(required())[1:])}{remedy}", file=file, path=f"columns.{name}"
         )
     if mapping.origin is not None and "latitude" not in columns:
         raise DocumentError("belongs to latitude and longitude, which are not mapped", file=file, path="origin")

@@ -1,13 +1,15 @@
 """Readers: a log as a table of columns under their own names, from text, Parquet, MATLAB or NMEA 0183.
 
-A reader is a document (how the file is written) and a function `(file, format, clock) -> table`, where `clock` names
-the column of time. Values come as they are written, text or numbers; units and meaning are the mapping's.
+A reader is a row of `READERS`: the options of its format, a function that reads, and one that recognises a file. Values
+come as they are written, text or numbers; units and meaning are the mapping's.
 """
 
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,8 +22,11 @@ from pydantic import Field, field_validator
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.repairs import Strict
+from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
+LOOKED_AT = 300  # lines that a guess at the format looks at
+_SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 
 
 class Format(Strict):
@@ -84,7 +89,7 @@ def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
     try:
         if file.stat().st_size == 0:
             raise DataError("the file is empty", file=file)
-        table: pd.DataFrame = FORMATS[form.kind][1](file, form, clock)
+        table: pd.DataFrame = READERS[form.kind].read(file, form, clock)
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
     if len(table) < 2:
@@ -276,7 +281,7 @@ def _speed(sentence: Any) -> Any:
     """Apparent wind speed [m/s] from N (knots), K (km/h) or M (m/s)."""
     if sentence.reference != "R" or not sentence.wind_speed:
         return None
-    factor = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
+    factor = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
     return None if factor is None else float(sentence.wind_speed) * factor
 
 
@@ -300,9 +305,47 @@ SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
 """Sentence -> column -> how it is read: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
 NMEA_COLUMNS = tuple(dict.fromkeys(name for columns in SENTENCES.values() for name in columns))
 
-FORMATS: dict[str, tuple[type[Format], Callable[[Path, Any, str], pd.DataFrame]]] = {
-    "text": (TextFormat, _text),
-    "parquet": (ParquetFormat, _parquet),
-    "mat": (MatFormat, _mat),
-    "nmea": (NmeaFormat, _nmea),
+
+@dataclass(frozen=True)
+class Reader:
+    """One format of logs.
+
+    options : model of the keys of [format] in a mapping.
+    read : (file, options, name of the column of time) -> table; raises DataError.
+    detect : (file, its first bytes) -> keys of [format] where it is of this format, else None; without it, no guess.
+    scattered : whether rows are single sentences that do not say everything, so that empty cells are no defect.
+    """
+
+    options: type[Format]
+    read: Callable[[Path, Any, str], pd.DataFrame]
+    detect: Callable[[Path, bytes], dict[str, Any] | None] | None = None
+    scattered: bool = False
+
+
+def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
+    return {"kind": "parquet"} if head.startswith(b"PAR1") else None
+
+
+def _is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"\x89HDF")) else None
+
+
+def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
+    """Most lines are sentences; the time is before them, or else in the fixes."""
+    if b"\0" in head:
+        return None
+    lines = [line for line in head.decode("latin-1").splitlines()[:LOOKED_AT] if line.strip()]
+    sentences = [line for line in lines if _SENTENCE.search(line)]
+    if len(sentences) <= len(lines) / 2:
+        return None
+    stamped = sum(not line.lstrip().startswith("$") for line in sentences)
+    return {"kind": "nmea", "time": "line" if stamped > len(sentences) / 2 else "fix"}
+
+
+READERS: dict[str, Reader] = {
+    "text": Reader(TextFormat, _text),  # no signature: a guess takes whatever is nothing else for text
+    "parquet": Reader(ParquetFormat, _parquet, _is_parquet),
+    "mat": Reader(MatFormat, _mat, _is_mat),
+    "nmea": Reader(NmeaFormat, _nmea, _is_nmea, scattered=True),
 }
+"""Kind, as in [format] of a mapping -> reader. To add a format: its options, its two functions, a row here."""

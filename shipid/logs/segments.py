@@ -9,8 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Array, Dataset, is_command, pieces
+from shipid.data.dataset import Array, Dataset, pieces
 from shipid.logs.mapping import Segment
+from shipid.physics.signals import is_shaft, steers
 
 HELM = np.radians(3.0)  # rad: less is steering a course
 TURN = np.radians(120.0)  # rad of heading over one helm: a turning, not a leg of a zigzag
@@ -86,7 +87,7 @@ def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
 
 def _helm(rows: pd.DataFrame) -> Array:
     """Mean steering angle [rad], about its median in the straightest rows; yaw rate in its place if none is logged."""
-    names = [name for name in map(str, rows.columns) if is_command(name) and not name.endswith(".n")]
+    names = [name for name in map(str, rows.columns) if steers(name)]
     if not names:
         r = rows["r"].to_numpy()
         return np.asarray(r / max(float(np.percentile(np.abs(r), 95)), 1e-9) * 4 * HELM)
@@ -133,7 +134,7 @@ def _straight(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, 
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
         return
     part = rows.iloc[first : last + 1]
-    shafts = [name for name in map(str, rows.columns) if is_command(name) and name.endswith(".n")]
+    shafts = [name for name in map(str, rows.columns) if is_shaft(name)]
     watched = part[shafts or ["u"]]  # the ship's own speed changes after every turn, too
     change = watched.quantile(0.98) - watched.quantile(0.02)
     moved = bool((change > CHANGE * watched.abs().median().clip(lower=1e-9)).any())

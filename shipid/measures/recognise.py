@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from shipid.errors import DataError
 from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
+from shipid.physics.signals import is_command, is_shaft, steers
 from shipid.units import DEGREE
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
@@ -34,8 +35,8 @@ def record_of(columns: Mapping[str, Array]) -> Record:
     if missing is not None:
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles = [np.asarray(values, dtype=float) for values in _commands(columns, (".delta", ".alpha"))]
-    shafts = [np.asarray(values, dtype=float) for values in _commands(columns, (".n",))]
+    angles = [np.asarray(values, dtype=float) for values in _commands(columns, steers)]
+    shafts = [np.asarray(values, dtype=float) for values in _commands(columns, is_shaft)]
     helms = [sign * angle for angle in angles if (sign := _sense(angle, states["r"]))]
     running = [shaft for shaft in shafts if shaft[0] != 0]
     return Record(
@@ -45,8 +46,8 @@ def record_of(columns: Mapping[str, Array]) -> Record:
     )
 
 
-def _commands(columns: Mapping[str, Array], endings: tuple[str, ...]) -> list[Array]:
-    return [values for name, values in columns.items() if name.count(".") == 1 and name.endswith(endings)]
+def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> list[Array]:
+    return [values for name, values in columns.items() if is_command(name) and wanted(name)]
 
 
 def _sense(angle: Array, r: Array) -> float:

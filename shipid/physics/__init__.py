@@ -1,7 +1,8 @@
 """Symbols in, symbols out: every force on a ship as a pure CasADi function.
 
 The signature is the schema: positional arguments are signals, keyword-only arguments are parameters (with unit), a
-`**` table is open and checked by its grammar. To add a term: write the function, name it here.
+`**` table is open and checked by its grammar. To add a term: write the function, name it here. To add a signal: one
+row in `signals.SIGNALS`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from shipid.physics import hull, propeller, radiation, restoring, rudder, thruster, waves, wind
+from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, signals, thruster, waves, wind
 
 
 @dataclass(frozen=True)
@@ -45,19 +46,22 @@ class Memory:
     advance: Callable[..., Any]
 
 
-@dataclass(frozen=True)
-class Signals:
-    """Names and units of what a term may ask for by a positional argument."""
-
-    motion: tuple[str, ...] = ("eta", "nu", "nu_r", "psi", "state")
-    commands: Mapping[str, str] = field(default_factory=lambda: {"n": "rev/s", "alpha": "rad", "delta": "rad"})
-    environment: Mapping[str, str] = field(
-        default_factory=lambda: {"V_w": "m/s", "beta_w": "rad", "V_c": "m/s", "beta_c": "rad"}
-    )
-    given: tuple[str, ...] = ("wash",)
+MOTION = ("eta", "nu", "nu_r", "psi", "state")
+"""What every term may ask for by a positional argument beside the commands and the environment of `signals.SIGNALS`."""
+GIVEN = ("wash",)
+"""What a term may ask for that another component gives: the one that its block says it is `behind`."""
 
 
-SIGNALS = Signals()
+class _Commands:
+    """Commands and their units, for what does not ask `signals.SIGNALS` yet."""
+
+    @property
+    def commands(self) -> dict[str, str]:
+        """Signal of a command -> SI unit."""
+        return {name: row.unit for name, row in signals.named("command").items()}
+
+
+SIGNALS = _Commands()
 
 TERMS: dict[str, Term] = {
     "hull.derivatives": Term(hull.derivatives),
@@ -66,6 +70,7 @@ TERMS: dict[str, Term] = {
     "hull.abkowitz": Term(hull.abkowitz),
     "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
     "hull.resistance": Term(hull.resistance),
+    "hull.learned": Term(learned.learned),
     "restoring.hydrostatic": Term(restoring.hydrostatic),
     "radiation.heave_pitch": Term(
         radiation.heave_pitch, states=radiation.heave_pitch_states, rates=radiation.heave_pitch_rates
@@ -80,6 +85,7 @@ TERMS: dict[str, Term] = {
     "thruster.azimuth": Term(thruster.azimuth),
     "thruster.tunnel": Term(thruster.tunnel),
     "thruster.propeller": Term(propeller.propeller, gives={"wash": propeller.wash}),
+    "thruster.controllable_pitch": Term(propeller.controllable_pitch, gives={"wash": propeller.controllable_wash}),
     "thruster.service_speed": Term(propeller.service_speed),
     "thruster.rudder": Term(rudder.rudder),
     "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),

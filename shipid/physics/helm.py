@@ -10,7 +10,8 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-STEERING = {"alpha": "rad", "delta": "rad"}  # signals that turn a ship; the other is the shaft speed n [rev/s]
+from shipid.physics.signals import steers, units
+
 DAMPING = 1.0  # of station keeping: critical
 INTEGRAL = 0.1  # of station keeping: integral gain over omega x proportional gain (Fossen 2021, sec. 15.3)
 SMALL = 1e-9  # (rev/s)^4: below it a thrust has no direction
@@ -36,15 +37,6 @@ class Helmsman:
     advance: Callable[[Named, Named, Named, Any], Named] | None = field(default=None, kw_only=True)
 
 
-def steers(command: str) -> bool:
-    """Whether a command is an angle (`port.alpha`, `rudder.delta`), not a shaft speed."""
-    return command.rpartition(".")[2] in STEERING
-
-
-def _units(commands: tuple[str, ...]) -> dict[str, str]:
-    return {name: STEERING.get(name.rpartition(".")[2], "rev/s") for name in commands}
-
-
 @lru_cache
 def zigzag(commands: tuple[str, ...]) -> Helmsman:
     """Reverse the helm whenever the heading has changed from the course of approach by the execute heading.
@@ -64,7 +56,7 @@ def zigzag(commands: tuple[str, ...]) -> Helmsman:
 
     return Helmsman(
         "zigzag",
-        {**_units(commands), "course": "rad", "execute_heading": "rad"},
+        {**units(commands), "course": "rad", "execute_heading": "rad"},
         {"side": 1.0},
         orders=orders,
         advance=lambda signals, told, memory, _dt: {"side": side(signals, told, memory)},
@@ -90,7 +82,7 @@ def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
         gained = told["gain"] / told["reset"] * (told["rate"] - signals["r"]) * dt
         return {"integral": _limit(memory["integral"] + gained)}
 
-    inputs = {**_units(commands), "rate": "rad/s", "gain": "s", "reset": "s"}
+    inputs = {**units(commands), "rate": "rad/s", "gain": "s", "reset": "s"}
     return Helmsman("yaw rate", inputs, {"integral": 0.0}, orders=orders, advance=advance)
 
 

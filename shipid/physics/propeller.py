@@ -1,4 +1,4 @@
-"""Fixed-pitch propellers: behind a hull (MMG), or as a shaft speed that belongs to a ship's speed."""
+"""Propellers behind a hull: of fixed pitch (MMG), of controllable pitch, or as a shaft speed for a ship's speed."""
 
 from __future__ import annotations
 
@@ -96,6 +96,73 @@ def wash(
     K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
     race = ca.sqrt(ca.fmax(u_P**2 + 8 / ca.pi * K * (n * D_p) ** 2, 0) + SPEED_FLOOR**2)
     return ca.vertcat(u_P, ca.if_else(n >= 0, race, u_P), D_p)
+
+
+def bilinear_thrust(u_P: SX, n: SX, pitch: SX, D_p: SX, k_P: SX, k_J: SX, k_astern: SX | float) -> SX:
+    """Open-water thrust over rho D_p^4 [s^-2] of a controllable-pitch propeller: k_P p n|n| - k_J |n| u_P / D_p.
+
+    u_P [m/s], n [rev/s], pitch p = P/D [-]. Where shaft and pitch drive astern together, k_astern times the first part.
+    """
+    driven = pitch * n * ca.fabs(n)
+    return k_P * ca.if_else(driven >= 0, 1, k_astern) * driven - k_J * ca.fabs(n) * u_P / D_p
+
+
+def controllable_pitch(
+    nu_r: SX,
+    n: SX,
+    pitch: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    k_P: Annotated[SX, "-", POSITIVE],
+    k_J: Annotated[SX, "-", POSITIVE],
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    t_P: Annotated[SX | float, "-"] = 0.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of a controllable-pitch propeller: X = (1 - t_P) rho D_p^4 (k_P p n|n| - k_J |n| u_P / D_p).
+
+    n [rev/s]; pitch p [-], the ratio P/D at 0.7 of the radius, negative to drive astern. That is K_T = k_P p - k_J J:
+    no thrust at p = 0 in still water, thrust vanishes at the advance J = k_P p / k_J, a turning disc of zero pitch
+    drags. Inflow u_P as behind a hull (see `inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
+    Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a line through the K_T curves of the
+    Wageningen B-series over pitch, not a fit of them. Linear in p, so the greatest pitches give less than it says.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus))
+    thrust = rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
+    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+
+
+def controllable_wash(
+    nu_r: SX,
+    n: SX,
+    pitch: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    k_P: Annotated[SX, "-", POSITIVE],
+    k_J: Annotated[SX, "-", POSITIVE],
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+) -> SX:
+    """Flow at a rudder behind a controllable-pitch propeller, (3): inflow, speed far down the race [m/s], D_p [m].
+
+    u_race^2 = u_P^2 + 8 T / (pi rho D_p^2) by momentum theory; no race where the propeller drives astern.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus))
+    lift = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
+    race = ca.sqrt(ca.fmax(u_P**2 + lift, 0) + SPEED_FLOOR**2)
+    return ca.vertcat(u_P, ca.if_else(pitch * n >= 0, race, u_P), D_p)
 
 
 def service_speed(

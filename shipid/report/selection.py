@@ -23,7 +23,7 @@ def spread(items: Sequence[str], count: int) -> list[str]:
 def families(content: ReportContent) -> pd.DataFrame:
     """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last."""
     known = content.models[["model", "family", "A"]]
-    trained = content.cells[["model", "kind", "A"]].rename(columns={"kind": "family"})
+    trained = content.cells[["model", "family", "A"]]
     joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})
     frame = joined.groupby("model", sort=False, as_index=False).agg({"family": "first", "A": "first"})
     frame["last"] = frame.family == DATA_DRIVEN

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.engine.integrate import Method
-from shipid.engine.rollout import Engine, rollout
+from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.helm import Unit, steers
+from shipid.physics.helm import Unit
+from shipid.physics.signals import steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -87,7 +88,7 @@ def helm_effect(controls: Controls, n: float, u: float) -> float:
 
 
 def steady(
-    controls: Controls, n: Array, *, step: float, method: Method, engine: Engine
+    controls: Controls, n: Array, *, step: float, method: Method, engine: str
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.engine.integrate import Method
-from shipid.engine.rollout import Engine, Trajectories, rollout
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
@@ -32,7 +32,7 @@ def perform(
     method: Method = "rk4",
     environment: Mapping[str, float | Array] | None = None,
     components: Mapping[str, Array] | None = None,
-    engine: Engine = "auto",
+    engine: str = "auto",
 ) -> pd.DataFrame:
     """Run manoeuvres and log them: all that one helmsman (or the clock) orders in one rollout.
 

@@ -6,21 +6,19 @@ import numpy as np
 import pandas as pd
 
 from shipid.study.plan import NO_MODEL
-from shipid.study.results import Results, naive_summary
+from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, metres, named, runs, words
 
 
 def by_model(results: Results) -> pd.DataFrame:
-    """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per model and N_D, with the spread of H over seeds.
+    """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D, with the range of H.
 
-    Failed cells are left out.
+    The method is the one that the study judges by. Failed cells are left out.
     """
-    loss = [
-        min((t["value"] for t in trials if t["value"] is not None), default=np.nan)
-        for trials in results.cells["trials"]
-    ]
-    good = results.cells.assign(loss=loss)[results.cells["status"] == "ok"]
-    grouped = good.groupby(["model", "kind", "N_D"], sort=False)
+    cells = judged_cells(results)
+    loss = [min((t["value"] for t in trials if t["value"] is not None), default=np.nan) for trials in cells["trials"]]
+    good = cells.assign(loss=loss)[cells["status"] == "ok"]
+    grouped = good.groupby(["model", "family", "N_D"], sort=False)
     frame = grouped.agg(
         A=("A", "mean"),
         H=("H", "mean"),
@@ -37,20 +35,21 @@ def by_model(results: Results) -> pd.DataFrame:
 def answer(results: Results) -> list[tuple[str, str]]:
     """Four to nine sentences built from the results, each with the anchor of the figure that carries it."""
     claims, every_model = results.plan.study.claims, by_model(results)
-    table = every_model[~every_model["kind"].isin(results.plan.aside)]
+    table = every_model[~every_model["family"].isin(results.plan.aside)]
     sentences = [(text, "cells") for text in _caveats(results)]
     largest = int(table["N_D"].max()) if len(table) else 0
     top = table[table["N_D"] == largest]
-    physics = top[top["kind"] != NO_MODEL]
+    physics = top[top["family"] != NO_MODEL]
     if physics.empty:
         where = f" at {runs(largest)}" if largest else ""
         return [*sentences, (f"No cell with physics has a result{where}, so nothing can be said yet.", "cells")]
     best = physics.iloc[int(physics["loss"].argmin())]  # chosen by validation, never by the test
     chart = "map" if _has_map(table) else "gain"
     sentences.append((_headline(best, largest, results.test.horizon * results.test.step), "gain"))
-    pure = table[table["kind"] == NO_MODEL].set_index("N_D")
+    pure = table[table["family"] == NO_MODEL].set_index("N_D")
     if len(pure):
-        failed = results.cells[(results.cells["status"] != "ok") & (results.cells["kind"] != NO_MODEL)]
+        cells = judged_cells(results)
+        failed = cells[(cells["status"] != "ok") & (cells["family"] != NO_MODEL)]
         every = "every physics model" + (" with a result" if len(failed) else "")
         sentences += [(_worth(table, pure, best), chart), (_harm(table, pure, every), chart)]
     known = physics[physics["A"] > 0]  # an exact model has no error that could be left
@@ -66,13 +65,13 @@ def answer(results: Results) -> list[tuple[str, str]]:
     if trend := _trend(table):
         sentences.append((trend, "gain"))
     sentences.append((_floor(top, largest, naive_summary(results)["mean"]), "gain"))
-    nominal = every_model[every_model["kind"] == claims.nominal] if claims else every_model[:0]
+    nominal = every_model[every_model["family"] == claims.nominal] if claims else every_model[:0]
     return [*sentences, *((text, "gain") for text in _nominal(nominal, largest))]
 
 
 def _has_map(table: pd.DataFrame) -> bool:
     """Whether there is a map H(A, N_D): more than one amount, two physics models or more."""
-    return table["N_D"].nunique() > 1 and table[table["kind"] != NO_MODEL]["model"].nunique() > 1
+    return table["N_D"].nunique() > 1 and table[table["family"] != NO_MODEL]["model"].nunique() > 1
 
 
 def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
@@ -120,7 +119,7 @@ def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
         return f"There is no result without physics at {runs(largest)}, so whether physics harms there cannot be told."
 
     def harming(amount: int) -> list[str]:
-        rows = table[(table["N_D"] == amount) & (table["kind"] != NO_MODEL)]
+        rows = table[(table["N_D"] == amount) & (table["family"] != NO_MODEL)]
         return [str(name) for name in rows[rows["H"] >= float(pure["H"].loc[amount])]["model"]]
 
     if names := harming(largest):

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
-from shipid.data.windows import from_frame
+from shipid.data.windows import Instants, from_frame, past_of
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
+from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.predictor import Predictor, check_columns
+from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file
 
@@ -35,10 +36,17 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
     parts = [_along(predictor, dataset, run, rows) for run, rows in pieces(dataset)]
     frame = pd.concat(parts, ignore_index=True)
     if frame.empty:
-        length = predictor.horizon * predictor.step
-        raise DataError(f"no run is as long as the horizon of {length:g} s, over which commands are known", file=log)
+        raise DataError(_too_short(predictor), file=log)
     write_table(out, frame)
     return frame, float(frame["outside"].mean())
+
+
+def _too_short(predictor: Predictor) -> str:
+    step = predictor.physics.step
+    length = predictor.physics.horizon * step
+    past = f"the past of {predictor.past * step:g} s" if predictor.past else ""
+    plan = f"the horizon of {length:g} s, over which commands are known" if predictor.commands == "known" else ""
+    return f"no run is as long as {' and '.join(filter(None, (past, plan)))}"
 
 
 def _known_cell(folder: Path, cell: str) -> Path:
@@ -51,29 +59,37 @@ def _known_cell(folder: Path, cell: str) -> Path:
 
 
 def _along(predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame) -> pd.DataFrame:
-    t, planned = rows["t"].to_numpy(), None
-    count = len(t)
+    """Predictions from every instant of one unbroken stretch that has the past and the plan that they need."""
+    physics, t = predictor.physics, rows["t"].to_numpy()
+    slack = clock_slack(t)
+    first = int((t < t[0] + predictor.past * physics.step - slack).sum())  # earlier instants have no whole past
+    last = len(t)
+    ahead = physics.step * np.arange(physics.horizon)
     if predictor.commands == "known":
-        ahead = predictor.step * np.arange(predictor.horizon)
-        count = int((t + ahead[-1] <= t[-1] + clock_slack(t)).sum())  # later instants have no whole plan
-        if count == 0:
-            return pd.DataFrame()
-        later = sample(rows, t[:count] + ahead[:, None])
+        last = int((t + ahead[-1] <= t[-1] + slack).sum())  # later instants have no whole plan
+    count = last - first
+    if count <= 0:
+        return pd.DataFrame()
+    planned = None
+    if predictor.commands == "known":
+        later = sample(rows, t[first:last] + ahead[:, None])
         planned = {name: later[name] for name in dataset.commands}
-    memory = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
-    memory = memory and {name: values[:count] for name, values in memory.items()}
-    columns = {str(name): rows[name].to_numpy()[:count] for name in rows.columns if name != "run"}
-    origin, steps = (columns["north"], columns["east"], columns["psi"]), predictor.horizon
+    hidden = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
+    hidden = hidden and {name: values[first:last] for name, values in hidden.items()}
+    columns = {str(name): rows[name].to_numpy()[first:last] for name in rows.columns if name != "run"}
+    past = past_of(rows, t[first:last], predictor.past, physics.step, predictor.path)
+    instants = Instants(columns, past, planned, hidden)
+    origin, steps = (columns["north"], columns["east"], columns["psi"]), physics.horizon
     result = {
         "run": np.full(steps * count, run),
         "t": np.repeat(columns["t"], steps),
-        "ahead": np.tile(predictor.step * np.arange(1, steps + 1), count),
+        "ahead": np.tile(physics.step * np.arange(1, steps + 1), count),
     }
-    physics = predictor.physics(columns, memory, planned)
-    cooperative = physics + predictor.compensation(columns, planned)
+    alone = predictor.alone(instants)
+    predicted = predictor.predict(instants, alone)
     if predictor.vessel is None:
-        physics = np.full_like(physics, np.nan)
-    for name, path in (("physics", physics), ("cooperative", cooperative)):
+        alone = np.full_like(alone, np.nan)
+    for name, path in (("physics", alone), ("cooperative", predicted)):
         north, east = from_frame(path[..., 0], path[..., 1], *origin)
         result[f"{name}_north"], result[f"{name}_east"] = north.T.ravel(), east.T.ravel()
     result["outside"] = np.repeat(predictor.outside(columns), steps)

@@ -14,6 +14,9 @@ from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, read_results
 from shipid.study.store import stored_plan
 
+ALONE = "alone"
+"""Method of the rows of A, which no data improve."""
+
 
 def read_worlds(folders: Sequence[Path]) -> list[Results]:
     """Read finished runs of one study in different worlds; ResultError where they are not."""
@@ -56,17 +59,16 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
 
 
 def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
-    """H [m] per family and N_D, mean over members and seeds, then mean, low and high over worlds; N_D = 0 is A.
+    """H [m] per family, method and N_D: mean over members and seeds, then mean, low and high over worlds; N_D = 0 is A.
 
     Failed cells are left out; `worlds` says how many have a result.
     """
     parts = []
     for world, results in enumerate(worlds):
         good = results.cells[results.cells["status"] == "ok"]
-        known = ~good["kind"].isin([NO_MODEL, *results.plan.identified])
-        alone = good[known].drop_duplicates("model").assign(N_D=0, H=lambda rows: rows["A"])
-        means = pd.concat([alone, good]).groupby(["kind", "N_D"], sort=False)["H"].mean()
+        known = ~good["family"].isin([NO_MODEL, *results.plan.identified])
+        alone = good[known].drop_duplicates("foundation").assign(N_D=0, H=lambda rows: rows["A"], method=ALONE)
+        means = pd.concat([alone, good]).groupby(["family", "method", "N_D"], sort=False)["H"].mean()
         parts.append(means.reset_index().assign(world=world))
-    grouped = pd.concat(parts).groupby(["kind", "N_D"], sort=False)["H"]
-    frame = grouped.agg(mean="mean", low="min", high="max", worlds="size").reset_index()
-    return frame.rename(columns={"kind": "family"})
+    grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)["H"]
+    return grouped.agg(mean="mean", low="min", high="max", worlds="size").reset_index()

@@ -9,16 +9,11 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.windows import Windows
-from shipid.hybrid.compensator import choose_features, feature_table
-from shipid.study.plan import PUBLISHED, Plan, Published
+from shipid.hybrid.features import choose_features, feature_table
+from shipid.physics.signals import read_unit, signal_of
+from shipid.study.plan import Plan, Published, published_keys
 from shipid.study.prepare import nested
-from shipid.units import DEGREE, RPM
 
-SAILORS = {
-    "n": ("shaft", "rpm", 1 / RPM),
-    "alpha": ("azimuth", "deg", 1 / DEGREE),
-    "delta": ("rudder", "deg", 1 / DEGREE),
-}
 LIMITS = ("min", "mean", "max")
 
 
@@ -43,7 +38,7 @@ def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | Non
     """The envelope in degrees and rpm, a row per set and quantity; what is published is the set of that name."""
     own = []
     for row in rows:
-        unit, factor = sailors_unit(row["quantity"])
+        unit, factor = read_unit(row["quantity"])
         own.append({**row, "unit": unit, **{name: row[name] * factor for name in LIMITS}})
     return pd.DataFrame([*own, *_published(published, [row["quantity"] for row in own])])
 
@@ -52,17 +47,10 @@ def _published(published: Published | None, quantities: Sequence[str]) -> list[d
     """Rows of the published envelope for those quantities that the study has."""
     rows = []
     for key, limits in (published.envelope if published else {}).items():
-        signal, to_SI = PUBLISHED[key]
+        signal, to_SI = published_keys()[key]
         for quantity in dict.fromkeys(quantities):
-            if quantity.rpartition(".")[2] == signal:
-                unit, factor = sailors_unit(quantity)
+            if signal_of(quantity) == signal:
+                unit, factor = read_unit(quantity)
                 values = dict(zip(LIMITS, (to_SI * factor * limit for limit in limits), strict=True))
                 rows.append({"set": "published", "quantity": quantity, "unit": unit, **values})
     return rows
-
-
-def sailors_unit(quantity: str) -> tuple[str, float]:
-    """Unit in which sailors read a quantity, and the factor to it from SI."""
-    if "." in quantity:
-        return SAILORS[quantity.rpartition(".")[2]][1:]
-    return ("deg/s", 1 / DEGREE) if quantity == "r" else ("m/s", 1.0)

@@ -9,7 +9,7 @@ from shipid.metrics import over_horizon, position_error
 from shipid.study.advise import by_model
 from shipid.study.findings_simulation import simulation_findings
 from shipid.study.plan import NO_MODEL, Claims
-from shipid.study.results import Results
+from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import Finding, interval, metres, undecided, verdict
 
 CLAIMS = {
@@ -34,7 +34,7 @@ def _full_scale(results: Results, claims: Claims) -> list[Finding]:
     """R1-R4 at the largest amount of data."""
     table = by_model(results)
     largest = int(table["N_D"].max())
-    top = table[table["N_D"] == largest].set_index("kind")
+    top = table[table["N_D"] == largest].set_index("family")
     if any(name not in top.index for name in (claims.accurate, claims.inaccurate, NO_MODEL)):
         return undecided(CLAIMS, "a cell that it needs has failed or is missing")
     good, bad = top.loc[[claims.accurate]].iloc[0], top.loc[[claims.inaccurate]].iloc[0]
@@ -72,16 +72,18 @@ def _full_scale(results: Results, claims: Claims) -> list[Finding]:
 
 def _gaps(results: Results, claims: Claims, N_D: int) -> pd.Series:
     """Difference [m] of H between the accurate and the inaccurate model, of every seed that has both."""
-    cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == N_D)]
-    H = cells.pivot_table(index="seed", columns="kind", values="H")
+    cells = judged_cells(results)
+    cells = cells[(cells["status"] == "ok") & (cells["N_D"] == N_D)]
+    H = cells.pivot_table(index="seed", columns="family", values="H")
     return (H[claims.accurate] - H[claims.inaccurate]).dropna().abs()
 
 
 def _worst_share(results: Results, N_D: int) -> tuple[str, float]:
     """Which predictor, physics alone included, is most often worst over the horizon; share of steps where `none` is."""
     curves: dict[str, list[np.ndarray]] = {}
-    aside = {model.name for model in results.plan.models if model.family in results.plan.aside}
-    for row in results.cells[results.cells["N_D"] == N_D].itertuples():
+    aside = {one.name for one in results.plan.foundations if one.family in results.plan.aside}
+    cells = judged_cells(results)
+    for row in cells[cells["N_D"] == N_D].itertuples():
         if row.cell in results.paths and row.model not in aside:
             error = position_error(results.paths[str(row.cell)], results.test.future)
             curves.setdefault(str(row.model), []).append(over_horizon(error)["mean"])

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from shipid.metrics import median_slope, rank_correlation, roughness
 from shipid.study.plan import NO_MODEL
-from shipid.study.results import Results
+from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import Finding, Verdict, interval, metres, named, undecided, verdict
 
 Array = NDArray[np.float64]
@@ -109,10 +109,10 @@ def simulation_findings(results: Results) -> list[Finding]:
 
 def read_grid(results: Results, metric: str) -> Grid | str:
     """H or H_90 of a finished study as a grid, or the reason why there is none."""
-    claims, cells = results.plan.study.claims, results.cells
+    claims, cells = results.plan.study.claims, judged_cells(results)
     assert claims is not None
     if not results.complete:
-        return f"{results.plan.cells - len(cells)} of {results.plan.cells} cells are not finished"
+        return f"{results.plan.cells - len(results.cells)} of {results.plan.cells} cells are not finished"
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
         return "pure data-driven has no result in every cell"
@@ -120,7 +120,7 @@ def read_grid(results: Results, metric: str) -> Grid | str:
     if len(amounts) < 2:
         return "the findings are about a growing N_D, and the study has one"
     members = {
-        family: [model.name for model in results.plan.models if model.family == family]
+        family: [one.name for one in results.plan.foundations if one.family == family]
         for family in (claims.moderate, claims.high)
     }
     sound = {family: tuple(name for name in names if name not in failed) for family, names in members.items()}
@@ -380,7 +380,8 @@ def _S7(results: Results, grid: Grid) -> Finding:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
     first = grid.amounts[0]
     true = roughness(results.test.future)
-    cells = results.cells[results.cells["N_D"] == first].set_index(["model", "seed"])["cell"]
+    judged = judged_cells(results)
+    cells = judged[judged["N_D"] == first].set_index(["model", "seed"])["cell"]
     rough = {m: np.array([roughness(results.paths[cells[m, seed]]) for seed in grid.seeds]) for m in grid.H}
     alone = float(np.median([roughness(results.physics[model]) for model in grid.physics]))
 

@@ -22,7 +22,7 @@ from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.predictor import assumed, check_columns
+from shipid.hybrid.physics import assumed, check_columns
 from shipid.simulation.approach import Controls
 from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
 from shipid.study.plan import NO_MODEL, Plan, build_plan
@@ -148,7 +148,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
         Choice("split.test", tests, _why_test(runs, tests)),
     ]
     ahead = [
-        Choice("prediction.horizon", steps, why + _left_out(seen.runs, usable)),
+        Choice("prediction.ahead", float(f"{steps * step:.9g}"), why + _left_out(seen.runs, usable)),
         Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
     ]
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
@@ -200,10 +200,10 @@ def _first_that_runs(
 ) -> Draft:
     """Explicit Euler, else RK4, else RK4 at half the step; milder families in turn: the first that rolls out."""
     horizon, step = ahead
-    euler = Choice("prediction.method", "euler", "the paper's; take rk4 if you take a longer step")
-    rk4 = Choice("prediction.method", "rk4", "explicit Euler diverges on these runs")
+    euler = Choice("prediction.integrator", "euler", "the paper's; take rk4 if you take a longer step")
+    rk4 = Choice("prediction.integrator", "rk4", "explicit Euler diverges on these runs")
     halved = [
-        Choice(horizon.path, 2 * horizon.value, horizon.why),
+        horizon,
         Choice(step.path, step.value / 2, f"{step.why}; twice as long diverges"),
     ]
     for (front, method), chosen in product(((ahead, euler), (ahead, rk4), (halved, rk4)), families):
@@ -224,7 +224,9 @@ def _check_runs(plan: Plan, dataset: Dataset) -> None:
     """Do all that a run of the plan does but the training."""
     prepared = prepare(plan, dataset)
     for batch in plan.batches:
-        prepared.folds(plan, batch, prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch))))
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+        for way in plan.methods:
+            prepared.folds(plan, batch, windows, way.method.validation)
 
 
 def _planned(choices: Sequence[Choice], families: Sequence[Any], out: Path, vessels: Mapping[str, Vessel]) -> Plan:
@@ -403,10 +405,10 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("description", f"simulated: {vessel.name} as she is makes the truth, and degraded models predict her"),
         *_truth(named, vessel, service, rpm, horizon, step),
         Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
-        Choice("split.folds", 1, "with the recipe `fast` every run validates in turn"),
+        Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
     ]
     ahead = [
-        Choice("prediction.horizon", round(horizon / step), why),
+        Choice("prediction.ahead", float(f"{round(horizon / step) * step:.9g}"), why),
         Choice("prediction.step", step, "s; the truth is stepped more finely, that is a part of what models get wrong"),
     ]
     tail = [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,24 +15,31 @@ from shipid import document as documents
 from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
-from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.method import Method
+from shipid.hybrid.methods import method_of
 from shipid.identification.problem import Identify, unknowns
 from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
+from shipid.physics.signals import SIGNALS, named
 from shipid.simulation.truth import Truth, check_truth
-from shipid.units import DEGREE, RPM
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
-ALONE, BOTH = "-identified", "-both"  # added to the names of a family and its members
-WAYS = {ALONE: "identified from the runs of each cell", BOTH: "identified from the runs of each cell, then compensated"}
+WITH = "+"  # between a foundation and a method
+NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
+MOST_STEPS = 100_000
+IDENTIFIED = "identified from the runs of each cell"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
-PUBLISHED = {  # key of a published envelope -> signal, factor to SI
-    **{name: (name, 1.0) for name in ("u", "v", "r", "u_rw", "v_rw", "n", "alpha", "delta")},
-    "n_rpm": ("n", RPM),
-    **{f"{name}_deg": (name, DEGREE) for name in ("r", "alpha", "delta")},
-}
+INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
+
+
+def published_keys() -> dict[str, tuple[str, float]]:
+    """Key of a published envelope -> signal, factor to SI: `n`, and `n_rpm` in the unit that sailors read."""
+    names = (*INPUTS, *named("command"))
+    read = {name: SIGNALS[name] for name in names if SIGNALS[name].shown}
+    in_words = {f"{name}_{row.read_in.partition('/')[0]}": (name, row.factor) for name, row in read.items()}
+    return {name: (name, 1.0) for name in names} | in_words
 
 
 class Strict(BaseModel):
@@ -73,12 +81,28 @@ class Split(Strict):
 class Prediction(Strict):
     """`[prediction]`: horizon and step of the predictor, and what it knows; wind is held at its present value."""
 
-    horizon: Annotated[int, Field(ge=2, le=100000, description="steps")]
+    ahead: Annotated[FiniteFloat, Field(gt=0, description="s, a multiple of the step")]
     step: Annotated[FiniteFloat, Field(gt=0, description="s")] = 1.0
-    method: Literal["euler", "rk4"] = "euler"
+    integrator: Literal["euler", "rk4"] = "euler"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between instants of prediction")] = 1.0
+    past: Annotated[
+        FiniteFloat, Field(ge=0, description="s of a run before its first instant; more if a method needs")
+    ] = 0.0
     samples: Annotated[int, Field(ge=1)] | None = Field(default=None, description="instants per run, at most")
     commands: Commands = Field(default="held", description="held at their present value, or known over the horizon")
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Prediction:
+        steps = self.ahead / self.step
+        if abs(steps - round(steps)) > 1e-6 * steps or not 2 <= round(steps) <= MOST_STEPS:
+            most = f"{MOST_STEPS:,}"
+            raise ValueError(f"ahead = {self.ahead:g} s must be 2 to {most} steps of {self.step:g} s")
+        return self
+
+    @property
+    def horizon(self) -> int:
+        """Number of steps T."""
+        return round(self.ahead / self.step)
 
 
 class Grid(Strict):
@@ -89,7 +113,9 @@ class Grid(Strict):
 
 
 class Claims(Strict):
-    """`[claims]`: families that the findings of the method speak of: R1-R4 at full scale, S1-S7 in simulation."""
+    """`[claims]`: the families, and the method, that findings speak of: R1-R4 at full scale, S1-S7 in simulation."""
+
+    method: str | None = Field(default=None, description="default: the first method that learns from data")
 
     accurate: str | None = Field(default=None, description="with `inaccurate`: findings R1-R4")
     inaccurate: str | None = None
@@ -126,11 +152,27 @@ class Published(Strict):
     @model_validator(mode="after")
     def _sensible(self) -> Published:
         for key, limits in self.envelope.items():
-            if key not in PUBLISHED:
-                raise ValueError(f"envelope.{key} is no input: {choices(key, PUBLISHED)}")
+            if key not in published_keys():
+                raise ValueError(f"envelope.{key} is no input: {choices(key, published_keys())}")
             if len(limits) != 3 or limits != sorted(limits):
                 raise ValueError(f"envelope.{key}: give [min, mean, max], found {limits}")
         return self
+
+
+class MethodBlock(BaseModel):
+    """`[[method]]`: a way to improve physics by data; every further key is a setting of its kind."""
+
+    model_config = ConfigDict(extra="allow")
+    name: Annotated[str, Field(pattern=NAME)]
+    kind: str
+    families: Annotated[list[str], Field(min_length=1, description="families that it meets; * stands for any text")] = [
+        "*"
+    ]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the kind."""
+        return dict(self.model_extra or {})
 
 
 class Study(Strict):
@@ -144,7 +186,7 @@ class Study(Strict):
     split: Split
     prediction: Prediction
     grid: Grid
-    recipe: dict[str, Any] = {"kind": "fast"}
+    method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
     published: Published | None = None
     family: Annotated[list[Family], Field(min_length=1)]
@@ -169,26 +211,43 @@ class Study(Strict):
 
 
 @dataclass(frozen=True)
-class Model:
-    """A foundation of the study: a variant of a vessel, or no physics at all (`variant` is None).
+class Foundation:
+    """What the physics says: a variant of a vessel, a variant identified from the runs of each batch, or nothing.
 
-    identify : what is identified from the runs of each batch before anything is compensated; None: nothing.
-    compensated : whether a compensator is trained on it; else it predicts alone.
+    variant : the numbers on the base; None is no physics at all.
+    base : the vessel that the variant changes.
+    identify : what is identified from the runs of each batch; None: nothing.
     """
 
     name: str
     family: str
     member: int
     variant: Variant | None
-    vessel: Vessel | None
+    base: Vessel | None
     description: str = ""
     identify: Identify | None = None
-    compensated: bool = True
+
+    @property
+    def vessel(self) -> Vessel | None:
+        """The base with the numbers of the variant."""
+        if self.base is None or self.variant is None:
+            return None
+        return self.base.with_values(self.variant.values) if self.variant.values else self.base
+
+
+@dataclass(frozen=True)
+class Way:
+    """A method of the study under its name, with the foundations that it meets."""
+
+    name: str
+    kind: str
+    method: Method
+    foundations: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """The unit of work: all models at one amount of data and one seed; they share windows and train together."""
+    """The unit of work: every foundation with every method at one amount of data and one seed; they share windows."""
 
     N_D: int
     seed: int
@@ -198,14 +257,14 @@ class Batch:
         """File-safe name."""
         return f"N{self.N_D:04d}-s{self.seed}"
 
-    def cell(self, model: str) -> str:
-        """Name of the cell of one model in this batch."""
-        return f"{model}-{self.key}"
+    def cell(self, foundation: str, method: str) -> str:
+        """Name of the cell of a foundation with a method in this batch."""
+        return f"{foundation}{WITH}{method}-{self.key}"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A study ready to run: checked document, models before any redraw, recipe and batches.
+    """A study ready to run: checked document, foundations before any redraw, methods and batches.
 
     study : the checked document with the seeds of its world; `document` holds them as written.
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
@@ -218,8 +277,8 @@ class Plan:
     file: str
     document: Document
     study: Study
-    models: tuple[Model, ...]
-    recipe: Recipe
+    foundations: tuple[Foundation, ...]
+    methods: tuple[Way, ...]
     batches: tuple[Batch, ...]
     truth: Vessel | None = None
     vessels: Mapping[str, Vessel] = field(default_factory=dict)
@@ -227,13 +286,14 @@ class Plan:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def standing(self) -> list[Vessel]:
-        """The vessel of the truth, if there is one, and those of the models."""
-        return [vessel for vessel in (self.truth, *(model.vessel for model in self.models)) if vessel is not None]
+    def used_vessels(self) -> list[Vessel]:
+        """The vessel of the truth, if there is one, and the bases of the foundations."""
+        every = (self.truth, *(foundation.base for foundation in self.foundations))
+        return [vessel for vessel in every if vessel is not None]
 
     @property
     def digest(self) -> str:
-        """Digest of the document, every vessel, the data's sources and the recipe in full: what results depend on."""
+        """Digest of the document, every vessel, the data's sources and the methods in full: what results depend on."""
         return self._digest(self.document)
 
     @property
@@ -242,26 +302,48 @@ class Plan:
         return self._digest({key: value for key, value in self.document.items() if key != "seed"})
 
     def _digest(self, document: Document) -> str:
-        vessels = sorted({vessel.digest for vessel in self.standing})
-        depends = {"vessels": vessels, "sources": dict(self.sources), "recipe": self.recipe.model_dump()}
+        vessels = sorted({vessel.digest for vessel in self.used_vessels})
+        methods = [{"kind": way.kind, **way.method.model_dump(mode="json")} for way in self.methods]
+        depends = {"vessels": vessels, "sources": dict(self.sources), "methods": methods}
         return documents.digest({"study": document, **depends})
 
     @property
     def identified(self) -> set[str]:
         """Families whose numbers, and so their A, depend on the data of the batch."""
-        return {model.family for model in self.models if model.identify is not None}
+        return {foundation.family for foundation in self.foundations if foundation.identify is not None}
 
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
-        claims = self.study.claims
-        alone = {model.family for model in self.models if not model.compensated}
-        return alone | (claims.not_judged if claims else set())
+        return self.study.claims.not_judged if self.study.claims else set()
+
+    @property
+    def judged(self) -> str:
+        """Name of the method that findings and the answer speak of."""
+        named = self.study.claims.method if self.study.claims else None
+        return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
+
+    @property
+    def past(self) -> int:
+        """Steps of the past that every window holds: what the study asks for, or more where a method needs it."""
+        prediction = self.study.prediction
+        seconds = max(prediction.past, *(way.method.past for way in self.methods))
+        return math.ceil(seconds / prediction.step - 1e-9)
+
+    @property
+    def pairs(self) -> list[tuple[str, Way]]:
+        """Every foundation with every method that it meets: a cell each at every amount of data and seed."""
+        return [(f.name, way) for f in self.foundations for way in self.methods if f.name in way.foundations]
 
     @property
     def cells(self) -> int:
         """Number of cells."""
-        return len(self.batches) * len(self.models)
+        return len(self.batches) * len(self.pairs)
+
+    def label(self, foundation: str, method: str) -> str:
+        """Name of a model for people: the foundation, with the method where that is not the only one that learns."""
+        learning = [way.name for way in self.methods if way.method.compensates]
+        return foundation if [method] == learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
 
     def text(self) -> str:
         """The resolved document as TOML."""
@@ -297,11 +379,12 @@ def build_plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
+    _check_version(document, file)
     study = documents.parse(Study, document, file).in_its_world()
     known = dict(vessels or {})
-    models = _models(study, file, known)
-    _check_claims(study, models, file)
-    recipe = _recipe(study, file)
+    foundations = _foundations(study, file, known)
+    methods = _methods(study, foundations, file)
+    _check_claims(study, foundations, file)
     batches = tuple(
         Batch(amount, seed)
         for amount in sorted(set(study.grid.N_D), reverse=True)
@@ -317,7 +400,7 @@ def build_plan(
             raise DocumentError(error.message, file=file, path=error.path) from None
     found = _sources(study.data, file) if sources is None and study.data is not None else sources
     return Plan(
-        file.stem, str(file), document, study, models, recipe, batches, truth, known, found or {}, changes or {}
+        file.stem, str(file), document, study, foundations, methods, batches, truth, known, found or {}, changes or {}
     )
 
 
@@ -382,39 +465,71 @@ def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vesse
     return known[name]
 
 
-def _models(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Model, ...]:
-    found: list[Model] = []
-    for index, family in enumerate(resolve(study.family, file)):
+def _check_version(document: Document, file: Path) -> None:
+    """Refuse a document of version 0.1 with one line that says what to write instead."""
+    if "recipe" in document:
+        kind = document["recipe"].get("kind", "fast") if isinstance(document["recipe"], dict) else "fast"
+        new = {"paper": "path-trained"}.get(kind, "path-drawn")
+        message = f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
+        raise DocumentError(message, file=file, path="recipe")
+    prediction = document.get("prediction")
+    if isinstance(prediction, dict) and "horizon" in prediction:
+        value, step = prediction["horizon"], prediction.get("step", 1.0)
+        numbers = isinstance(value, int | float) and isinstance(step, int | float)
+        seconds = f"ahead = {value * step:g}" if numbers else "ahead"
+        message = f"was a number of steps: write {seconds}, in seconds"
+        raise DocumentError(message, file=file, path="prediction.horizon")
+    if isinstance(prediction, dict) and "method" in prediction:
+        raise DocumentError("is now called `integrator`", file=file, path="prediction.method")
+
+
+def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
+    """Every member of every family; an identified family has the members of the family that it extends."""
+    families = resolve(study.family, file)
+    found: list[Foundation] = []
+    for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
         if family.name == NO_MODEL:
-            raise DocumentError(
-                "this name is taken by the model without physics", file=file, path=f"family.{index}.name"
-            )
+            message = "this name is taken by the foundation without physics"
+            raise DocumentError(message, file=file, path=f"family.{index}.name")
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
-        drawn = members(family, vessel, file)
+        if family.identify is None:
+            found += [Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
+            continue
+        parent = _identified_parent(study.family[index], families, file, f"family.{index}")
         settings = _identify(study, family, index, vessel, file)
-        found += [Model(v.name, v.family, v.member, v, vessel, words) for v in drawn]
-        for suffix, way in WAYS.items() if settings is not None else ():
-            told = ", ".join(filter(None, (words, way)))
-            found += [
-                Model(f"{v.name}{suffix}", f"{v.family}{suffix}", v.member, v, vessel, told, settings, suffix == BOTH)
-                for v in drawn
-            ]
-    names = [model.name for model in found]
+        described = words or ", ".join(filter(None, (parent.description, IDENTIFIED)))
+        for variant in members(parent, vessel, file):
+            name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
+            found.append(Foundation(name, family.name, variant.member, variant, vessel, described, settings))
+    names = [foundation.name for foundation in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise DocumentError(f"two models would be called {twice!r}: rename a family", file=file, path="family")
-    return (*found, Model(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+        raise DocumentError(f"two foundations would be called {twice!r}: rename a family", file=file, path="family")
+    return (*found, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
 
 
-def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Identify | None:
-    """What a family identifies, with the horizon, step and method of the study's own prediction unless it says else."""
-    if family.identify is None:
-        return None
+def _identified_parent(written: Family, families: Sequence[Family], file: Path, path: str) -> Family:
+    """The family whose members are identified; DocumentError unless the block only extends it."""
+    if written.extends is None or written.perturb or "members" in written.model_fields_set:
+        message = (
+            "an identified family is a family of its own: take the block out of this one and add [[family]] "
+            f'name = "{written.name}-identified", extends = "{written.name}" with the block [family.identify]'
+        )
+        raise DocumentError(message, file=file, path=f"{path}.identify")
+    parent = next(family for family in families if family.name == written.extends)
+    if parent.identify is not None:
+        message = f"{parent.name!r} is identified already: extend the family that it extends"
+        raise DocumentError(message, file=file, path=f"{path}.extends")
+    return parent
+
+
+def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Identify:
+    """What a family identifies; horizon, step and method are those of the study's prediction unless it says else."""
     ahead, prefix = study.prediction, f"family.{index}.identify"
-    own = {"horizon": ahead.horizon * ahead.step, "step": ahead.step, "method": ahead.method}
-    settings: Identify = documents.parse(Identify, own | family.identify, file, prefix)
+    default = {"horizon": ahead.ahead, "step": ahead.step, "method": ahead.integrator}
+    settings: Identify = documents.parse(Identify, default | (family.identify or {}), file, prefix)
     try:
         unknowns(vessel, settings)
     except DocumentError as error:
@@ -423,21 +538,36 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
     return settings
 
 
-def _recipe(study: Study, file: Path) -> Recipe:
-    """The named recipe with the changes of its block."""
-    block = dict(study.recipe)
-    kind = str(block.pop("kind", "fast"))
-    try:
-        fields = Recipe.kind(kind).model_fields
-        unknown = next((key for key in block if key not in fields), None)
-        if unknown is not None:
-            raise DocumentError(f"unknown key of {kind!r}: {choices(unknown, fields)}", path=f"recipe.{unknown}")
-        return Recipe.preset(kind, **block)
-    except DocumentError as error:
-        raise DocumentError(error.message, file=file, path=error.path) from None
+def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tuple[Way, ...]:
+    """The methods with their settings checked, and the foundations that each meets."""
+    ways: list[Way] = []
+    families = list(dict.fromkeys(foundation.family for foundation in foundations))
+    for index, block in enumerate(study.method):
+        path = f"method.{index}"
+        if block.name in (way.name for way in ways):
+            raise DocumentError(f"two methods are called {block.name!r}", file=file, path=f"{path}.name")
+        try:
+            method = method_of(block.kind, block.settings, path)
+        except DocumentError as error:
+            raise DocumentError(error.message, file=file, path=error.path) from None
+        met: set[str] = set()
+        for pattern in block.families:
+            matching = documents.match(pattern, families)
+            if not matching:
+                message = f"{pattern!r} is no family: {choices(pattern, families)}"
+                raise DocumentError(message, file=file, path=f"{path}.families")
+            met.update(matching)
+        if not method.compensates:
+            met -= {NO_MODEL}
+        ways.append(Way(block.name, block.kind, method, tuple(f.name for f in foundations if f.family in met)))
+    met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
+    idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
+    if idle is not None:
+        raise DocumentError(f"no method meets {idle!r}: name its family in `families`", file=file, path="method")
+    return tuple(ways)
 
 
-def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
+def _check_claims(study: Study, models: Sequence[Foundation], file: Path) -> None:
     """Refuse claims about families that are not there, or that are not what their role needs."""
     if study.claims is None:
         return
@@ -447,6 +577,10 @@ def _check_claims(study: Study, models: tuple[Model, ...], file: Path) -> None:
         if name not in families:
             message = f"{name!r} is not a family: {choices(name, set(families))}"
             raise DocumentError(message, file=file, path=f"claims.{role}")
+    names = [block.name for block in study.method]
+    if study.claims.method is not None and study.claims.method not in names:
+        message = f"{study.claims.method!r} is not a method: {choices(study.claims.method, names)}"
+        raise DocumentError(message, file=file, path="claims.method")
     roles = study.claims.roles
     for role in ("accurate", "inaccurate", "nominal"):
         count = families.count(roles.get(role, ""))

@@ -12,17 +12,25 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset, pieces, read_dataset
-from shipid.data.windows import Windows, cut_windows, fold_masks, nested_runs, part_folds, split_folds, split_runs
+from shipid.data.windows import (
+    Instants,
+    Windows,
+    cut_windows,
+    fold_masks,
+    nested_runs,
+    part_folds,
+    split_folds,
+    split_runs,
+)
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DocumentError, choices
-from shipid.hybrid.recipe import RidgeRecipe
+from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.metrics import Summary, position_error, summary
-from shipid.predictor import assumed, check_columns, physics_paths
 from shipid.simulation.truth import simulate
-from shipid.study.plan import Batch, Model, Plan, beside, mapping_of
+from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw, resolve
 
@@ -37,15 +45,15 @@ class Prepared:
 
     data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
-    models : foundations, after redraws.
-    pool_paths, test_paths : model -> (T, S, 2) [m] in the frame (11); zeros for the model without physics.
+    foundations : after redraws.
+    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics.
     notes : what was assumed, redrawn or left out, in sentences.
     """
 
     data: Dataset
     pool: Windows
     test: Windows
-    models: tuple[Model, ...]
+    foundations: tuple[Foundation, ...]
     pool_paths: Mapping[str, Array]
     test_paths: Mapping[str, Array]
     notes: tuple[str, ...]
@@ -55,9 +63,9 @@ class Prepared:
         """Command columns of the runs."""
         return tuple(self.data.commands)
 
-    def accuracy(self, model: str) -> Summary:
+    def accuracy(self, foundation: str) -> Summary:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
-        return summary(position_error(self.test_paths[model], self.test.future))
+        return summary(position_error(self.test_paths[foundation], self.test.future))
 
     @cached_property
     def naive(self) -> Array:
@@ -68,24 +76,24 @@ class Prepared:
         """Training and validation runs of a batch: nested over N_D for one seed."""
         return nested(plan, self.pool, batch)
 
-    def folds(self, plan: Plan, batch: Batch, windows: Windows) -> list[tuple[Array, Array]]:
+    def folds(self, plan: Plan, batch: Batch, windows: Windows, validation: str) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
 
-        With one fold, 20 % of the runs validate; a recipe in closed form can afford to leave out every run in turn. A
+        With one fold, 20 % of the runs validate; a method with `validation` = `runs` leaves out every run in turn. A
         single run is left out part by part.
         """
         runs, num_folds = self.runs(plan, batch), plan.study.split.folds
         if len(runs) == 1:
             return part_folds(windows)
         held_out: list[tuple[str, ...]]
-        if num_folds == 1 and isinstance(plan.recipe, RidgeRecipe):
+        if num_folds == 1 and validation == "runs":
             held_out = [(run,) for run in runs]
         elif num_folds == 1:
             held_out = [split_runs(runs, VALIDATION_SHARE, batch.seed)[1]]
         else:
             held_out = list(split_folds(runs, min(num_folds, len(runs)), batch.seed))
         masks = [fold_masks(windows, names) for names in held_out]
-        return [(np.flatnonzero(train), np.flatnonzero(validation)) for train, validation in masks]
+        return [(np.flatnonzero(train), np.flatnonzero(judged)) for train, judged in masks]
 
 
 def obtain(plan: Plan) -> Dataset:
@@ -141,9 +149,10 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
             step=prediction.step,
             interval=prediction.interval,
             path=plan.study.data.path if plan.study.data else "position",
+            past=plan.past,
         )
     except DataError as error:
-        raise DocumentError(error.message, file=plan.file, path="prediction.horizon") from None
+        raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
     if prediction.samples is not None:
         windows = windows.select(_place_in_run(windows) < prediction.samples)
     return windows
@@ -170,19 +179,19 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     rest, test, notes = partition(plan, dataset)
     both = [rest, test]
     longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
-    for model in plan.models:
-        if model.identify is not None and model.identify.horizon / 2 > longest:
-            message = f"{model.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
-            raise DocumentError(message, file=plan.file, path=f"family.{model.family}.identify.horizon")
-        if model.vessel is not None:
-            check_columns(model.vessel, test.columns, plan.file)
-            notes += not_measured(model.vessel, test)
-    models, paths = _roll_out(plan, dataset, both, notes, device)
+    for foundation in plan.foundations:
+        if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
+            message = f"{foundation.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
+            raise DocumentError(message, file=plan.file, path=f"family.{foundation.family}.identify.horizon")
+        if foundation.base is not None:
+            check_columns(foundation.base, test.columns, plan.file)
+            notes += not_measured(foundation.base, test)
+    foundations, paths = _roll_out(plan, dataset, both, notes, device)
     return Prepared(
         data=dataset,
         pool=rest,
         test=test,
-        models=models,
+        foundations=foundations,
         pool_paths={name: pair[0] for name, pair in paths.items()},
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
@@ -222,105 +231,98 @@ Pair = tuple[Array, Array]
 
 def _roll_out(
     plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str], device: str
-) -> tuple[tuple[Model, ...], dict[str, Pair]]:
-    """Paths of every model on (pool, test), members that diverge on the pool redrawn."""
+) -> tuple[tuple[Foundation, ...], dict[str, Pair]]:
+    """Paths of every foundation on (pool, test), members that diverge on the pool redrawn."""
     families = {family.name: family for family in resolve(plan.study.family, plan.file)}
-    finished: dict[str, tuple[Model, Pair]] = {}
-    waiting = [model for model in plan.models if model.vessel is not None and model.identify is None]
+    finished: dict[str, tuple[Foundation, Pair]] = {}
+    waiting = [one for one in plan.foundations if one.base is not None and one.identify is None]
     while waiting:
         again = []
-        for model, paths, share in _one_round(plan, dataset, parts, waiting, device):
+        for foundation, paths, share in _one_round(plan, dataset, parts, waiting, device):
             if share:
-                drawn = _redraw(plan, model, families[model.family], share)
+                drawn = _redraw(plan, foundation, families[foundation.family], share)
                 counter = drawn.variant.counter if drawn.variant else 0
                 notes.append(
-                    f"{model.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}"
+                    f"{foundation.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}"
                 )
                 again.append(drawn)
             else:
-                finished[model.name] = (model, paths)
+                finished[foundation.name] = (foundation, paths)
         waiting = again
     zeros = (np.zeros_like(parts[0].future), np.zeros_like(parts[1].future))
-    for model in plan.models:
-        if model.identify is not None and model.variant is not None:  # the same member, before anything is identified
-            same, paths = finished[model.variant.name]
-            finished[model.name] = (replace(model, variant=same.variant), paths)
-        finished.setdefault(model.name, (model, zeros))
-    models = tuple(finished[model.name][0] for model in plan.models)
-    return models, {model.name: finished[model.name][1] for model in models}
+    for foundation in plan.foundations:
+        if foundation.identify is not None and foundation.variant is not None:  # the member before identification
+            same, paths = finished[foundation.variant.name]
+            finished[foundation.name] = (replace(foundation, variant=same.variant), paths)
+        finished.setdefault(foundation.name, (foundation, zeros))
+    foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
+    return foundations, {one.name: finished[one.name][1] for one in foundations}
+
+
+def physics_of(plan: Plan, vessel: Vessel | None) -> Physics:
+    """The physics of a study: a vessel, rolled out over the horizon of the study."""
+    prediction = plan.study.prediction
+    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator)
+
+
+def instants_of(plan: Plan, vessel: Vessel | None, dataset: Dataset, windows: Windows) -> Instants:
+    """What a prediction of a study knows at each window, with the states of the vessel's actuators."""
+    hidden = None if vessel is None else window_memory(vessel, dataset, windows)
+    return windows.instants(known=plan.study.prediction.commands == "known", hidden=hidden)
 
 
 def _one_round(
-    plan: Plan, dataset: Dataset, parts: Sequence[Windows], models: Sequence[Model], device: str
-) -> Iterator[tuple[Model, Pair, float]]:
-    """Paths of each model on (pool, test), the share of pool windows on which it diverged; one rollout a structure."""
-    prediction = plan.study.prediction
-    alike: dict[tuple[str, ...], list[Model]] = {}
-    for model in models:
-        vessel = own_vessel(model)
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], foundations: Sequence[Foundation], device: str
+) -> Iterator[tuple[Foundation, Pair, float]]:
+    """Paths of each foundation on (pool, test) and the share of pool windows on which it diverged.
+
+    Foundations of one structure are one rollout.
+    """
+    alike: dict[tuple[str, ...], list[tuple[Foundation, Vessel]]] = {}
+    for foundation in foundations:
+        vessel = foundation.vessel
+        assert vessel is not None
         lags = (f"{path} {value}" for path, value in vessel.parameters.items() if ".actuator." in path)
-        alike.setdefault((vessel.structure, *lags), []).append(model)  # equal lags: equal hidden states at the start
+        alike.setdefault((vessel.structure, *lags), []).append((foundation, vessel))  # equal lags: equal hidden states
     for group in alike.values():
-        vessel = own_vessel(group[0])
-        parameters = np.array([model.variant.parameters for model in group if model.variant is not None])
+        vessel = group[0][1]
+        parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
         (pool, pool_bad), (test, test_bad) = (
-            physics_paths(
-                vessel,
-                windows.columns,
-                prediction.horizon,
-                prediction.step,
-                prediction.method,
-                parameters=parameters,
-                memory=window_memory(vessel, dataset, windows),
-                planned=planned(plan, windows),
-                device=device,
-            )
+            physics_of(plan, vessel).variant_paths(instants_of(plan, vessel, dataset, windows), parameters, device)
             for windows in parts
         )
-        for position, model in enumerate(group):
+        for position, (foundation, _) in enumerate(group):
             paths = (pool[:, position], test[:, position])
             paths[1][:, test_bad[position]] = np.nan
-            yield model, paths, float(pool_bad[position].mean())
+            yield foundation, paths, float(pool_bad[position].mean())
 
 
-def paths_of(plan: Plan, dataset: Dataset, parts: Sequence[Windows], model: Model, device: str) -> Pair:
-    """Paths of one model on (pool, test); where it diverges they are not numbers."""
-    _, paths, share = next(_one_round(plan, dataset, parts, [model], device))
+def paths_of(plan: Plan, dataset: Dataset, parts: Sequence[Windows], foundation: Foundation, device: str) -> Pair:
+    """Paths of one foundation on (pool, test); where it diverges they are not numbers."""
+    _, paths, share = next(_one_round(plan, dataset, parts, [foundation], device))
     return (np.full_like(paths[0], np.nan), paths[1]) if share else paths
 
 
-def _redraw(plan: Plan, model: Model, family: Family, share: float) -> Model:
+def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) -> Foundation:
     """The same member with the next counter; DocumentError where nothing can be drawn, or not any more."""
-    assert model.variant is not None
-    assert model.vessel is not None
-    counter = model.variant.counter + 1
-    if counter > MOST_REDRAWS or not any(isinstance(block.factor, tuple) for block in family.perturb):
+    assert foundation.variant is not None
+    assert foundation.base is not None
+    counter = foundation.variant.counter + 1
+    if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
         raise DocumentError(
-            f"{model.name} diverges on {share:.1%} of the training windows{tries}: "
+            f"{foundation.name} diverges on {share:.1%} of the training windows{tries}: "
             "take a smaller [prediction] step, rk4, or narrower factors",
             file=plan.file,
-            path=f"family.{model.family}",
+            path=f"family.{foundation.family}",
         )
-    return replace(model, variant=draw(family, model.member, model.vessel, counter, plan.file))
-
-
-def own_vessel(model: Model) -> Vessel:
-    """Return the vessel of a model with the numbers of its variant."""
-    assert model.vessel is not None
-    assert model.variant is not None
-    return model.vessel.with_values(model.variant.values) if model.variant.values else model.vessel
+    return replace(foundation, variant=draw(family, foundation.member, foundation.base, counter, plan.file))
 
 
 def not_measured(vessel: Vessel, windows: Windows) -> list[str]:
     """A sentence on what a vessel feels and the windows do not hold; none where they hold all."""
     missing = assumed(vessel, windows.columns)
     return [f"{vessel.name}: {', '.join(missing)} not measured, assumed 0"] if missing else []
-
-
-def planned(plan: Plan, windows: Windows) -> Mapping[str, Array] | None:
-    """Commands over the horizon, name -> (T, S), where the study knows them; None where they are held."""
-    return windows.planned if plan.study.prediction.commands == "known" else None
 
 
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
@@ -363,11 +365,11 @@ def limits(windows: Windows, commands: Sequence[str]) -> dict[str, tuple[float, 
     return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 
-def describe(model: Model) -> dict[str, Any]:
-    """A model as plain data: what it is, where it comes from, its factors."""
-    variant = model.variant
-    row: dict[str, Any] = {"model": model.name, "family": model.family, "member": model.member}
-    row["description"] = model.description
+def describe(foundation: Foundation) -> dict[str, Any]:
+    """A foundation as plain data: what it is, where it comes from, its factors."""
+    variant = foundation.variant
+    row: dict[str, Any] = {"foundation": foundation.name, "family": foundation.family, "member": foundation.member}
+    row["description"] = foundation.description
     if variant is not None:
         row |= {"base": variant.base, "base_digest": variant.base_digest, "counter": variant.counter}
         row |= {"seed": variant.seed, "factors": dict(variant.factors), "values": dict(variant.values)}

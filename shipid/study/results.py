@@ -16,11 +16,12 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
+from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.envelope import SAILORS, envelope_table
-from shipid.study.plan import NO_MODEL, Plan
-from shipid.study.prepare import constant_motion, window_memory
+from shipid.study.envelope import envelope_table
+from shipid.study.plan import NO_MODEL, Plan, Way
+from shipid.study.prepare import constant_motion, instants_of
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
@@ -60,18 +61,16 @@ def read_results(folder: Path) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
     plan = store.stored_plan(folder)
     cells = store.read_rows(folder)
+    cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
     paths = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
             predictor = Predictor.load(store.cell_file(folder, row["cell"]))
-            alone = physics.get(row["model"])
-            if alone is None:  # its numbers depend on the cell
-                assert predictor.vessel is not None
-                memory = window_memory(predictor.vessel, dataset, test)
-                alone = predictor.physics(test.columns, memory, test.planned)
-            paths[row["cell"]] = alone + predictor.compensation(test.columns, test.planned)
+            instants = instants_of(plan, predictor.vessel, dataset, test)
+            alone = physics.get(row["foundation"])  # None where its numbers depend on the cell
+            paths[row["cell"]] = predictor.predict(instants, alone)
     return Results(
         folder=folder,
         plan=plan,
@@ -88,7 +87,8 @@ def read_results(folder: Path) -> Results:
 
 def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
     """One row per model: accuracy [m], also by axis of the frame (11), and whether it diverged on the test windows."""
-    frame = pd.DataFrame(read_json(folder / store.MODELS))
+    frame = pd.DataFrame(read_json(folder / store.FOUNDATIONS))
+    frame["model"] = frame["foundation"]
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
@@ -178,22 +178,22 @@ def commands_frame(results: Results) -> pd.DataFrame:
     result = frame[["run", "t"]].reset_index(drop=True)
     shown: dict[str, str] = {}
     for name in results.dataset.commands:
-        alike = (other for other in shown if other.rpartition(".")[2] == name.rpartition(".")[2])
+        alike = (other for other in shown if signal_of(other) == signal_of(name))
         twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
         if twin is None:
             shown[name] = name.partition(".")[0]
         else:
             shown[twin] += f" and {name.partition('.')[0]}"
     for name, components in shown.items():
-        word, unit, factor = SAILORS[name.rpartition(".")[2]]
-        result[f"{components} {word} [{unit}]"] = frame[name].to_numpy() * factor
+        unit, factor = read_unit(name)
+        result[f"{components} {SIGNALS[signal_of(name)].word} [{unit}]"] = frame[name].to_numpy() * factor
     return _with_gaps(result, ["run"])
 
 
 def snapshots(results: Results) -> list[dict[str, Any]]:
     """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
     particulars: Mapping[str, float] = next(
-        (m.vessel.document.get("particulars", {}) for m in results.plan.models if m.vessel), {}
+        (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
     )
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
@@ -275,11 +275,12 @@ def factors_frame(results: Results) -> pd.DataFrame:
 
 def trials_frame(results: Results) -> pd.DataFrame:
     """One row per trial of the search, value [m^2], with a column for all that varies; the best trials are `chosen`."""
-    recipe = results.plan.recipe
-    searched, rows = list(recipe.varied()), []
+    methods = {way.name: way.method for way in results.plan.methods}
+    searched = list(dict.fromkeys(name for method in methods.values() for name in method.varied()))
+    rows = []
     for cell in results.rows:
         done = [trial for trial in cell["trials"] if trial["state"] == "complete"]
-        best = sorted(done, key=lambda trial: trial["value"])[: recipe.num_chosen()]
+        best = sorted(done, key=lambda trial: trial["value"])[: methods[cell["method"]].num_chosen()]
         for trial in cell["trials"]:
             row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
             row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
@@ -318,17 +319,30 @@ def _source_words(source: Any) -> str:
     return str(source)
 
 
+def _method_words(way: Way) -> str:
+    """A method in a few words: its name, its kind and how much it searches."""
+    trials = getattr(way.method, "trials", None)
+    kind = "" if way.kind == way.name else f" ({way.kind})"
+    return f"{way.name}{kind}" + (f": {trials} trials" if trials else "")
+
+
+def judged_cells(results: Results) -> pd.DataFrame:
+    """Rows of the cells of the method that findings and the answer speak of; `model` is the foundation."""
+    cells = results.cells[results.cells["method"] == results.plan.judged]
+    return cells.assign(model=cells["foundation"])
+
+
 def provenance_words(results: Results) -> dict[str, str]:
     """What the results stand on, as label -> text."""
     record, study = results.provenance, results.plan.study
     machine = record.get("machine", {})
     words = {
         "study": f"{results.plan.name}, digest {record['digest']}",
-        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in results.plan.standing})),
+        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in results.plan.used_vessels})),
         "data": _source_words(results.dataset.metadata.get("source", "")),
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
         "seeds": ", ".join(map(str, study.grid.seeds)),
-        "recipe": f"{study.recipe.get('kind', 'fast')}: {results.plan.recipe.trials} trials",
+        "methods": "; ".join(_method_words(way) for way in results.plan.methods),
         "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
         f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_batch
 
 CONFIDENCE = 0.95
-KEYS = ["test", "model", "kind", "N_D", "seed", "A", "H", "H_90", "naive", "status"]
+KEYS = ["test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90", "naive", "status"]
 
 
 def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
@@ -39,7 +40,7 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
 def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu") -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
-    A row has test, model, kind (its family), N_D (runs that were left), seed, A, H, H_90 and naive [m], status. No
+    A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 and naive [m], status. No
     training window shares a moment with the test run.
     """
     for test in tests:
@@ -57,11 +58,17 @@ def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cp
 
 
 def spread(frame: pd.DataFrame) -> pd.DataFrame:
-    """A row per model over the turns, seeds averaged: A, H, least and greatest H, H_90 [m], turns with H below A."""
+    """A row per foundation and method over the turns, seeds averaged: A, H, its range, H_90 [m], turns where H < A."""
     per_turn = _per_turn(frame)
     rows = []
-    for model, part in per_turn.groupby("model", sort=False):
-        row = {"model": model, "turns": len(part), "A": part["A"].mean(), "H": part["H"].mean()}
+    for (foundation, method), part in per_turn.groupby(["foundation", "method"], sort=False):
+        row: dict[str, Any] = {
+            "foundation": foundation,
+            "method": method,
+            "turns": len(part),
+            "A": part["A"].mean(),
+            "H": part["H"].mean(),
+        }
         row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
         compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
         rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
@@ -77,11 +84,11 @@ def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     claims = plan.study.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return pd.DataFrame(columns=["id", "difference", "mean", "low", "high", "above", "turns"])
-    per_turn = _per_turn(frame)
+    per_turn = _per_turn(frame[frame["method"] == plan.judged])
     good, bad = claims.accurate, claims.inaccurate
-    kinds = [good, bad, NO_MODEL, *dict.fromkeys(per_turn["kind"])]
+    kinds = [good, bad, NO_MODEL, *dict.fromkeys(per_turn["family"])]
     A, H = (
-        per_turn.pivot_table(index="test", columns="kind", values=name, dropna=False).reindex(
+        per_turn.pivot_table(index="test", columns="family", values=name, dropna=False).reindex(
             columns=list(dict.fromkeys(kinds))
         )
         for name in ("A", "H")
@@ -106,6 +113,10 @@ def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
 
 
 def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
-    """Means over the seeds of every turn and model; cells that failed are left out."""
+    """Means over the seeds of every turn, foundation and method; cells that failed are left out."""
     good = frame[frame["status"] == "ok"]
-    return good.groupby(["test", "model", "kind"], sort=False)[["A", "H", "H_90", "naive"]].mean().reset_index()
+    return (
+        good.groupby(["test", "foundation", "family", "method"], sort=False)[["A", "H", "H_90", "naive"]]
+        .mean()
+        .reset_index()
+    )

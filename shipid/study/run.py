@@ -17,19 +17,27 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.data.windows import Windows, covered, planned_means
+from shipid.data.windows import Windows, covered
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
-from shipid.hybrid.compensator import Tuned
+from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.training import check_device, use_threads
-from shipid.hybrid.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import envelope
-from shipid.study.plan import Batch, Model, Plan
-from shipid.study.prepare import Prepared, describe, limits, obtain, own_vessel, planned, prepare
-from shipid.study.reidentify import Foundation, foundations
+from shipid.study.foundations import Prediction, predictions
+from shipid.study.plan import Batch, Foundation, Plan, Way
+from shipid.study.prepare import (
+    Prepared,
+    describe,
+    instants_of,
+    limits,
+    obtain,
+    physics_of,
+    prepare,
+    window_memory,
+)
 from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
@@ -80,17 +88,19 @@ def run_study(
         yield Event("note", "simulating the truth" if plan.study.truth else doing)
         write_dataset(obtain(plan), folder / store.DATASET)
     dataset = read_dataset(folder / store.DATASET)
-    yield Event("note", "rolling out the models")
+    yield Event("note", "rolling out the foundations")
     prepared = prepare(plan, dataset, device)
-    fixed = {m.name: prepared.test_paths[m.name] for m in prepared.models if m.identify is None}
+    fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if one.identify is None}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
     write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
-    write_json(folder / store.MODELS, [{**describe(m), **_accuracy(m, prepared)} for m in prepared.models])
+    write_json(
+        folder / store.FOUNDATIONS, [{**describe(one), **_accuracy(one, prepared)} for one in prepared.foundations]
+    )
     for note in prepared.notes:
         yield Event("note", note)
     done = store.finished(folder, plan.batches)
     left = [batch for batch in plan.batches if batch not in done]
-    cells = len(done) * len(plan.models)
+    cells = len(done) * len(plan.pairs)
     yield Event("start", done=cells, total=plan.cells)
     for batch, results in _compute(plan, prepared, left, workers, scheduler, device):
         rows = []
@@ -114,70 +124,86 @@ def run_study(
 def run_batch(
     plan: Plan, prepared: Prepared, batch: Batch, device: str
 ) -> list[tuple[dict[str, Any], Predictor | None]]:
-    """All cells of one batch: (row of results, predictor) for every model. Pure: the same on every worker."""
+    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker."""
     use_threads(1)
     check_device(device)
     runs = prepared.runs(plan, batch)
-    mask = np.isin(prepared.pool.run, runs)
-    windows = prepared.pool.select(mask)
-    standing = foundations(plan, prepared, batch, device)
-    targets = {name: windows.future - one.paths for name, one in standing.items() if one.model.compensated}
-    means = planned_means(windows.columns, planned(plan, windows) or {})
-    tuned = tune(
-        {**windows.columns, **means},
-        (*prepared.commands, *means),
-        targets,
-        prepared.folds(plan, batch, windows),
-        plan.recipe,
-        batch.seed,
-        device=device,
-    )
+    windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
+    known = predictions(plan, prepared, batch, device)
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
+    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device) for way in plan.methods}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
-    for name, foundation in standing.items():
-        found = tuned.get(name, Tuned(None, [], 0.0))
-        row = {
-            "cell": batch.cell(name),
-            **shared,
-            "seconds": found.seconds + foundation.seconds,
-            "trials": found.trials,
-        }
-        if foundation.model.compensated and found.compensator is None:
-            told, predictor = _failed(foundation.sentence or "no training converged"), None
+    for name, way in plan.pairs:
+        one, result = known[name], fitted[way.name][name]
+        row = {"cell": batch.cell(name, way.name), **_names(one, way, prepared.test), **shared}
+        row |= {"seconds": result.seconds + one.seconds, "trials": result.trials}
+        if result.corrector is None:
+            predictor, outcome = None, _failed(one.sentence or "no training converged")
         else:
-            predictor = _predictor(plan, prepared, foundation.model, batch, found.compensator, windows)
-            told = _judged(plan, prepared.test, foundation, predictor)
-        results.append(({**row, **_named(foundation, prepared.test), **told}, predictor))
+            predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
+            outcome = _judged(plan, prepared, one, predictor, way)
+        results.append(({**row, **outcome}, predictor))
     return results
 
 
-def _named(foundation: Foundation, test: Windows) -> dict[str, Any]:
-    """Which model a row is of, and how accurate its physics alone."""
-    model = foundation.model
-    known = foundation.accuracy(test) if model.vessel is not None else None
-    row = {"model": model.name, "kind": model.family, "member": model.member}
+def _fitted(
+    plan: Plan,
+    prepared: Prepared,
+    batch: Batch,
+    windows: Windows,
+    known: Mapping[str, Prediction],
+    way: Way,
+    device: str,
+) -> dict[str, Fitted]:
+    """Results of one method for the foundations that it meets."""
+    mine = {name: known[name] for name in way.foundations}
+    cases = {name: Case(physics_of(plan, one.foundation.vessel), one.paths) for name, one in mine.items()}
+    task = Task(
+        cases=cases,
+        windows=windows,
+        folds=prepared.folds(plan, batch, windows, way.method.validation) if way.method.compensates else (),
+        commands=prepared.commands,
+        known=plan.study.prediction.commands == "known",
+        seed=batch.seed,
+        hidden={
+            name: window_memory(case.physics.vessel, prepared.data, windows)
+            for name, case in cases.items()
+            if case.physics.vessel is not None and way.method.compensates
+        },
+        device=device,
+    )
+    return way.method.fit(task)
+
+
+def _names(one: Prediction, way: Way, test: Windows) -> dict[str, Any]:
+    """Which foundation and method a row is of, and how accurate the physics alone."""
+    foundation = one.foundation
+    known = one.accuracy(test) if foundation.base is not None else None
+    row = {"foundation": foundation.name, "family": foundation.family, "member": foundation.member, "method": way.name}
     return row | {key: known[name] if known else np.nan for key, name in ACCURACY.items()}
 
 
 def _failed(sentence: str, status: str = "failed") -> dict[str, Any]:
-    """What a row says that has no result."""
+    """The columns of a row without a result."""
     blank = dict.fromkeys(("H", "H_90", "rms"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
-def _judged(plan: Plan, test: Windows, foundation: Foundation, predictor: Predictor) -> dict[str, Any]:
+def _judged(plan: Plan, prepared: Prepared, one: Prediction, predictor: Predictor, way: Way) -> dict[str, Any]:
     """Errors [m] of a predictor on the test windows, and what its search chose."""
-    chosen = predictor.compensator.hyperparameters if predictor.compensator else {}
-    words = ", ".join(f"{name} {chosen[name]:.3g}" for name in plan.recipe.varied() if name in chosen)
-    failed = ~np.isfinite(foundation.test_paths).all(axis=(0, 2))
+    chosen, test = predictor.corrector.hyperparameters, prepared.test
+    words = ", ".join(f"{name} {chosen[name]:.3g}" for name in way.method.varied() if name in chosen)
+    failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
     if failed.any():
         share = f"physics diverges on {failed.mean():.1%} of the test windows"
-        sentence = share if np.isfinite(foundation.paths).all() else foundation.sentence
+        sentence = share if np.isfinite(one.paths).all() else one.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}
-    paths = foundation.test_paths + predictor.compensation(test.columns, test.planned)
+    paths = predictor.predict(instants_of(plan, predictor.vessel, prepared.data, test), one.test_paths)
+    if not np.isfinite(paths).all():
+        return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
-    return {**errors, "status": "ok", "sentence": foundation.sentence, "hyperparameters": words}
+    return {**errors, "status": "ok", "sentence": one.sentence, "hyperparameters": words}
 
 
 def machine() -> dict[str, Any]:
@@ -187,27 +213,36 @@ def machine() -> dict[str, Any]:
     return {**system, "cores": os.cpu_count(), "packages": packages}
 
 
-def _accuracy(model: Model, prepared: Prepared) -> dict[str, Any]:
-    """A, A_90, A_rms [m] of a model; not a number without physics, and where it depends on the batch."""
-    if model.vessel is None or model.identify is not None:
+def _accuracy(foundation: Foundation, prepared: Prepared) -> dict[str, Any]:
+    """A, A_90, A_rms [m] of a foundation; not a number without physics, and where it depends on the batch."""
+    if foundation.base is None or foundation.identify is not None:
         return dict.fromkeys(ACCURACY, np.nan)
-    found: Mapping[str, Any] = prepared.accuracy(model.name)
+    found: Mapping[str, Any] = prepared.accuracy(foundation.name)
     return {key: found[name] for key, name in ACCURACY.items()}
 
 
-def _predictor(plan: Plan, prepared: Prepared, model: Model, batch: Batch, compensator: Any, windows: Any) -> Predictor:
+def _predictor(
+    plan: Plan,
+    prepared: Prepared,
+    foundation: Foundation,
+    way: Way,
+    batch: Batch,
+    corrector: Corrector,
+    windows: Windows,
+) -> Predictor:
     return Predictor(
-        vessel=None if model.vessel is None else own_vessel(model),
-        compensator=compensator,
-        horizon=windows.horizon,
-        step=windows.step,
-        method=plan.study.prediction.method,
+        physics=physics_of(plan, foundation.vessel),
+        method=way.kind,
+        corrector=corrector,
         limits=limits(windows, prepared.commands),
         commands=plan.study.prediction.commands,
+        path=plan.study.data.path if plan.study.data else "position",
         provenance={
             "study": plan.name,
             "digest": plan.digest,
-            "cell": batch.cell(model.name),
+            "cell": batch.cell(foundation.name, way.name),
+            "foundation": foundation.name,
+            "method": way.name,
             "runs": list(prepared.runs(plan, batch)),
             "shipid": version("shipid"),
         },

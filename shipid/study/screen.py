@@ -15,10 +15,10 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.native import compiler
 from shipid.errors import DocumentError, choices
+from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
-from shipid.predictor import check_columns, physics_distances
 from shipid.study.plan import Plan
-from shipid.study.prepare import not_measured, partition, planned, window_memory
+from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -31,11 +31,7 @@ OWN = ("family", "member", "A", "A_90", "diverged")
 
 def families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [
-        family
-        for family in resolve(plan.study.family, plan.file)
-        if any(isinstance(block.factor, tuple) for block in family.perturb)
-    ]
+    drawn = [family for family in resolve(plan.study.family, plan.file) if any(block.drawn for block in family.perturb)]
     if name is None and not drawn:
         raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
     found = [family for family in drawn if name in (None, family.name)]
@@ -84,15 +80,10 @@ def _rows(
     for same in _equal_lags(base, values):
         vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
         for windows in parts:
-            found = physics_distances(
-                vessel,
-                windows.columns,
+            found = physics_of(plan, vessel).distances(
+                instants_of(plan, vessel, dataset, windows),
                 windows.future,
-                plan.study.prediction.step,
-                plan.study.prediction.method,
-                parameters=values[same],
-                memory=window_memory(vessel, dataset, windows),
-                planned=planned(plan, windows),
+                values[same],
                 engine="native" if device == "cpu" and compiler() is not None else "auto",
                 device=device,
             )

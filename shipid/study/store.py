@@ -14,12 +14,11 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
-from shipid.files import read_json, write_arrays, write_json, write_table, write_text
-from shipid.predictor import read_arrays
-from shipid.study.plan import Batch, Model, Plan, build_plan
+from shipid.files import read_arrays, read_json, write_arrays, write_json, write_table, write_text
+from shipid.study.plan import Batch, Foundation, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
-STUDY, VESSELS, PROVENANCE, MODELS = "study.toml", "vessels.json", "provenance.json", "models.json"
+STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
@@ -60,7 +59,7 @@ def stored_plan(folder: Path) -> Plan:
     plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
     if plan.digest != provenance["digest"]:
         raise ResultError(
-            "its study or vessels were changed by hand, or this shipid has another recipe: run the study again",
+            "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
             file=folder,
         )
     return plan
@@ -74,14 +73,14 @@ def _provenance(folder: Path) -> dict[str, Any]:
     return record
 
 
-def write_patches(folder: Path, models: Iterable[Model]) -> int:
+def write_patches(folder: Path, foundations: Iterable[Foundation]) -> int:
     """Write a patch document for every variant and return how many; it loads from anywhere and rebuilds it exactly."""
     count = 0
-    for model in models:
-        if model.vessel is not None and model.variant is not None and model.identify is None:
-            named = documents.bundled("models").get(model.variant.base) == Path(model.vessel.file)
-            base = model.variant.base if named else str(Path(model.vessel.file).absolute())
-            write_text(folder / f"{model.name}.toml", replace(model.variant, base=base).document())
+    for one in foundations:
+        if one.base is not None and one.variant is not None and one.identify is None:
+            named = documents.bundled("models").get(one.variant.base) == Path(one.base.file)
+            base = one.variant.base if named else str(Path(one.base.file).absolute())
+            write_text(folder / f"{one.name}.toml", replace(one.variant, base=base).document())
             count += 1
     return count
 
@@ -102,7 +101,7 @@ def finished(folder: Path, batches: Iterable[Batch]) -> list[Batch]:
 
 
 def read_rows(folder: Path) -> pd.DataFrame:
-    """One row per finished cell, with its trials; ordered by N_D, seed and model."""
+    """One row per finished cell, with its trials; ordered by N_D, seed, foundation and method."""
     rows = [row for file in sorted((folder / "batches").glob("*.json")) for row in read_json(file)]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
@@ -114,7 +113,7 @@ def read_rows(folder: Path) -> pd.DataFrame:
 
 def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial."""
-    keys = ["cell", "model", "kind", "member", "N_D", "runs", "minutes", "seed", "status"]
+    keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
     write_table(folder / "results.parquet", table)
@@ -128,17 +127,19 @@ def _flat(trial: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:
-    """Store the test windows and every model's physics paths on them, so that a report needs nothing else."""
+    """Store the test windows and the physics paths of every foundation on them, so that a report needs nothing else."""
     arrays: dict[str, np.ndarray] = {"run": test.run, "t": test.t, "future": test.future, "naive": naive}
     arrays |= {f"column {name}": values for name, values in test.columns.items()}
     arrays |= {f"planned {name}": values for name, values in test.planned.items()}
+    arrays |= {f"past {name}": values for name, values in test.past.items()}
+    arrays |= {f"states {name}": values for name, values in test.states.items()}
     arrays |= {f"physics {name}": values for name, values in paths.items()}
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
     write_arrays(folder / TEST, arrays, compressed=True)
 
 
 def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:
-    """Test windows, physics paths by model, and the naive floor's errors (T, S)."""
+    """Test windows, physics paths by foundation, and the naive floor's errors (T, S)."""
     try:
         arrays = read_arrays(folder / TEST)
         meta = json.loads(str(arrays["meta"]))
@@ -154,6 +155,8 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]
         columns=named("column "),
         future=arrays["future"],
         planned=named("planned "),
+        past=named("past "),
+        states=named("states "),
         horizon=meta["horizon"],
         step=meta["step"],
         shared_clock=meta["shared"],

@@ -10,6 +10,7 @@ import pandas as pd
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, cumulative_integral, pieces
 from shipid.logs.segments import kind_of
+from shipid.physics.signals import steers
 
 KINDS = ("zigzag", "turning")
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
@@ -50,7 +51,7 @@ def survey(dataset: Dataset) -> Survey:
     for run, parts in stretches.items():
         longest = max(parts, key=lambda part: part["t"].iloc[-1] - part["t"].iloc[0])
         t = longest["t"].to_numpy()
-        angles = longest[[name for name in dataset.commands if not name.endswith(".n")]]
+        angles = longest[[name for name in dataset.commands if steers(name)]]
         found[run] = {
             "duration": float(t[-1] - t[0]),
             "kind": declared.get(run) or kind_of(longest),
@@ -100,7 +101,7 @@ def separation(dataset: Dataset, lag: float) -> float:
 def helm_sense(dataset: Dataset) -> dict[str, float]:
     """Correlation of every angle command that moves with the yaw acceleration that follows: > 0 turns to starboard."""
     found: dict[str, float] = {}
-    for name in (name for name in dataset.commands if not name.endswith(".n")):
+    for name in filter(steers, dataset.commands):
         pairs = [(rows[name].to_numpy()[:-1], np.diff(rows["r"])) for _, rows in pieces(dataset)]
         angle, change = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
         size = float(np.linalg.norm(angle) * np.linalg.norm(change))

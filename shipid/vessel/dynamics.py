@@ -12,10 +12,11 @@ import numpy as np
 from casadi import SX
 
 from shipid.errors import DocumentError, choices
-from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
+from shipid.physics import ACTUATORS, TERMS, Term
 from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
+from shipid.physics.signals import named, units
 from shipid.vessel.bindings import Binding, bindings
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import BEHIND, behind, signals, structural, term_blocks
@@ -169,7 +170,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         ),
         state=names,
         hidden=tuple(name for entries in hidden.values() for name in entries),
-        memory={name: _command_unit(name) if name in lags else "-" for name in memory},
+        memory={**dict.fromkeys(memory, "-"), **units(lags)},
         commands=tuple(told),
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
@@ -184,7 +185,7 @@ def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[
         f"{path.rsplit('.', 1)[-1]}.{signal}"
         for path, key, _ in terms
         for signal in signals(TERMS[key].function)
-        if signal in SIGNALS.commands
+        if signal in named("command")
     )
 
 
@@ -267,7 +268,7 @@ def _sum_of_terms(
 def _own_commands(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
     """Commands of one component by signal: what its actuators have reached."""
     component = path.rsplit(".", 1)[-1]
-    return {name: available[f"{component}.{name}"] for name in SIGNALS.commands if f"{component}.{name}" in available}
+    return {name: available[f"{component}.{name}"] for name in named("command") if f"{component}.{name}" in available}
 
 
 def _given(
@@ -315,7 +316,7 @@ def _environment(vessel: Vessel) -> tuple[str, ...]:
     wanted = {name for _, key, _ in term_blocks(vessel.document) for name in signals(TERMS[key].function)}
     if "current" in vessel.document:
         wanted |= {"V_c", "beta_c"}
-    return tuple(name for name in SIGNALS.environment if name in wanted)
+    return tuple(name for name in named("environment") if name in wanted)
 
 
 def _actuators(
@@ -355,7 +356,3 @@ def _values(binding: Binding, value_of: Mapping[str, SX]) -> dict[str, Any]:
         return target
 
     return {keyword: resolve(target) for keyword, target in binding.items()}
-
-
-def _command_unit(name: str) -> str:
-    return SIGNALS.commands[name.rsplit(".", 1)[-1]]

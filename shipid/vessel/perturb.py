@@ -11,11 +11,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
@@ -32,27 +33,125 @@ _RELATIONS: dict[str, Callable[[int, int], bool]] = {
 }
 
 
-class Perturbation(BaseModel):
-    """One `[[family.perturb]]` block: a factor, new values, or removals."""
+@dataclass(frozen=True)
+class Rule:
+    """One way of changing numbers, named by its key in a `[[family.perturb]]` block.
 
-    model_config = ConfigDict(extra="forbid")
+    argument : type of the key's value, for pydantic.
+    change : (number, argument, u) -> new number; u is uniform in [0, 1), drawn for each number and member.
+    drawn : whether this argument makes a draw, so that members differ.
+    places : (argument, base, file, path in the document) -> path of each number to change and the argument for it; None
+        where the block's `parameters` select the numbers and every one has the same argument.
+    note : what the argument is, for the schema.
+    """
+
+    argument: Any
+    change: Callable[[float, Any, float], float]
+    drawn: Callable[[Any], bool] = lambda _: False
+    places: Callable[[Any, Vessel, Any, str], Mapping[str, Any]] | None = None
+    note: str = ""
+
+
+def _removed(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
+    return dict.fromkeys(select(patterns, base.parameters, file, where))
+
+
+def _set(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
+    unknown = next((path for path in values if path not in base.parameters), None)
+    if unknown is not None:
+        message = f"{base.key} has no parameter {unknown!r}: {choices(unknown, base.parameters)}"
+        raise DocumentError(message, file=file, path=where)
+    return values
+
+
+def _times(number: float, factor: float | tuple[float, float], u: float) -> float:
+    if not isinstance(factor, tuple):
+        return number * factor
+    low, high = factor
+    return number * (low + (high - low) * u)
+
+
+def _rises(value: Any) -> Any:
+    if isinstance(value, tuple) and value[0] > value[1]:
+        raise ValueError(f"the range {list(value)} runs backwards: give [low, high]")
+    return value
+
+
+RULES: dict[str, Rule] = {
+    "remove": Rule(
+        list[str],
+        lambda _number, _none, _u: 0.0,
+        places=_removed,
+        note="paths whose value becomes 0; * and [order >= 3]",
+    ),
+    "set": Rule(dict[str, FiniteFloat], lambda _number, value, _u: value, places=_set, note="path -> new value"),
+    "factor": Rule(
+        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(_rises)],
+        _times,
+        drawn=lambda factor: isinstance(factor, tuple),
+        note="a number is fixed, a pair is a range drawn from uniformly",
+    ),
+}
+"""Key -> rule; a block with several applies them in this order. To add one, write its change and name it here."""
+
+
+class Perturbation(BaseModel):
+    """One `[[family.perturb]]` block: keys of `RULES`, and which numbers they change.
+
+    `given` holds what the block says for each rule, by its key.
+    """
+
+    model_config = ConfigDict(extra="allow")
     parameters: list[str] = Field(default=[], description="dotted paths; * and [order >= 3] select")
-    factor: FiniteFloat | tuple[FiniteFloat, FiniteFloat] | None = Field(
-        default=None, description="a number is fixed, a pair is a range drawn from uniformly"
-    )
     together: bool = Field(default=False, description="one draw for all parameters of the block")
-    set: dict[str, FiniteFloat] = Field(default={}, description="path -> new value")
-    remove: list[str] = Field(default=[], description="paths whose value becomes 0")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_rules(cls, raw: Any) -> Any:
+        """Check the keys and values of rules, so that a complaint names key and value."""
+        if isinstance(raw, cls):
+            return raw
+        return _block_model(tuple(RULES.items())).model_validate(raw).model_dump(exclude_unset=True)
 
     @model_validator(mode="after")
     def _one_meaning(self) -> Perturbation:
-        if bool(self.parameters) != (self.factor is not None):
-            raise ValueError("`parameters` and `factor` go together: which ones, and by how much")
-        if not (self.parameters or self.set or self.remove):
-            raise ValueError("says nothing: give `parameters` with `factor`, or `set`, or `remove`")
-        if isinstance(self.factor, tuple) and self.factor[0] > self.factor[1]:
-            raise ValueError(f"the range {list(self.factor)} runs backwards: give [low, high]")
+        selecting = [key for key, rule in RULES.items() if rule.places is None]
+        if bool(self.parameters) != any(key in self.given for key in selecting):
+            raise ValueError(f"`parameters` and {_either(selecting)} go together: which ones, and by how much")
+        if not (self.parameters or any(self.given.values())):
+            others = ", or ".join(f"`{key}`" for key in RULES if key not in selecting)
+            raise ValueError(f"says nothing: give `parameters` with {_either(selecting)}, or {others}")
         return self
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Keys that a block may have."""
+        return [*cls.model_fields, *RULES]
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Key of each rule that the block uses -> its argument, in the order of `RULES`."""
+        said = self.model_extra or {}
+        return {key: said[key] for key in RULES if said.get(key) is not None}
+
+    @property
+    def drawn(self) -> bool:
+        """Whether members differ by this block."""
+        return any(RULES[key].drawn(argument) for key, argument in self.given.items())
+
+
+def _either(keys: Iterable[str]) -> str:
+    return " or ".join(f"`{key}`" for key in keys)
+
+
+@cache
+def _block_model(rules: tuple[tuple[str, Rule], ...]) -> type[BaseModel]:
+    """Model of a block whose keys are these rules."""
+    fields: dict[str, Any] = {
+        key: (Annotated[rule.argument | None, Field(description=rule.note)], None) for key, rule in rules
+    }
+    shared: dict[str, Any] = {"parameters": (list[str], []), "together": (bool, False)}
+    return create_model("perturbation", __config__=ConfigDict(extra="forbid"), **shared, **fields)
 
 
 class Family(BaseModel):
@@ -150,56 +249,60 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
 
     Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
     """
-    return _draw(family, _rules(family, base, file), member, base, counter, file)
+    return _draw(family, _changes(family, base, file), member, base, counter, file)
 
 
 def members(
     family: Family, base: Vessel, file: str | Path | None = None, numbers: Iterable[int] | None = None
 ) -> list[Variant]:
     """Members of a resolved family, all or those of the given numbers from 0, none redrawn."""
-    rules = _rules(family, base, file)
+    changes = _changes(family, base, file)
     wanted = range(family.members) if numbers is None else numbers
-    return [_draw(family, rules, number, base, 0, file) for number in wanted]
+    return [_draw(family, changes, number, base, 0, file) for number in wanted]
 
 
 @dataclass(frozen=True)
-class _Rule:
-    """One perturbation with its paths looked up: what is removed, what is set, and the key of each path's draw."""
+class _Change:
+    """One rule of one block with its paths looked up.
 
-    remove: Sequence[str]
-    set: Mapping[str, float]
-    factor: float | tuple[float, float] | None
+    arguments : path -> argument of the rule for it. keys : path -> key of its draw, and how often it was used before.
+    """
+
+    rule: Rule
+    arguments: Mapping[str, Any]
     keys: Mapping[str, tuple[str, int]]
 
 
-def _rules(family: Family, base: Vessel, file: str | Path | None) -> list[_Rule]:
+def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
     original, times, found = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb):
         where = f"family {family.name!r}.perturb.{index}"
-        remove = select(block.remove, original, file, f"{where}.remove")
-        for path in block.set:
-            if path not in original:
-                raise DocumentError(
-                    f"{base.key} has no parameter {path!r}: {choices(path, original)}", file=file, path=f"{where}.set"
-                )
-        paths = select(block.parameters, original, file, f"{where}.parameters")
-        keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
-        times.update({key: times.get(key, -1) + 1 for key in keys.values()})
-        found.append(_Rule(remove, block.set, block.factor, {path: (key, times[key]) for path, key in keys.items()}))
+        for key, argument in block.given.items():
+            rule = RULES[key]
+            if rule.places is not None:
+                found.append(_Change(rule, rule.places(argument, base, file, f"{where}.{key}"), {}))
+                continue
+            paths = select(block.parameters, original, file, f"{where}.parameters")
+            keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
+            times.update({name: times.get(name, -1) + 1 for name in keys.values()})
+            counted = {path: (name, times[name]) for path, name in keys.items()}
+            found.append(_Change(rule, dict.fromkeys(paths, argument), counted))
     return found
 
 
 def _draw(
-    family: Family, rules: Sequence[_Rule], member: int, base: Vessel, counter: int, file: str | Path | None
+    family: Family, changes: Sequence[_Change], member: int, base: Vessel, counter: int, file: str | Path | None
 ) -> Variant:
     original = base.parameters
     values: dict[str, float] = {}
-    for rule in rules:
-        values |= dict.fromkeys(rule.remove, 0.0) | dict(rule.set)
-        for path, (key, times) in rule.keys.items():
-            factor = _factor(rule.factor, family, member, key, times, counter)
-            values[path] = values.get(path, original[path]) * factor
+    for change in changes:
+        for path, argument in change.arguments.items():
+            u = 0.0
+            if change.rule.drawn(argument):
+                key, times = change.keys.get(path, (path, 0))
+                u = uniform(family.seed, family.name, member, key, times, counter)
+            values[path] = change.rule.change(values.get(path, original[path]), argument, u)
     _check(family, member, base, values, file)
     factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
     name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
@@ -215,16 +318,6 @@ def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float
     except DocumentError as error:
         message = f"member {member + 1} would be no vessel: {error.path}: {error.message}"
         raise DocumentError(message, file=file, path=f"family {family.name!r}") from None
-
-
-def _factor(
-    given: float | tuple[float, float] | None, family: Family, member: int, key: str, times: int, counter: int
-) -> float:
-    if not isinstance(given, tuple):
-        assert given is not None
-        return given
-    low, high = given
-    return low + (high - low) * uniform(family.seed, family.name, member, key, times, counter)
 
 
 def uniform(*key: Any) -> float:

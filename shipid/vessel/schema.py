@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
-from shipid.physics import ACTUATORS, SIGNALS, TERMS, Term
+from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.signals import named
 
 FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
@@ -93,7 +94,7 @@ def structural(term: Term) -> tuple[str, ...]:
 @cache
 def behind(term: Term) -> tuple[str, ...]:
     """Signals that a term takes from the component that its block says it is behind."""
-    return tuple(name for name in signals(term.function) if name in SIGNALS.given)
+    return tuple(name for name in signals(term.function) if name in GIVEN)
 
 
 BEHIND = "behind"  # the key that names another component
@@ -184,7 +185,7 @@ def term_model(key: str) -> type[Block]:
         extra["kind"] = (Literal[kind], ...)
     for name in structural(term):
         extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
-    commands = [signal for signal in signals(term.function) if signal in SIGNALS.commands]
+    commands = [signal for signal in signals(term.function) if signal in named("command")]
     if commands:
         fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)

@@ -15,6 +15,7 @@ import numpy as np
 
 from shipid.document import bundled, get, read
 from shipid.errors import ShipidError, choices
+from shipid.physics.signals import is_shaft, neutral
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -359,8 +360,8 @@ def _accelerations(vessel: Vessel) -> Callable[[tuple[float, float, float], floa
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
 
     def found(nu: tuple[float, float, float], n: float) -> np.ndarray:
-        commands = [n if name.endswith(".n") else 0.0 for name in model.commands]
-        memory = [n if name.endswith(".n") else 0.0 for name in model.memory]
+        commands = [n if is_shaft(name) else neutral(name) for name in model.commands]
+        memory = [n if is_shaft(name) else neutral(name) for name in model.memory]
         rates: Any = model.rates([0.0, 0.0, 0.0, *nu], memory, commands, calm, values, np.zeros(3))
         return np.array(rates).ravel()[3:]
 

@@ -20,6 +20,7 @@ from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best,
 THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "limits": 1,
     "rollouts": 2,
+    "gradient": 2,
     "screening": 2,
     "truth": 2,
     "growth": 2,

@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from shipid.engine import torch as batched
+from shipid.engine.integrate import Job
 from shipid.engine.lowering import lower
 from shipid.engine.native import compiler
 from shipid.engine.rollout import Batch, Method, Trajectories, rollout
@@ -263,8 +264,8 @@ def test_a_sum_counts_every_component(what: str, draw_inputs: Draw) -> None:
     with_tau = np.zeros((1, 3, 3))
     with_tau[0, 0] = totals[what]
     pushed = Batch(**{**vars(batch), "tau_extra": with_tau})
-    found, _ = run_torch(summed, batch, 1.0, 1, "euler", 1, list(range(6)), False, "cpu")
-    expected, _ = run_torch(model, pushed, 1.0, 1, "euler", 1, list(range(6)), False, "cpu")
+    found, _ = run_torch(summed, batch, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
+    expected, _ = run_torch(model, pushed, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
     np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 

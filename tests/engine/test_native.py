@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from shipid.engine import native
-from shipid.engine.integrate import Batch
+from shipid.engine.integrate import Batch, Job
 from shipid.engine.native import Target, compiler, run_native, target
 from shipid.engine.rollout import distances, rollout
 from shipid.errors import ShipidError
@@ -57,7 +57,7 @@ def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.Monk
     for first in range(0, len(values), 6):
         part = ca.vertcat(*(values[first : first + 6] + [ca.SX(0)] * 6)[:6])
         rates = ca.Function("rates", [x, *middle, p, tau], [ca.densify(part)], names, ["rates"])
-        found, _ = run_native(replace(model, rates=rates), batch, 1.0, 1, "euler", 1, list(range(6)))
+        found, _ = run_native(replace(model, rates=rates), batch, Job(1.0, 1, "euler", 1, tuple(range(6))))
         expected = np.hstack(
             [np.array(rates(start[:, k], [], [0] * 4, [0] * 2, parameters[0], [0] * 3)) for k in range(21)]
         )

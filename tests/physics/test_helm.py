@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import Helmsman, Unit, station_keeping, steers, yaw_rate, zigzag
+from shipid.physics.helm import Helmsman, Unit, station_keeping, yaw_rate, zigzag
+from shipid.physics.signals import steers
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 

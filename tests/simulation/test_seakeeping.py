@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.native import compiler
-from shipid.engine.rollout import Engine, Trajectories, rollout
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.physics.frames import skew
 from shipid.simulation.sea import GRAVITY, Sea, draw_components, jonswap, wave_loads
 from shipid.simulation.truth import Truth, simulate
@@ -26,7 +26,7 @@ OF = {HEAVE: "down", ROLL: "phi", PITCH: "theta"}
 OFF = {f"thruster.{side}.off": True for side in ("port", "starboard")}
 HELD = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e12, "added_mass.N_rdot": -1e14}
 LOW = Sea(H_s=0.1, T_p=5.0)  # linear: heading and path of a ship that no course keeper holds stay as they were
-ENGINE: Engine = "auto" if compiler() is None else "native"
+ENGINE = "auto" if compiler() is None else "native"
 BETA_DEG = (0, 45, 90, 135, 180)
 
 #: BEM data base, uncoupled about the centre of gravity: natural periods [s] of heave, pitch, roll

@@ -35,7 +35,7 @@ BROKEN = {
     "family-without-base": ("family.0.base", "name a base vessel"),
     "extends-nobody": ("family.0.extends", "did you mean 'wrong'?"),
     "circular-extends": ("family.0.extends", "right -> wrong"),
-    "range-backwards": ("family.1.perturb.0", "give [low, high]"),
+    "range-backwards": ("family.1.perturb.0.factor", "give [low, high]"),
     "range-of-three": ("family.1.perturb.0.factor", "valid"),
     "selects-nothing": ("family 'wrong'.perturb.0.parameters", "did you mean 'hull.derivatives."),
     "factor-without-parameters": ("family.1.perturb.0", "go together"),

@@ -6,8 +6,9 @@ import casadi as ca
 import pytest
 
 from shipid.document import bundled
-from shipid.physics import ACTUATORS, SIGNALS, TERMS
+from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
 from shipid.physics.inertia import rigid_body
+from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import kinds, parameters, signals, structural, term_blocks, vessel_model
 
@@ -16,11 +17,11 @@ from shipid.vessel.schema import kinds, parameters, signals, structural, term_bl
 def test_every_argument_of_a_term_is_declared(key: str) -> None:
     """Positional arguments are signals or component arrays; keyword-only ones have a unit."""
     term = TERMS[key]
-    given = {*SIGNALS.motion, *SIGNALS.commands, *SIGNALS.environment}
+    given = {*MOTION, *named("command"), *named("environment")}
     source = term.components or term.drawn
     if source is not None:
         given |= set(source(**dict.fromkeys(structural(term), 3)))
-    given |= set(SIGNALS.given)
+    given |= set(GIVEN)
     if term.rates is not None:
         assert term.states is not None
         assert set(signals(term.rates)) <= given
@@ -37,7 +38,8 @@ def test_parameters_are_read_off_the_signature() -> None:
 
 
 def test_kinds_of_a_group() -> None:
-    assert kinds("thruster") == ["azimuth", "tunnel", "propeller", "service_speed", "rudder", "rudder_derivatives"]
+    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "service_speed"]
+    assert kinds("thruster") == [*driving, "rudder", "rudder_derivatives"]
     assert kinds("wind") == ["table", "blendermann"]
     assert kinds("rocket") == []
 

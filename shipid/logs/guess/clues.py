@@ -10,29 +10,15 @@ from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows
 from shipid.logs.guess.sniff import plain
 from shipid.logs.mapping import UNITS
+from shipid.physics.signals import SIGNALS
 
-NAMES: dict[str, str] = {
-    "north": r"n|north|northing|x0|x|xn|pos_?n|x_?earth|y_north",
-    "east": r"e|east|easting|y0|y|ye|pos_?e|y_?earth",
+INPUT_NAMES: dict[str, str] = {
     "latitude": r"lat|latitude",
     "longitude": r"lon|long|lng|longitude",
-    "psi": r"psi|heading|hdg|hdt|head|yaw|true_?heading|gyro",
-    "u": r"u|surge|surge_?(speed|vel\w*)|vx|u_?b(ody)?|speed_?long\w*|dx0?",
-    "v": r"v|sway|sway_?(speed|vel\w*)|vy|v_?b(ody)?|speed_?(trans|lat)\w*|dy0?",
-    "r": r"r|rot|yaw_?rate|rate_?of_?turn|psi_?dot|dpsi\w*|wz",
     "speed": r"sog|speed|spd|speed_?over_?ground",
     "course": r"cog|course|track|course_?over_?ground",
-    "phi": r"phi|roll",
-    "theta": r"theta|pitch",
-    "p": r"p|roll_?rate",
-    "q": r"q|pitch_?rate",
-    "V_w": r"v_?w|(true_?)?wind_?(speed)?|tws",
-    "beta_w": r"beta_?w|(true_?)?wind_?(dir\w*|from|angle)|twd",
-    "n": r"n_?(port|stbd|starboard|stern|bow)?|rpm\w*|rev\w*|rps\w*|shaft\w*|\w+_(rpm|shaft|rev)|n_p|n_s",
-    "alpha": r"alpha\w*|azi\w*|\w+_(azi\w*|alpha)",
-    "delta": r"delta\w*|rud\w*|\w+_(rud\w*|delta)",
 }
-"""What a column may be -> how it is often called, in lower case, without its unit."""
+"""How logs call what a mapping turns into columns, in lower case, without its unit; for signals see their table."""
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?",
     "m/s": r"mps|m/s|ms",
@@ -45,6 +31,7 @@ UNIT_WORDS = {
     "rpm": r"rpm|1/min|min-1",
     "rev/s": r"rps|1/s|rev/s|hz",
     "m": r"m|metres?|meters?",
+    "%": r"%|percent|pct",
 }
 SIDES = r"(port|starboard|stbd|stern|bow|fore|aft|main)"
 
@@ -70,6 +57,10 @@ class Finding:
     confidence: float
     sentence: str
     repair: dict[str, Any] | None = None
+
+
+def _pattern(meaning: str) -> str:
+    return INPUT_NAMES.get(meaning) or SIGNALS[meaning].names or "(?!)"  # a signal that no log has matches no name
 
 
 def stem(name: str) -> str:
@@ -114,7 +105,7 @@ class State:
 
     def called(self, meaning: str) -> list[str]:
         """Free columns whose name says that they may be this."""
-        return [name for name in self.free() if re.fullmatch(NAMES[meaning], stem(name))]
+        return [name for name in self.free() if re.fullmatch(_pattern(meaning), stem(name))]
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
         """Claim a column."""
@@ -134,4 +125,4 @@ class State:
 
     def all_called(self, meaning: str) -> list[str]:
         """Columns whose name says that they may be this, claimed or not."""
-        return [name for name in self.columns if re.fullmatch(NAMES[meaning], stem(name))]
+        return [name for name in self.columns if re.fullmatch(_pattern(meaning), stem(name))]

@@ -22,8 +22,10 @@ from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.sniff import Sniffed, sniff
 from shipid.logs.mapping import UNITS, to_si
+from shipid.physics.signals import SIGNALS, named, steers
 
 CLEAR, LIKELY = 1.5, 0.6
+AZIMUTH = "thruster"  # component of a command of an azimuth unit whose name says no side
 
 
 @dataclass(frozen=True)
@@ -365,7 +367,7 @@ def _orders(state: State) -> None:
     """Rudder, azimuth and shaft by name; their sign by what they do to the yaw rate."""
     numbered = all(name.isdecimal() for name in state.columns)
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
-    angles = [(name, signal) for signal in ("alpha", "delta") for name in state.called(signal)]
+    angles = [(name, signal) for signal in named("command") if steers(signal) for name in state.called(signal)]
     if numbered and r is not None:
         small = [
             name
@@ -378,11 +380,11 @@ def _orders(state: State) -> None:
         }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > 4 else []
-    azimuth = any(signal == "alpha" for _, signal in angles)
+    azimuth = any(SIGNALS[signal].component == AZIMUTH for _, signal in angles)
     used: dict[str, int] = {}
     for name, signal in angles:
         values = state.columns[name]
-        unit = unit_said(name, "rad") or ("deg" if np.abs(values).max() > 1.6 else "rad")
+        unit = _unit_of(state, name, signal)
         power = 0.0 if r is None else evidence.effect(state.t, r, values)
         extra: dict[str, Any] = {}
         why = "by its name; it is not seen to turn the ship"
@@ -393,19 +395,28 @@ def _orders(state: State) -> None:
                 ("port", "starboard") if power > 0 else ("starboard", "port")
             )  # where it does not turn her, and does
             why = f"positive turns the ship to {sides[1]} (t value {abs(power):.0f})"
-            if (power > 0) != (signal == "delta"):  # an azimuth is taken for one aft of the origin
+            if (power > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1
                 sentence = f"positive {name!r} turns to {sides[1]} (t value {abs(power):.0f}); here to {sides[0]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
-        component = _component(name, "rudder" if signal == "delta" else "thruster")
+        component = _component(name, SIGNALS[signal].component)
         state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
-    for name in state.called("n"):
-        largest = float(np.abs(state.columns[name]).max())
-        said = unit_said(name, "rev/s")
-        unit = said or ("rpm" if largest > 25 or "rpm" in name.lower() else "rev/s")
-        component = _component(name, "thruster" if azimuth else "propeller")
-        why = f"by its name; up to {largest:.4g}"
-        state.suggest(_unique(f"{component}.n", used), name, unit, 0.9 if said else 0.7, why)
+    for signal in (signal for signal in named("command") if not steers(signal)):
+        for name in state.called(signal):
+            said = unit_said(name, SIGNALS[signal].unit)
+            component = _component(name, AZIMUTH if azimuth else SIGNALS[signal].component)
+            why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
+            unit = _unit_of(state, name, signal)
+            state.suggest(_unique(f"{component}.{signal}", used), name, unit, 0.9 if said else 0.7, why)
+
+
+def _unit_of(state: State, name: str, signal: str) -> str:
+    """Unit of a column that may be this signal: what its name says, else what its magnitude makes likely."""
+    row = SIGNALS[signal]
+    large = row.read_as_SI is not None and float(np.abs(state.columns[name]).max()) > row.read_as_SI
+    return unit_said(name, row.unit) or (
+        row.read_in if large or (row.shaft and row.read_in in name.lower()) else row.unit
+    )
 
 
 def _held(values: Array) -> float:
@@ -428,7 +439,7 @@ def _others(state: State) -> None:
     """Roll, pitch and wind, by name alone."""
     for meaning in ("phi", "theta"):
         for name in state.called(meaning)[:1]:
-            unit = unit_said(name, "rad") or ("deg" if np.abs(state.columns[name]).max() > 0.8 else "rad")
+            unit = _unit_of(state, name, meaning)
             state.suggest(meaning, name, unit, 0.5, "by its name; its sign cannot be told from the log")
     if {"apparent_angle", "apparent_speed"} <= set(state.free()):
         why = "the sentence says that it is relative to the bow"
@@ -440,5 +451,5 @@ def _others(state: State) -> None:
         state.suggest("V_w", speeds[0], unit, 0.5, "by its name; true or apparent cannot be told from the log")
         said = "from" if "towards" not in angles[0].lower() else "towards"
         why = f"by its name; taken as {said!r}, as sailors say it"
-        turn = unit_said(angles[0], "rad") or ("deg" if np.abs(state.columns[angles[0]]).max() > 7 else "rad")
+        turn = _unit_of(state, angles[0], "beta_w")
         state.suggest("beta_w", angles[0], turn, 0.5, why, direction=said, wrap=True)

@@ -12,6 +12,7 @@ from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import to_si
+from shipid.physics.signals import is_shaft
 
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
@@ -34,7 +35,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
             )
             state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
     for column in state.suggestions:
-        if column.name.endswith(".n"):
+        if is_shaft(column.name):
             values = state.columns[column.source]
             top = float(np.mean(values == values.max()))
             if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS:
@@ -46,7 +47,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
         sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
         state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
-    if missing and sniffed.form.get("kind") != "nmea":  # no sentence says everything
+    if missing and not sniffed.scattered:  # no sentence says everything
         state.find(
             "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
         )

@@ -93,7 +93,7 @@ def _head(found: Guess) -> Iterator[str]:
     yield from _lines(found.sniffed.form)
     yield "\n[clock]"
     yield from _lines(found.sniffed.clock)
-    scattered = found.sniffed.form.get("kind") == "nmea"
+    scattered = found.sniffed.scattered
     source = found.columns[0].source
     steps = np.diff(found.sniffed.t[np.isfinite(found.sniffed.columns[source])] if scattered else found.sniffed.t)
     usual = float(np.median(steps))

@@ -13,13 +13,11 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.readers import FORMATS, read_table, seconds
+from shipid.logs.readers import LOOKED_AT, READERS, read_table, seconds
 
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
-LOOKED_AT = 300  # lines
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 CLOCK_WORDS = re.compile(r"^(t|tvec|time.*|timestamp|stamp|clock|sec|seconds|date.*|utc.*|.*_time|ms|zeit)$")
-_SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 _UNIT = re.compile(
     r"[\[(]?(s|ms|m|km|deg|°|rad|m/s|kn|kts|knots|km/h|deg/s|deg/min|rad/s|rpm|1/s|hz|nm?|kw|%|-|)[\])]?$"
 )
@@ -39,6 +37,11 @@ class Sniffed:
     columns: dict[str, Array]
     notes: tuple[str, ...]
 
+    @property
+    def scattered(self) -> bool:
+        """Whether a row is one sentence, which does not say everything."""
+        return READERS[self.form.get("kind", "text")].scattered
+
 
 def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     """Find out how a log is written and read it; `names` name the columns of a text log without a header.
@@ -54,7 +57,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     if not head.strip():
         raise DataError("the file is empty", file=file)
     form = _format(head, file, names)
-    model = FORMATS[form.get("kind", "text")][0].model_validate(form)
+    model = READERS[form.get("kind", "text")].options.model_validate(form)
     table = read_table(file, model, "time")
     columns, words = _numbers(table, form.get("decimal", "."))
     clock, t = _clock(table, columns, file)
@@ -66,16 +69,11 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
 
 
 def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
-    if head.startswith(b"PAR1"):
-        return {"kind": "parquet"}
-    if head.startswith((b"MATLAB 5.0", b"\x89HDF")):
-        return {"kind": "mat"}
+    for reader in READERS.values():
+        form = reader.detect(file, head) if reader.detect else None
+        if form is not None:
+            return form
     encoding = _encoding(head, file)
-    lines = [line for line in head.decode(encoding, "ignore").splitlines()[:LOOKED_AT] if line.strip()]
-    sentences = [line for line in lines if _SENTENCE.search(line)]
-    if len(sentences) > len(lines) / 2:
-        stamped = sum(not line.lstrip().startswith("$") for line in sentences)
-        return {"kind": "nmea", "time": "line" if stamped > len(sentences) / 2 else "fix"}
     return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
 
 

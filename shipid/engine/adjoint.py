@@ -1,0 +1,300 @@
+"""Exact gradients as C on SIMD vectors: a rollout forward, whose states are kept, then a sweep backward over them.
+
+The integrator runs once on names, which gives the calls and sums of one step; the sweep goes through them in reverse.
+CasADi differentiates the rates and the memories in reverse mode, once for each structure.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from shipid.engine.casadi import summed_rates
+from shipid.engine.integrate import Array, Batch, Job, Method, integrate
+from shipid.engine.native import (
+    C,
+    Parts,
+    Target,
+    address,
+    compiled_for,
+    head,
+    longs,
+    num_parts,
+    packed_records,
+    padded,
+    spread,
+    target,
+    width,
+)
+from shipid.engine.printing import STAGES, print_function
+from shipid.errors import ShipidError
+from shipid.vessel.dynamics import INPUTS, Dynamics
+
+Loss = Callable[[Array], tuple[Array, Array]]
+"""Path (T + 1, S, C) of the kept channels -> the loss of each sample (S,), and its slope in the path (T + 1, S, C)."""
+
+
+@dataclass(frozen=True)
+class Adjoint:
+    """A loss of each sample and its exact derivatives, channel first.
+
+    loss : (S,). path : (T + 1, S, C) the kept channels. worst : (S,) greatest speed on the way.
+    parameters : (K, S), in the order of the wanted ones. tau_extra : (T, n_dof, S), of the force of each step.
+    state : (nx, S), of the states at the start.
+    """
+
+    loss: Array
+    path: Array
+    worst: Array
+    parameters: Array
+    tau_extra: Array
+    state: Array
+
+
+def checked_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
+    """What a loss gives for a path; ShipidError if its shapes are wrong."""
+    values, slopes = (np.asarray(part, dtype=float) for part in loss(path))
+    if values.shape != path.shape[1:2] or slopes.shape != path.shape:
+        wanted = f"{path.shape[1:2]} and {path.shape}"
+        raise ShipidError(f"a loss gives values and slopes of shapes {wanted}, found {values.shape} and {slopes.shape}")
+    return values, slopes
+
+
+@dataclass(frozen=True)
+class _Line:
+    """One line of a step: `out` = rates of (state, memory), memory after dt, or state + a k."""
+
+    kind: str
+    out: str
+    operands: tuple[str, ...]
+    number: float = 0.0
+
+
+def _recorded(step: float, method: Method) -> tuple[list[_Line], str, str]:
+    """The lines of one step from `x` and `m`, and the names of what comes out."""
+    lines: list[_Line] = []
+
+    def note(kind: str, *operands: str, number: float = 0.0) -> str:
+        lines.append(_Line(kind, f"b{len(lines)}", operands, number))
+        return lines[-1].out
+
+    after, memory_after = integrate(
+        lambda x, m: note("rates", x, m),
+        lambda m, dt: note("advance", m, number=dt),
+        lambda x, a, k: note("add", x, k, number=a),
+        "x", "m", step, method,
+    )  # fmt: skip
+    return lines, after, memory_after
+
+
+def _needed(lines: Sequence[_Line]) -> set[str]:
+    """What the sweep reads of the way forward: operands of rates and memories, and what leads to them."""
+    needed = {name for line in lines if line.kind != "add" for name in line.operands}
+    for line in reversed(lines):
+        if line.out in needed:
+            needed |= set(line.operands)
+    return needed
+
+
+class _Source(Parts):
+    """Writes the C of the sweep of one model."""
+
+    def __init__(self, model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> None:
+        self.model, self.wanted = model, wanted
+        self.tape = _recorded(step, method)
+        sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+        inputs = [SX.sym(name, size) for name, size in zip(INPUTS, (*sizes, len(model.parameters)), strict=True)]
+        tau, dt = SX.sym("tau_extra", model.num_dof), SX.sym("dt")
+        rates = SX(summed_rates(model, inputs, tau, {}))
+        later = SX(model.advance(*inputs, dt))
+        start = sizes[0] + sizes[1]
+
+        def function(name: str, result: SX, last: SX, *more: SX) -> ca.Function:
+            given = [*inputs, last, *more]
+            names = [*INPUTS, "dt" if last is dt else "tau_extra", *(["bar"] if more else [])]
+            return ca.Function(name, given, [ca.densify(result)], names, ["result"], {"cse": True})
+
+        def reverse(name: str, result: SX, last: SX) -> ca.Function:
+            """(inputs, last, bar) -> bar^T d(result)/d(state, memory, wanted parameters, last)."""
+            bar = SX.sym("bar", result.shape[0])
+            slopes = ca.jtimes(result, ca.vertcat(*inputs[:2], inputs[4], last), bar, True)
+            kept = [*range(start), *(start + place for place in wanted)]
+            kept += [] if last is dt else range(start + len(model.parameters), slopes.shape[0])
+            return function(name, slopes[kept], last, bar)
+
+        functions = [
+            function("rates", rates, tau),
+            function("advance", later, dt),
+            reverse("rates_back", rates, tau),
+            reverse("advance_back", later, dt),
+        ]
+        self.all = [print_function(one, STAGES, C) for one in functions]
+
+    def functions(self) -> str:
+        """Stages, rates, memories, and both in reverse, which add to what is there."""
+        rates, advance, rates_back, advance_back = self.all
+        nx, nm, count = len(self.model.state) + len(self.model.hidden), len(self.model.memory), len(self.wanted)
+
+        def ends(texts: Sequence[str]) -> list[str]:
+            return [f"out[{i}] = {text};" for i, text in enumerate(texts)]
+
+        def adds(texts: Sequence[str]) -> list[str]:
+            sizes = (("state_bar", nx), ("memory_bar", nm), ("grad", count), ("tau_bar", self.model.num_dof))
+            names = [f"{name}[{i}]" for name, size in sizes for i in range(size)]
+            pairs = zip(names, texts, strict=False)  # the memories take no force
+            return [f"{name} += {text};" for name, text in pairs if text not in ("K(0.0)", "K(-0.0)")]
+
+        inputs = "const V *state, const V *memory"
+        saved = "const V *saved0, const V *saved1"
+        bars = "const V *bar, V *state_bar, V *memory_bar, V *grad, V *tau_bar"
+        return f"""
+static void stage0(const V *parameters, V *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
+static void stage1(const V *commands, const V *environment, const V *saved0, V *saved) {{
+{" ".join(self.stage(1, p) for p in self.all)} }}
+static void rates({inputs}, const V *tau_extra, {saved}, V *out) {{
+{self.block(rates, (0, 1), [*rates.lines[2], *ends(rates.outputs)])} }}
+static void advance({inputs}, double step, {saved}, V *out) {{ const V dt[1] = {{ K(step) }};
+{self.block(advance, (0, 1), [*advance.lines[2], *ends(advance.outputs)])} }}
+static void rates_back({inputs}, const V *tau_extra, {saved}, {bars}) {{
+{self.block(rates_back, (0, 1), [*rates_back.lines[2], *adds(rates_back.outputs)])} }}
+static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1] = {{ K(step) }};
+{self.block(advance_back, (0, 1), [*advance_back.lines[2], *adds(advance_back.outputs)])} }}
+"""
+
+    def one_step(self) -> str:
+        """What the sweep reads of the step, computed again; then the step in reverse."""
+        lines, after, memory_after = self.tape
+        sizes = {"rates": len(self.model.state) + len(self.model.hidden), "advance": len(self.model.memory)}
+        sizes["add"] = sizes["rates"]
+        forward, backward, needed = [], [], _needed(lines)
+        for line in lines:
+            size = sizes[line.kind]
+            if line.out in needed:
+                forward.append(f"V {line.out}[{max(1, size)}];" + self._forward(line, size))
+        bars = [f"V {line.out}_bar[{max(1, sizes[line.kind])}] = {{}};" for line in lines]
+        bars += [f"V x_bar[{sizes['rates']}] = {{}}, m_bar[{max(1, sizes['advance'])}] = {{}};"]
+        bars += [f"for (int i = 0; i < {sizes['rates']}; ++i) {after}_bar[i] = x_next[i];"]
+        bars += [f"for (int i = 0; i < {sizes['advance']}; ++i) {memory_after}_bar[i] = m_next[i];"]
+        backward = [self._backward(line, sizes[line.kind]) for line in reversed(lines)]
+        ends = [f"for (int i = 0; i < {sizes['rates']}; ++i) x_next[i] = x_bar[i];"]
+        ends += [f"for (int i = 0; i < {sizes['advance']}; ++i) m_next[i] = m_bar[i];"]
+        return "\n".join([*forward, *bars, *backward, *ends])
+
+    def _forward(self, line: _Line, size: int) -> str:
+        if line.kind == "rates":
+            return f"rates({', '.join(line.operands)}, tau, saved0, saved1, {line.out});"
+        if line.kind == "advance":
+            return f"advance(x, {line.operands[0]}, {line.number!r}, saved0, saved1, {line.out});"
+        x, k = line.operands
+        return f"for (int i = 0; i < {size}; ++i) {line.out}[i] = {x}[i] + {line.number!r} * {k}[i];"
+
+    def _backward(self, line: _Line, size: int) -> str:
+        bar = f"{line.out}_bar"
+        if line.kind == "rates":
+            x, m = line.operands
+            return f"rates_back({x}, {m}, tau, saved0, saved1, {bar}, {x}_bar, {m}_bar, grad, tau_bar);"
+        if line.kind == "advance":
+            m = line.operands[0]
+            if not size:
+                return ""
+            return f"advance_back(x, {m}, {line.number!r}, saved0, saved1, {bar}, x_bar, {m}_bar, grad, tau_bar);"
+        x, k = line.operands
+        return (
+            f"for (int i = 0; i < {size}; ++i) {{ {x}_bar[i] += {bar}[i]; {k}_bar[i] += {line.number!r} * {bar}[i]; }}"
+        )
+
+    def text(self, wanted: Target) -> str:
+        """The whole source."""
+        model = self.model
+        nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
+        nc, ne, parameters, count = len(model.commands), len(model.environment), len(model.parameters), len(self.wanted)
+        return f"""{head(wanted)}
+{self.functions()}
+#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
+#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
+#define SLOPES(record) for (long i = 0; i < num_rows; ++i) {{ \\
+  V slope = *AT(slopes, (record) * num_rows + i); \\
+  if (rows[i] < {nx}) x_next[rows[i]] += slope; else m_next[rows[i] - {nx}] += slope; }}
+void run(long first, long last, long stride, long steps, const long *lengths, const double *numbers,
+         double *path, double *commands, double *environment, double *extra, double *slopes,
+         const long *rows, long num_rows, double *state_bar, double *parameters_bar, double *extra_bar) {{
+V parameters[{max(1, parameters)}], saved0[{self.total(0)}], saved1[{self.total(1)}];
+for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
+stage0(parameters, saved0);
+for (long g = first; g < last; ++g) {{
+  V x_next[{nx}] = {{}}, m_next[{max(1, nm)}] = {{}}, grad[{max(1, count)}] = {{}}, tau[{n}];
+  for (long k = steps - 1; k >= 0; --k) {{
+    V x[{nx}], m[{max(1, nm)}], tau_bar[{n}] = {{}};
+    SLOPES(k + 1)
+    for (int i = 0; i < {nx}; ++i) x[i] = *AT(path, k * {nx + nm} + i);
+    for (int i = 0; i < {nm}; ++i) m[i] = *AT(path, k * {nx + nm} + {nx} + i);
+    if (k == steps - 1 || lengths[2] > 1)
+      for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, NOW(2, k) * {n} + i);
+    if (k == steps - 1 || lengths[0] > 1 || lengths[1] > 1) {{
+      V c[{max(1, nc)}], e[{max(1, ne)}];
+      for (int i = 0; i < {nc}; ++i) c[i] = *AT(commands, NOW(0, k) * {nc} + i);
+      for (int i = 0; i < {ne}; ++i) e[i] = *AT(environment, NOW(1, k) * {ne} + i);
+      stage1(c, e, saved0, saved1);
+    }}
+    {self.one_step()}
+    for (int i = 0; i < {n}; ++i) *AT(extra_bar, k * {n} + i) = tau_bar[i];
+  }}
+  SLOPES(0)
+  for (int i = 0; i < {nx}; ++i) *AT(state_bar, i) = x_next[i];
+  for (int i = 0; i < {count}; ++i) *AT(parameters_bar, i) = grad[i];
+}} }}
+"""
+
+
+@lru_cache(maxsize=32)
+def _library(model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> Any:
+    """The `run` of a sweep, compiled or from the cache."""
+    return compiled_for(lambda: _Source(model, wanted, step, method).text(target()))
+
+
+def gradient_native(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+    """A loss on the job's channels and its derivatives, samples on SIMD lanes and threads.
+
+    wanted : places of the parameters in question. The batch holds one variant and no drawn components.
+    """
+    nx, nm, num_samples, wide = len(batch.state), len(batch.memory), batch.state.shape[1], width(batch)
+    records, worst = packed_records(model, batch, replace(job, every=1, rows=tuple(range(nx + nm))))
+    path = records[0][:, list(job.rows)].transpose(0, 2, 1)[:, :num_samples]
+    values, slopes = checked_loss(loss, path)
+    run, lanes, n, num_steps = (
+        _library(model, wanted, job.step, job.method),
+        target().lanes,
+        model.num_dof,
+        job.num_steps,
+    )
+    series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    inputs = [*series, padded(slopes.transpose(0, 2, 1), wide)]
+    lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
+    places = (ctypes.c_long * max(1, len(job.rows)))(*job.rows)
+    numbers = np.ascontiguousarray(batch.parameters[0], dtype=float)
+    state, force = np.empty((nx, wide)), np.empty((num_steps, n, wide))
+    slope = np.empty((len(wanted), wide))
+    parts = num_parts(batch)
+    edges = np.linspace(0, wide // lanes, parts + 1).astype(int).tolist()
+
+    def work(part: int) -> None:
+        run(
+            *longs(edges[part], edges[part + 1], wide, num_steps),
+            lengths,
+            *(address(array) for array in (numbers, records[0], *inputs)),
+            places,
+            *longs(len(job.rows)),
+            *(address(array) for array in (state, slope, force)),
+        )
+
+    spread(work, ((part,) for part in range(parts)))
+    return Adjoint(
+        values, path, worst[0, :num_samples], slope[:, :num_samples], force[:, :, :num_samples], state[:, :num_samples]
+    )

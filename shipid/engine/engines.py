@@ -1,0 +1,132 @@
+"""The engines, by name. To add one: write its file, name it here.
+
+An engine runs a job on a batch. What else it can do is said here too: measure distances on its way, differentiate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from shipid.engine.adjoint import Adjoint, Loss, gradient_native
+from shipid.engine.casadi import run_casadi
+from shipid.engine.integrate import Array, Batch, Job
+from shipid.engine.native import compiler, measure_native, run_native
+from shipid.errors import ShipidError, choices
+from shipid.vessel.dynamics import Dynamics
+
+AUTO = "auto"
+COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
+NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
+COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
+BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
+
+
+@dataclass(frozen=True)
+class Load:
+    """How much there is to do.
+
+    work : evaluations of the right-hand side, drawn components counted in.
+    width : samples x variants.
+    device : a PyTorch device.
+    """
+
+    work: float
+    width: int
+    device: str
+
+
+def _never(_: Load) -> bool:
+    return False
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A way to run rollouts.
+
+    run : (model, batch, job) -> records (R, V, S, C) and the greatest speed (V, S) [m/s, rad/s].
+    preferred : whether `auto` takes this engine for a load, if no engine named before it is preferred.
+    available : whether this machine has what the engine needs.
+    measure : (model, batch, job, goal (T, 2, S)) -> sum of distances (V, S), tally (V, BINS) and greatest speed (V, S);
+        the distances are those of the two channels of the job to the goal after every step. None if it cannot.
+    gradient : (model, batch of one variant, job, places of the wanted parameters, loss) -> Adjoint. None if it cannot.
+    any_device : whether it runs on every PyTorch device, not on the CPU alone.
+    """
+
+    run: Callable[[Dynamics, Batch, Job], tuple[Array, Array]]
+    preferred: Callable[[Load], bool] = _never
+    available: Callable[[], bool] = lambda: True
+    measure: Callable[[Dynamics, Batch, Job, Array], tuple[Array, Array, Array]] | None = None
+    gradient: Callable[[Dynamics, Batch, Job, tuple[int, ...], Loss], Adjoint] | None = None
+    any_device: bool = False
+
+
+def _torch(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+    from shipid.engine.torch import run_torch  # PyTorch takes a second to import
+
+    return run_torch(model, batch, job, compiled=False)
+
+
+def _compiled(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+    from shipid.engine.torch import run_torch
+
+    return run_torch(model, batch, job, compiled=True)
+
+
+def _torch_gradient(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+    from shipid.engine.torch import gradient_torch
+
+    return gradient_torch(model, batch, job, wanted, loss)
+
+
+def _has_compiler() -> bool:
+    return compiler() is not None
+
+
+ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
+    "native": Engine(
+        run_native,
+        preferred=lambda load: load.device == "cpu" and load.work > NATIVE_FROM,
+        available=_has_compiler,
+        measure=measure_native,
+        gradient=gradient_native,
+    ),
+    "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
+    "compiled": Engine(
+        _compiled, preferred=lambda load: load.device != "cpu" and load.work > COMPILE_FROM, any_device=True
+    ),
+    "torch": Engine(_torch, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
+}
+
+
+def named(name: str, device: str) -> Engine | None:
+    """The engine of a name, None for `auto`; ShipidError if there is none, or it does not run on the device."""
+    if name == AUTO:
+        return None
+    if name not in ENGINES:
+        raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
+    engine = ENGINES[name]
+    if device != "cpu" and not engine.any_device:
+        others = " or ".join(repr(other) for other, found in ENGINES.items() if found.any_device)
+        raise ShipidError(f"engine {name!r} runs on the CPU: use {others} on {device!r}")
+    return engine
+
+
+def chosen(batch: Batch, job: Job) -> Engine:
+    """The engine that `auto` takes for a rollout: by size, and by what there is."""
+    weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
+    width = batch.state.shape[1] * len(batch.parameters)
+    load = Load(job.num_steps * width * (4 if job.method == "rk4" else 1) * weight, width, job.device)
+    return next(engine for engine in ENGINES.values() if engine.preferred(load) and engine.available())
+
+
+def differentiable(name: str, device: str) -> Engine:
+    """The engine of a name that has gradients; for `auto` the first that does; ShipidError if it has none."""
+    engine = named(name, device)
+    able = {key: found for key, found in ENGINES.items() if found.gradient is not None}
+    if engine is None:
+        fit = (found for found in able.values() if found.available() and (device == "cpu" or found.any_device))
+        return next(fit)
+    if engine.gradient is None:
+        raise ShipidError(f"engine {name!r} has no gradient: use {' or '.join(map(repr, able))}")
+    return engine

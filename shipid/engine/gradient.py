@@ -1,0 +1,116 @@
+"""Exact gradients of a loss through a rollout, with respect to parameters, to the extra force and to the start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipid.engine.adjoint import Loss
+from shipid.engine.engines import differentiable
+from shipid.engine.integrate import Array, Job, Method
+from shipid.engine.rollout import SPEED_LIMIT, channels, finite, places, prepared
+from shipid.errors import ShipidError, choices
+from shipid.vessel.load import Vessel
+
+PATH = ("north", "east")
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """A loss of each sample and its derivatives; of a sample that diverged they mean nothing.
+
+    loss : (S,) in the unit of the loss.
+    parameters : (S, K) d(loss)/d(parameter), by `names`; their sum over samples is the gradient of the summed loss.
+    tau_extra : (num_steps, S, n_dof) d(loss)/d(extra force during each step) [1/N, 1/(N m)].
+    start : state name -> (S,) d(loss)/d(state at the start).
+    path : (num_steps + 1, S, C) the kept channels, the start first.
+    diverged : (S,) as in `Trajectories`.
+    """
+
+    loss: Array
+    parameters: Array
+    names: tuple[str, ...]
+    tau_extra: Array
+    start: Mapping[str, Array]
+    path: Array
+    diverged: Array
+
+
+def rollout_gradient(
+    vessel: Vessel,
+    start: Mapping[str, Array],
+    commands: Mapping[str, Array],
+    environment: Mapping[str, Array] | None,
+    loss: Loss,
+    *,
+    step: float,
+    num_steps: int,
+    names: Sequence[str] = (),
+    keep: Sequence[str] = PATH,
+    method: Method = "euler",
+    parameters: Array | None = None,
+    memory: Mapping[str, Array] | None = None,
+    tau_extra: Array | None = None,
+    engine: str = "auto",
+    device: str = "cpu",
+) -> Gradient:
+    """Value and exact gradient of a loss on a rollout of many samples by one variant.
+
+    Reverse mode: the cost does not grow with the number of parameters. It is the derivative of the discrete motion, so
+    that it agrees with finite differences of `rollout` at any step; a kink has the slope of one of its sides.
+
+    Parameters
+    ----------
+    start, commands, environment, memory, tau_extra, step, num_steps, method : as in `rollout`.
+    loss : path (num_steps + 1, S, C) of the channels `keep` -> (loss (S,), slope d(loss)/d(path), shaped as the path);
+        such as `squared_distance(goal)`.
+    names : dotted paths of the parameters to differentiate by; ShipidError for one that the vessel does not have.
+    keep : states and memories that the loss looks at.
+    parameters : (P,) in the order of `vessel.parameters`; default: the vessel's own.
+    engine : `native`, `torch`, or `auto`: native where there is a C compiler.
+
+    Memories at the start are taken as they are: the first orders do not depend on parameters. Terms whose components
+    are drawn (waves) stay in calm water only where they are off: ShipidError otherwise.
+    """
+    way = differentiable(engine, device)
+    if num_steps < 1:
+        raise ShipidError(f"num_steps must be 1 or more, found {num_steps}")
+    values = None if parameters is None else np.asarray(parameters, dtype=float).reshape(1, -1)
+    weather = environment or {}
+    model, batch = prepared(vessel, start, commands, weather, {}, num_steps, values, memory, tau_extra, None)
+    if model.drawn:
+        raise ShipidError(f"{model.drawn[0].path} draws its components and has no gradient: switch it off")
+    wrong = next((name for name in names if name not in model.parameters), None)
+    if wrong is not None:
+        raise ShipidError(f"{vessel.name} has no parameter {wrong!r}: {choices(wrong, model.parameters)}")
+    order = {name: place for place, name in enumerate(model.parameters)}
+    job = Job(step, num_steps, method, 1, places(keep, channels(model), vessel), device)
+    with np.errstate(all="ignore"):
+        assert way.gradient is not None
+        found = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
+    return Gradient(
+        loss=found.loss,
+        parameters=found.parameters.T,
+        names=tuple(names),
+        tau_extra=found.tau_extra.transpose(0, 2, 1),
+        start=dict(zip((*model.state, *model.hidden), found.state, strict=True)),
+        path=found.path,
+        diverged=(~(found.worst <= SPEED_LIMIT) | ~finite(batch))[0],
+    )
+
+
+def squared_distance(goal: Array, weights: Array | float = 1.0) -> Loss:
+    """Mean over the steps of the weighted squared distance to `goal` (num_steps, S, C), the start left out.
+
+    weights : broadcast against (num_steps, S, C); with the channels north and east and weight 1 the loss is in m^2.
+    """
+
+    def loss(path: Array) -> tuple[Array, Array]:
+        apart = path[1:] - goal
+        slope = np.zeros(path.shape)
+        slope[1:] = 2 * weights * apart / len(goal)
+        return (weights * apart**2).sum(axis=(0, 2)) / len(goal), slope
+
+    return loss

@@ -1,0 +1,52 @@
+"""Physics alone: nothing is learned, the path of the foundation is the prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.windows import Instants
+from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.physics import Physics
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Unchanged:
+    """The corrector that leaves the path of the physics as it is."""
+
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return the paths (T, S, 2) [m] of the physics."""
+        return paths
+
+    def header(self) -> dict[str, Any]:
+        """Return nothing: there is nothing to keep."""
+        return {}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return no arrays."""
+        return {}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:  # noqa: ARG003
+        """Rebuild it from nothing."""
+        return cls({})
+
+
+class Alone(Method):
+    """H = A: the prediction is the path of the physics. It has no settings and does not meet `none`."""
+
+    compensates: ClassVar[bool] = False
+    corrector: ClassVar[type[Any]] = Unchanged
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Return the unchanged physics for every foundation."""
+        return {name: Fitted(Unchanged({}), [], 0.0) for name in task.cases}

@@ -1,0 +1,218 @@
+"""Candidate inputs of a method: what is measured at the instant, what is planned, and what the past says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
+
+from shipid.data.windows import Instants, to_frame
+from shipid.errors import DataError
+from shipid.hybrid.physics import Physics
+
+Array = NDArray[np.float64]
+MOTIONS = ("u", "v", "r")
+TOLERANCE = 1e-9  # two columns that differ by less, relative to their size, are one column written twice
+PARTS = 3  # of the horizon, in which a method sees planned commands
+
+
+def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
+    """Planned commands as few numbers: the mean command less the present one in each part of the horizon.
+
+    The parts are nearly equal, `PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
+    ..., so that the side and the sign of the command hold for its plan.
+    """
+    means: dict[str, Array] = {}
+    for name, values in planned.items():
+        component, _, signal = name.rpartition(".")
+        for number, part in enumerate(np.array_split(values, min(PARTS, len(values))), start=1):
+            means[f"{component}.planned-{number}.{signal}"] = part.mean(axis=0) - columns[name]
+    return means
+
+
+def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict[str, Array]:
+    """Return the inputs at the instant: u, v, r, the commands and, where wind was measured, the relative wind.
+
+    u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7). What is not measured is no input.
+
+    Parameters
+    ----------
+    columns : quantities (S,) at the instants of prediction, SI and radians.
+    commands : names of the command columns, `<component>.<signal>`.
+
+    Raises
+    ------
+    DataError : a motion or a command is missing.
+    """
+    for name in (*MOTIONS, *commands):
+        if name not in columns:
+            raise DataError(f"the compensator needs this column; there are {', '.join(sorted(columns))}", path=name)
+    table = {name: np.asarray(columns[name], dtype=float) for name in (*MOTIONS, *commands)}
+    if "V_w" in columns and "beta_w" in columns:
+        angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
+        table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
+        table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
+    return table
+
+
+class Memory(BaseModel):
+    """What a method takes from the past: all in seconds before the instant; nothing by default.
+
+    Parameters
+    ----------
+    history : u, v, r and the commands so long ago, less their present values.
+    turned : change of heading over so long.
+    error : what the physics, started so long ago with the commands then given, gets wrong by now: along and across the
+        present heading, and in u, v, r. It holds wind, current, and what the model lacks. 0: not taken.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    history: tuple[PositiveFloat, ...] = ()
+    turned: tuple[PositiveFloat, ...] = ()
+    error: NonNegativeFloat = 0.0
+
+    @property
+    def past(self) -> float:
+        """Length of the past that is needed [s]."""
+        return max((*self.history, *self.turned, self.error), default=0.0)
+
+
+NOTHING = Memory()
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Which inputs a method takes: names of commands, and the memory.
+
+    `table` gives them all by name; what is a difference to the past is called `past-4.u` or `port.past-4.alpha`, a
+    change of heading `turned-10.psi`, the error of the physics `error-8.x`, so that the last part is the signal.
+    """
+
+    commands: tuple[str, ...]
+    memory: Memory = NOTHING
+
+    def table(self, physics: Physics, instants: Instants) -> dict[str, Array]:
+        """Return every input (S,) at the instants; DataError where a column or a part of the past is missing."""
+        return self.common(instants, physics.step) | self.of_physics(physics, instants)
+
+    def common(self, instants: Instants, step: float) -> dict[str, Array]:
+        """Return the inputs (S,) that do not depend on the physics."""
+        planned = {name: instants.planned[name] for name in self.commands} if instants.planned is not None else {}
+        means = planned_means(instants.columns, planned)
+        table = feature_table({**instants.columns, **means}, (*self.commands, *means))
+        return table | self._history(instants, step)
+
+    def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
+        """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
+        seconds = self.memory.error
+        if not seconds or physics.vessel is None:
+            return {}
+        return {f"error-{seconds:g}.{name}": values for name, values in past_error(physics, instants, seconds).items()}
+
+    def _history(self, instants: Instants, step: float) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for seconds in self.memory.history:
+            for name in (*MOTIONS, *self.commands):
+                component, dot, signal = name.rpartition(".")
+                label = f"{component}{dot}past-{seconds:g}.{signal}"
+                found[label] = self._before(instants, name, seconds, step) - instants.columns[name]
+        for seconds in self.memory.turned:
+            before = self._before(instants, "psi", seconds, step)
+            found[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
+        return found
+
+    @staticmethod
+    def _before(instants: Instants, name: str, seconds: float, step: float) -> Array:
+        steps = steps_of(seconds, step)
+        if name not in instants.past or len(instants.past[name]) < steps:
+            held = len(instants.past.get(name, ())) * step
+            raise DataError(
+                f"the method needs {seconds:g} s of the past of this column, there are {held:g} s", path=name
+            )
+        return np.asarray(instants.past[name][-steps])
+
+    def header(self) -> dict[str, Any]:
+        """Return the inputs as plain JSON."""
+        return {"commands": list(self.commands), "memory": self.memory.model_dump(mode="json")}
+
+    @classmethod
+    def from_header(cls, header: Mapping[str, Any]) -> Inputs:
+        """Rebuild what `header` gave."""
+        return cls(tuple(header["commands"]), Memory(**header["memory"]))
+
+
+def group_of(name: str) -> str:
+    """Kind of an input by its name: `motion`, `wind`, `command` (a plan too), `history` or `error`."""
+    if name in MOTIONS:
+        return "motion"
+    if name.endswith("_rw"):
+        return "wind"
+    kind = re.match(r"(?:.*\.)?(past|turned|error)-", name)
+    return "command" if kind is None else "error" if kind[1] == "error" else "history"
+
+
+def steps_of(seconds: float, step: float) -> int:
+    """Number of steps in so many seconds, at least one."""
+    return max(round(seconds / step), 1)
+
+
+def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str, Array]:
+    """What the physics, started so long ago with the commands then given, gets wrong by now, (S,) each.
+
+    x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
+    velocities [m/s, rad/s]. A prediction that diverged gives zeros.
+    """
+    steps = steps_of(seconds, physics.step)
+    past, columns = instants.past, instants.columns
+    if "x" not in past or len(past["x"]) < steps:
+        held = len(past.get("x", ())) * physics.step
+        raise DataError(f"the method needs {seconds:g} s of the past, there are {held:g} s", path="memory.error")
+    then = {name: values[-steps] for name, values in past.items()}
+    given = {name: values[-steps:] for name, values in past.items() if "." in name}
+    before = replace(physics, horizon=steps)
+    found = {name: values[-1] for name, values in before.states(Instants(then, planned=given)).items()}
+    turned = columns["psi"] - then["psi"]
+    x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
+    dx, dy = x0 - found["x"], y0 - found["y"]
+    c, s = np.cos(turned), np.sin(turned)
+    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
+    errors |= {name: columns[name] - found[name] for name in MOTIONS}
+    sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
+    return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
+
+
+def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Merge columns that are equal and drop those that are constant: (12) becomes (13) where both azimuths act as one.
+
+    Parameters
+    ----------
+    table : features (S,), training samples only.
+
+    Returns
+    -------
+    dict : name of each feature that stays -> all the columns it stands for, itself first.
+
+    Raises
+    ------
+    DataError : none of them varies.
+    """
+    chosen: dict[str, tuple[str, ...]] = {}
+    for name, values in table.items():
+        tolerance = TOLERANCE * max(1e-300, float(np.abs(values).max(initial=0.0)))
+        if np.ptp(values) <= tolerance:
+            continue
+        twin = next((kept for kept in chosen if "." in name and np.allclose(table[kept], values, 0.0, tolerance)), None)
+        if twin is None:
+            chosen[name] = (name,)
+        else:
+            chosen[twin] += (name,)
+    if not chosen:
+        raise DataError(
+            f"none of {', '.join(table)} varies over the training windows: nothing can be learned from them"
+        )
+    return chosen

@@ -1,0 +1,158 @@
+"""The skeleton of a method: how data improve what the physics says. A method is one file and one line in METHODS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from shipid.data.windows import Instants, Windows
+from shipid.errors import DataError
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.physics import Physics
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class Corrector(Protocol):
+    """A fitted method: what it makes of the physics at instants of prediction.
+
+    `hyperparameters` are what the search chose. `header` and `arrays` hold all of it as plain JSON and as arrays, from
+    which `from_arrays` rebuilds it; ResultError where a part is missing or does not fit.
+    """
+
+    @property
+    def hyperparameters(self) -> Mapping[str, float]:
+        """Name -> value, for the record."""
+
+    @property
+    def past(self) -> float:
+        """Length of the past that a prediction needs [s]."""
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
+        """Return paths (T, S, 2) [m] in the frame (11); `paths` are those of the physics alone."""
+
+    def header(self) -> dict[str, Any]:
+        """Return all that is not an array."""
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name."""
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild what `header` and `arrays` gave."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One foundation of a task.
+
+    physics : equations with the numbers that the foundation says; without a vessel for pure data-driven.
+    paths : (T, S, 2) [m] of the physics alone on the windows of the task; zeros without a vessel.
+    """
+
+    physics: Physics
+    paths: Array
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a method is fitted to: foundations on the same windows.
+
+    Parameters
+    ----------
+    cases : name of a foundation -> its physics and paths. The result for one does not depend on the others.
+    windows : windows that train or validate.
+    folds : (training, validation) indices of windows, split by run; one pair, or one per fold.
+    commands : names of the command columns.
+    known : whether the commands over the horizon are known to a prediction.
+    seed : of all that is random.
+    hidden : foundation -> states of its actuators at the instants (S,), where it has any.
+    on_trial : called with (trials done, trials in all) after each trial.
+    device : a PyTorch device.
+    """
+
+    cases: Mapping[str, Case]
+    windows: Windows
+    folds: Sequence[tuple[Index, Index]]
+    commands: tuple[str, ...]
+    known: bool = False
+    seed: int = 0
+    hidden: Mapping[str, Mapping[str, Array] | None] = field(default_factory=dict)
+    on_trial: Callable[[int, int], None] | None = None
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        if any(len(part) == 0 for fold in self.folds for part in fold):
+            raise DataError("a fold has no windows to train on or to validate with: use more manoeuvres")
+
+    def instants(self, name: str) -> Instants:
+        """What a prediction of a foundation knows at each window."""
+        return self.windows.instants(known=self.known, hidden=self.hidden.get(name))
+
+    @property
+    def targets(self) -> dict[str, Array]:
+        """Foundation -> (T, S, 2) [m] what its physics misses; the true path itself without physics."""
+        return {name: self.windows.future - case.paths for name, case in self.cases.items()}
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Result of a method for one foundation.
+
+    corrector : the fitted method; None where every trial failed (targets that are not numbers).
+    trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
+        (`complete` or `diverged`).
+    seconds : time spent on this foundation, its share of what is done for several at once.
+    """
+
+    corrector: Corrector | None
+    trials: list[dict[str, Any]]
+    seconds: float
+
+
+class Method(BaseModel):
+    """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
+
+    validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
+    compensates : whether anything is learned from data; it then also works without physics.
+    corrector : the class that a saved predictor is rebuilt with.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    validation: ClassVar[str] = "share"
+    compensates: ClassVar[bool] = True
+    corrector: ClassVar[type[Any]]
+
+    @property
+    def past(self) -> float:
+        """Length of the past that windows must hold for this method [s]."""
+        return 0.0
+
+    def varied(self) -> tuple[str, ...]:
+        """Names of the hyperparameters that differ between trials."""
+        return ()
+
+    def num_chosen(self) -> int:
+        """Number of the best trials that make the corrector, at most."""
+        return 1
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Fit every foundation of a task; name of the foundation -> result."""
+        raise NotImplementedError
+
+
+def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:
+    """Inputs (S,) by name, for every foundation; an input that does not depend on the physics is one array for all."""
+    common = inputs.common(task.windows.instants(known=task.known), task.windows.step)
+    return {name: common | inputs.of_physics(case.physics, task.instants(name)) for name, case in task.cases.items()}
+
+
+def same_table(table: Mapping[str, Array]) -> tuple[tuple[str, int], ...]:
+    """A key that is equal for two tables of `shared_tables` that hold the same arrays."""
+    return tuple((name, id(values)) for name, values in table.items())

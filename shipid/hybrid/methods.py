@@ -1,0 +1,32 @@
+"""The methods that a study may name: to add one, write its file and name its class here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from shipid.document import parse
+from shipid.errors import DocumentError, choices
+from shipid.hybrid.alone import Alone
+from shipid.hybrid.method import Method
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_trained import PathTrained
+
+METHODS: dict[str, type[Method]] = {
+    "alone": Alone,
+    "path-drawn": PathDrawn,
+    "path-trained": PathTrained,
+}
+
+
+def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
+    """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
+    if kind not in METHODS:
+        raise DocumentError(f"no such kind of method: {choices(kind, METHODS)}", path=f"{path}.kind")
+    found: Method = parse(METHODS[kind], dict(settings), None, path)
+    return found
+
+
+def kind_of(method: Method) -> str:
+    """Return the name under which the class of a method is listed."""
+    return next(name for name, kind in METHODS.items() if type(method) is kind)

@@ -1,0 +1,122 @@
+"""Path, drawn: networks whose hidden units are drawn at random and whose output weights are solved in closed form.
+
+f(z) = B W tanh(V z + c) with V, c drawn, B polynomials of time, and W = argmin |targets - f|^2 + ridge |W|^2; every
+trial is judged by every run left out in turn, at the price of one solution (`shipid.hybrid.ridge`). Random features:
+Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import exp, log
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, PositiveInt
+
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.features import Memory
+from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.settings import Probability, Scale, Searched, spread
+
+RIDGES = 9  # of a range
+MEMORIES = ((), ("error",), ("history", "error"))  # that validation chooses from
+Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
+
+
+class PathDrawn(Searched):
+    """Networks with drawn hidden units on the errors of the path, solved in closed form.
+
+    All ranges are searched by their logarithm, with the same trials for all foundations. The defaults were chosen on
+    held-out windows of five worlds of `simulation`: docs/performance.md, "What lowers H".
+
+    Parameters
+    ----------
+    trials : sets of hyperparameters tried per foundation.
+    units : hidden units of tanh, drawn at random; twice as many where they come in mirrored pairs.
+    motion_scale, command_scale, wind_scale : how far an input must move, in its standard deviations, to change a hidden
+        unit by about one: u, v, r; the commands; the relative wind. Large = the compensation varies slowly with it.
+    offset : spread of the offsets of the hidden units: large bends more.
+    ridge : weight of the squared output weights; from low to high, the best of 9 is taken for each trial and model.
+    terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
+    mirror : share of the trials in which port and starboard are mirror images.
+    averaged : the compensation is the mean of the networks of so many best trials.
+    memory : what the inputs hold of the past; `history_scale` and `error_scale` are the scales of these inputs.
+    choose : whether validation chooses between no memory, the error of the physics, and that with history: each is
+        tried in a third of the trials (without physics: no memory or history, a half each).
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = (
+        "motion_scale",
+        "command_scale",
+        "wind_scale",
+        "history_scale",
+        "error_scale",
+        "offset",
+        "ridge",
+    )
+    validation: ClassVar[str] = "runs"
+    corrector: ClassVar[type[Any]] = Compensator
+
+    units: PositiveInt = 256
+    motion_scale: Scale = (1.0, 16.0)
+    command_scale: Scale = (1.0, 16.0)
+    wind_scale: Scale = (4.0, 64.0)
+    offset: Scale = (0.5, 4.0)
+    ridge: Ridge | tuple[Ridge, Ridge] = (1e-5, 10.0)
+    terms: PositiveInt = 8
+    mirror: Probability = 0.75
+    averaged: PositiveInt = 8
+    memory: Memory = Memory()
+    history_scale: Scale = (2.0, 32.0)
+    error_scale: Scale = (2.0, 32.0)
+    choose: bool = False
+
+    @property
+    def past(self) -> float:
+        """Length of the past that windows must hold [s]."""
+        return self.memory.past
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""
+        idle = set() if self.memory.history or self.memory.turned else {"history_scale"}
+        idle |= set() if self.memory.error else {"error_scale"}
+        return {name: pair for name, pair in super().ranges().items() if name not in idle}
+
+    def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
+        """Return the kinds of memory that a trial does without."""
+        taken = MEMORIES[int(point["memory"])] if "memory" in point else ("history", "error")
+        return frozenset({"history", "error"} - set(taken))
+
+    def varied(self) -> tuple[str, ...]:
+        """Return the names of the hyperparameters that differ between trials."""
+        mirror = ("mirror",) if 0 < self.mirror < 1 else ()
+        return (*self.ranges(), *mirror, *(("memory",) if self.choose else ()))
+
+    def num_chosen(self) -> int:
+        """Return how many of the best trials make the compensator, at most."""
+        return self.averaged
+
+    def points(self) -> list[dict[str, float]]:
+        """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0."""
+        ranges = {name: pair for name, pair in self.ranges().items() if name != "ridge"}
+        fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
+        found = []
+        for number, shares in enumerate(spread(len(ranges) + 1, self.trials)):
+            point = {**fixed, "mirror": float(shares[0] < self.mirror)}
+            if self.choose:
+                point["memory"] = float(number % len(MEMORIES))
+            for share, (name, (low, high)) in zip(shares[1:], ranges.items(), strict=True):
+                point[name] = exp(log(low) + share * (log(high) - log(low)))
+            found.append(point)
+        return found
+
+    def path(self) -> list[float]:
+        """Return the ridges that every trial is solved with, evenly spread by their logarithm."""
+        return [self.ridge] if isinstance(self.ridge, float) else [float(r) for r in np.geomspace(*self.ridge, RIDGES)]
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
+        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
+
+        return tune_ridge(task, self)

@@ -1,0 +1,311 @@
+"""The one table of signals: what a ship does, is ordered and meets; unit, sign in the mirror, names in logs, ranges.
+
+To add a signal, write one row in `SIGNALS`, and a term that takes it. Everything else asks this table at run time: the
+schema of vessels, datasets, the importer and its guesses, checks, truths, corrections, figures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass
+from typing import Literal
+
+from shipid.units import DEGREE, RPM
+
+Role = Literal["motion", "command", "environment", "derived"]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One row of the table.
+
+    role : `motion` of the ship; `command`, named `<component>.<signal>` in data; `environment`; `derived` from others.
+    unit : SI unit, `-` for a pure number.
+    word : what a figure calls it.
+    shown : unit in which sailors read it; None is `unit`.
+    factor : SI units in one `shown` unit.
+    angle : whether it is an angle, interpolated across its wrap.
+    shaft : whether it is a speed of revolutions.
+    turns : of an angle that steers: sign of the yaw rate that a positive one gives, aft of the origin; 0: steers not.
+    mirror : its sign in the port-starboard mirror.
+    column : whether datasets need it, may have it, or have it under no name. A command may always stand.
+    names : regular expression of how logs call it, in lower case and without the unit; empty where logs have it not.
+    plausible : largest magnitude [SI] that a check lets pass; None is not checked.
+    read_as_SI : largest magnitude that a log column without a unit is taken to have in SI; beyond, it is in `shown`.
+    reach : least and greatest value [SI] over which the laws of the physics are tested.
+    usual : least and greatest value [SI] of a command in ordinary use: what a simulated truth draws from.
+    neutral : value [SI] of a command where nobody says anything: helm amidships, shaft stopped, pitch of service.
+    component : name of the component that a log's column without a side belongs to.
+    """
+
+    role: Role
+    unit: str
+    word: str
+    _: KW_ONLY
+    shown: str | None = None
+    factor: float = 1.0
+    angle: bool = False
+    shaft: bool = False
+    turns: Literal[-1, 0, 1] = 0
+    mirror: Literal[-1, 1] = 1
+    column: Literal["required", "optional", "none"] = "none"
+    names: str = ""
+    plausible: float | None = None
+    read_as_SI: float | None = None
+    reach: tuple[float, float] = (-1.0, 1.0)
+    usual: tuple[float, float] = (0.0, 0.0)
+    neutral: float = 0.0
+    component: str = "thruster"
+
+    @property
+    def read_in(self) -> str:
+        """Unit in which sailors read it."""
+        return self.shown or self.unit
+
+
+SIGNALS: dict[str, Signal] = {
+    "north": Signal(
+        "motion", "m", "north", column="required", names=r"n|north|northing|x0|x|xn|pos_?n|x_?earth|y_north"
+    ),
+    "east": Signal(
+        "motion", "m", "east", mirror=-1, column="required", names=r"e|east|easting|y0|y|ye|pos_?e|y_?earth"
+    ),
+    "psi": Signal(
+        "motion",
+        "rad",
+        "heading",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        mirror=-1,
+        column="required",
+        names=r"psi|heading|hdg|hdt|head|yaw|true_?heading|gyro",
+        reach=(-math.pi, math.pi),
+    ),
+    "u": Signal(
+        "motion",
+        "m/s",
+        "speed ahead",
+        column="required",
+        names=r"u|surge|surge_?(speed|vel\w*)|vx|u_?b(ody)?|speed_?long\w*|dx0?",
+        plausible=25.0,
+    ),
+    "v": Signal(
+        "motion",
+        "m/s",
+        "speed to starboard",
+        mirror=-1,
+        column="required",
+        names=r"v|sway|sway_?(speed|vel\w*)|vy|v_?b(ody)?|speed_?(trans|lat)\w*|dy0?",
+        plausible=10.0,
+    ),
+    "r": Signal(
+        "motion",
+        "rad/s",
+        "yaw rate",
+        shown="deg/s",
+        factor=DEGREE,
+        mirror=-1,
+        column="required",
+        names=r"r|rot|yaw_?rate|rate_?of_?turn|psi_?dot|dpsi\w*|wz",
+        plausible=0.6,
+    ),
+    "z": Signal("motion", "m", "heave", column="optional"),
+    "phi": Signal(
+        "motion",
+        "rad",
+        "roll",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        mirror=-1,
+        column="optional",
+        names=r"phi|roll",
+        plausible=1.0,
+        read_as_SI=0.8,
+    ),
+    "theta": Signal(
+        "motion",
+        "rad",
+        "trim",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        column="optional",
+        names=r"theta|pitch",
+        plausible=0.5,
+        read_as_SI=0.8,
+    ),
+    "w": Signal("motion", "m/s", "speed down", column="optional"),
+    "p": Signal(
+        "motion",
+        "rad/s",
+        "roll rate",
+        shown="deg/s",
+        factor=DEGREE,
+        mirror=-1,
+        column="optional",
+        names=r"p|roll_?rate",
+    ),
+    "q": Signal(
+        "motion", "rad/s", "pitch rate", shown="deg/s", factor=DEGREE, column="optional", names=r"q|pitch_?rate"
+    ),
+    "V_w": Signal(
+        "environment",
+        "m/s",
+        "wind speed",
+        column="optional",
+        names=r"v_?w|(true_?)?wind_?(speed)?|tws",
+        plausible=60.0,
+        reach=(0.0, 20.0),
+    ),
+    "beta_w": Signal(
+        "environment",
+        "rad",
+        "wind direction",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        mirror=-1,
+        column="optional",
+        names=r"beta_?w|(true_?)?wind_?(dir\w*|from|angle)|twd",
+        read_as_SI=7.0,
+        reach=(-math.pi, math.pi),
+    ),
+    "V_c": Signal("environment", "m/s", "current speed", reach=(0.0, 2.0)),
+    "beta_c": Signal(
+        "environment",
+        "rad",
+        "current direction",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        mirror=-1,
+        reach=(-math.pi, math.pi),
+    ),
+    "u_rw": Signal("derived", "m/s", "speed ahead through the wind"),
+    "v_rw": Signal("derived", "m/s", "speed to starboard through the wind", mirror=-1),
+    "x": Signal("derived", "m", "way ahead"),
+    "y": Signal("derived", "m", "way to starboard", mirror=-1),
+    "n": Signal(
+        "command",
+        "rev/s",
+        "shaft",
+        shown="rpm",
+        factor=RPM,
+        shaft=True,
+        names=r"n_?(port|stbd|starboard|stern|bow)?|rpm\w*|rev\w*|rps\w*|shaft\w*|\w+_(rpm|shaft|rev)|n_p|n_s",
+        plausible=40.0,
+        read_as_SI=25.0,
+        reach=(-3.5, 3.5),
+        usual=(50 * RPM, 200 * RPM),
+        component="propeller",
+    ),
+    "alpha": Signal(
+        "command",
+        "rad",
+        "azimuth",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        turns=-1,
+        mirror=-1,
+        names=r"alpha\w*|azi\w*|\w+_(azi\w*|alpha)",
+        plausible=12.6,
+        read_as_SI=1.6,
+        reach=(-math.pi, math.pi),
+        usual=(-50 * DEGREE, 50 * DEGREE),
+    ),
+    "delta": Signal(
+        "command",
+        "rad",
+        "rudder",
+        shown="deg",
+        factor=DEGREE,
+        angle=True,
+        turns=1,
+        mirror=-1,
+        names=r"delta\w*|rud\w*|\w+_(rud\w*|delta)",
+        plausible=1.6,
+        read_as_SI=1.6,
+        reach=(-0.7, 0.7),
+        usual=(-35 * DEGREE, 35 * DEGREE),
+        component="rudder",
+    ),
+    "pitch": Signal(  # ratio P/D at 0.7 of the radius
+        "command",
+        "-",
+        "pitch ratio P/D",
+        names=r"cpp\w*|pitch_?(ratio|p_?d)\w*|prop(eller)?_?pitch\w*|(port|starboard|stbd)_pitch|pitch_(port|starboard|stbd)|p_?/?_?d",
+        plausible=2.0,
+        reach=(-1.4, 1.4),
+        usual=(0.4, 1.0),
+        neutral=0.8,
+        component="propeller",
+    ),
+}
+"""Name -> row. Order counts: columns of datasets and messages list signals in the order of the table."""
+
+
+def signal_of(name: str) -> str:
+    """Name of the signal of a command, `port.n` -> `n`; of anything else, the name itself."""
+    return name.rpartition(".")[2]
+
+
+def row_of(name: str) -> Signal | None:
+    """Row of a command (`port.n`) or of another signal (`u`); None where the table has none."""
+    return SIGNALS.get(signal_of(name))
+
+
+def named(role: Role) -> dict[str, Signal]:
+    """Rows of one role, in the order of the table."""
+    return {name: row for name, row in SIGNALS.items() if row.role == role}
+
+
+def is_command(name: str) -> bool:
+    """Whether a name is one of a command, `<component>.<signal>`."""
+    component, dot, signal = name.partition(".")
+    row = SIGNALS.get(signal)
+    return bool(dot) and row is not None and row.role == "command" and component.isidentifier() and component.isascii()
+
+
+def is_shaft(command: str) -> bool:
+    """Whether a command is a speed of revolutions, such as `port.n`."""
+    row = row_of(command)
+    return row is not None and row.shaft
+
+
+def steers(command: str) -> bool:
+    """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
+    row = row_of(command)
+    return row is not None and row.turns != 0
+
+
+def orders_thrust(name: str) -> bool:
+    """Whether a name ends in a command that does not steer: a shaft speed, a pitch; whatever it says of when."""
+    row = row_of(name)
+    return row is not None and row.role == "command" and row.turns == 0
+
+
+def neutral(command: str) -> float:
+    """Value [SI] of a command where nobody says anything: helm amidships, shaft stopped, pitch of service."""
+    row = row_of(command)
+    return 0.0 if row is None else row.neutral
+
+
+def mirror_sign(name: str) -> float:
+    """Factor of a signal in the port-starboard mirror, 1 or -1."""
+    row = row_of(name)
+    return 1.0 if row is None else float(row.mirror)
+
+
+def read_unit(name: str) -> tuple[str, float]:
+    """Unit in which sailors read a signal, and the factor from SI to it."""
+    row = SIGNALS[signal_of(name)]
+    return row.read_in, 1.0 / row.factor
+
+
+def units(names: Iterable[str]) -> dict[str, str]:
+    """SI unit of each of some commands or signals."""
+    return {name: SIGNALS[signal_of(name)].unit for name in names}

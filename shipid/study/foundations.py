@@ -1,0 +1,103 @@
+"""Foundations of one batch: variants as they are, and those whose numbers are identified first from the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shipid.data.dataset import BREAK, Dataset
+from shipid.data.windows import Windows
+from shipid.errors import ShipidError
+from shipid.metrics import position_error, summary
+from shipid.study.plan import Batch, Foundation, Plan
+from shipid.study.prepare import Prepared, paths_of
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a foundation of one batch predicts before any method improves it.
+
+    foundation : with the numbers that were identified, if any were.
+    paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
+    sentence : the message of the identification; empty where nothing was identified. seconds : that it took.
+    """
+
+    foundation: Foundation
+    paths: Array
+    test_paths: Array
+    sentence: str = ""
+    seconds: float = 0.0
+
+    def accuracy(self, test: Windows) -> Mapping[str, Any]:
+        """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
+        return summary(position_error(self.test_paths, test.future))
+
+
+def predictions(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> dict[str, Prediction]:
+    """Every foundation of a batch; those to be identified see the runs of the batch, and no moment of the test."""
+    mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
+    windows = prepared.pool.select(mask)
+    result = {}
+    data: Dataset | None = None
+    for one in prepared.foundations:
+        if one.identify is None:
+            paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
+            result[one.name] = Prediction(one, *paths)
+        else:
+            data = apart(prepared.data, prepared.test) if data is None else data
+            result[one.name] = _identified(plan, prepared, one, prepared.runs(plan, batch), data, windows, device)
+    return result
+
+
+def apart(dataset: Dataset, test: Windows) -> Dataset:
+    """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
+    if not test.shared_clock:
+        return dataset
+    t = dataset.frame["t"].to_numpy()
+    seen = np.zeros(len(t), dtype=bool)
+    for start, end in test.spans.values():
+        seen |= (t >= start) & (t <= end)
+    names = list(dict.fromkeys([*dataset.metadata["flags"], BREAK]))
+    after = np.concatenate([[False], seen[:-1]])
+    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
+    frame = dataset.frame.assign(flags=flags)[~seen].reset_index(drop=True)
+    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
+
+
+def _identified(
+    plan: Plan,
+    prepared: Prepared,
+    foundation: Foundation,
+    runs: tuple[str, ...],
+    data: Dataset,
+    windows: Windows,
+    device: str,
+) -> Prediction:
+    from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
+
+    assert foundation.identify is not None
+    assert foundation.variant is not None
+    assert foundation.vessel is not None
+    try:
+        solution = identify(foundation.vessel, data, runs, foundation.identify)
+        if solution.status != "ok":
+            return _nothing(foundation, windows, prepared.test, solution.sentence)
+        values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
+        now = replace(foundation, variant=replace(foundation.variant, values=values))
+        pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device)
+    except ShipidError as error:
+        return _nothing(foundation, windows, prepared.test, error.message)
+    if not np.isfinite(pair[0]).all():
+        return _nothing(foundation, windows, prepared.test, "the identified model diverges on training windows")
+    return Prediction(now, *pair, sentence=solution.sentence, seconds=solution.seconds)
+
+
+def _nothing(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> Prediction:
+    """A foundation without a result: paths that are no numbers, and why."""
+    here, there = (np.full_like(part.future, np.nan) for part in (windows, test))
+    return Prediction(foundation, here, there, f"identification: {sentence}")

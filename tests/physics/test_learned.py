@@ -1,0 +1,73 @@
+"""The learned force: what its formula says by hand, its bounds, its silence, and 200 weights by dotted path."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.engine.rollout import rollout
+from shipid.errors import DocumentError
+from shipid.physics.learned import learned
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from tests.conftest import WEIGHTS
+
+SHIP = load_vessel("gunnerus-28.9")
+OUTPUTS = ("c_X", "c_Y", "c_N")
+
+
+def force(nu: np.ndarray, **changes: object) -> np.ndarray:
+    return np.array(ca.evalf(learned(ca.SX(nu), **{**WEIGHTS, **changes}))).ravel()  # type: ignore[arg-type]
+
+
+def test_the_formula_by_hand() -> None:
+    nu = np.array([4.0, -0.7, 0.0, 0.0, 0.0, 0.08])
+    w = {name: np.array(value) for name, value in WEIGHTS.items()}
+    across = w["w_v"] * nu[1] / w["v_scale"] + w["w_r"] * nu[5] / w["r_scale"]
+    along = w["w_u"] * nu[0] / w["u_scale"] + w["w_0"]
+    starboard, port = np.tanh(along + across), np.tanh(along - across)
+    expected = np.zeros(6)
+    expected[0] = w["X_max"] * np.tanh(w["c_X"] @ ((starboard + port) / 2 - np.tanh(w["w_0"])))
+    expected[1] = w["Y_max"] * np.tanh(w["c_Y"] @ (starboard - port) / 2)
+    expected[5] = w["N_max"] * np.tanh(w["c_N"] @ (starboard - port) / 2)
+    np.testing.assert_allclose(force(nu), expected, rtol=1e-12)
+
+
+def test_it_is_bounded_however_large_the_weights() -> None:
+    large = {name: [1e6 * value for value in WEIGHTS[name]] for name in OUTPUTS}  # type: ignore[attr-defined]
+    found = np.abs(force(np.array([6.0, 2.0, 0, 0, 0, 0.2]), **large))
+    np.testing.assert_allclose(found[[0, 1, 5]], [WEIGHTS[name] for name in ("X_max", "Y_max", "N_max")], rtol=1e-12)
+
+
+def test_without_output_weights_there_is_exactly_no_force() -> None:
+    silent = {name: [0.0] * 3 for name in OUTPUTS}
+    assert (force(np.array([6.0, 2.0, 0, 0, 0, 0.2]), **silent) == 0).all()
+
+
+def test_a_silent_network_leaves_the_path_as_it_is() -> None:
+    learns = SHIP.with_values({"hull.learned": WEIGHTS | {name: [0.0] * 3 for name in OUTPUTS}})
+    start = {"north": np.zeros(1), "east": np.zeros(1), "psi": np.zeros(1), "u": np.full(1, 4.0)}
+    start |= {"v": np.full(1, 0.3), "r": np.full(1, 0.02)}
+    commands = {name: np.full(1, 1.5) for name in dynamics(SHIP).commands}
+    weather = {"V_w": np.full(1, 4.0), "beta_w": np.full(1, 1.0)}
+    paths = [rollout(ship, start, commands, weather, step=1.0, num_steps=10).states for ship in (SHIP, learns)]
+    np.testing.assert_allclose(*paths, rtol=1e-13)
+
+
+def test_two_hundred_weights_are_parameters_by_path_of_one_structure() -> None:
+    rng = np.random.default_rng(0)
+    lists = [name for name, value in WEIGHTS.items() if isinstance(value, list)]
+    block = WEIGHTS | {name: rng.normal(size=29).tolist() for name in lists}
+    vessel = SHIP.with_values({"hull.learned": block})
+    changed = vessel.with_values({"hull.learned.w_v.28": 0.25, "hull.learned.c_N.3": -1.5})
+    paths = [path for path in vessel.parameters if path.startswith("hull.learned.") and path.count(".") == 3]
+    assert len(paths) == 7 * 29
+    assert changed.parameters["hull.learned.w_v.28"] == 0.25
+    assert changed.parameters["hull.learned.c_N.3"] == -1.5
+    assert dynamics(changed) is dynamics(vessel)
+
+
+def test_lists_of_unequal_length_are_refused() -> None:
+    with pytest.raises(DocumentError, match=r"equally long.*hull\.learned|hull\.learned.*equally long"):
+        SHIP.with_values({"hull.learned": WEIGHTS | {"w_v": [0.1, 0.2]}})

@@ -1,0 +1,107 @@
+"""The table of signals: every row is whole, and every question is answered by the table alone."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from shipid.logs.mapping import UNITS
+from shipid.physics.signals import (
+    SIGNALS,
+    is_command,
+    is_shaft,
+    mirror_sign,
+    named,
+    neutral,
+    read_unit,
+    row_of,
+    signal_of,
+    steers,
+    units,
+)
+
+COMMANDS = tuple(f"port.{name}" for name in named("command"))
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_a_row_is_whole(name: str) -> None:
+    row = SIGNALS[name]
+    re.compile(row.names)
+    assert row.reach[0] < row.reach[1]
+    assert row.factor > 0
+    assert (row.shown is None) == (row.factor == 1.0)
+    assert row.column == "none" or row.role in ("motion", "environment")
+    assert not row.turns or (row.angle and row.mirror == -1), (
+        "what steers to one side steers to the other in the mirror"
+    )
+    if row.names:  # the importer reads it in the unit of sailors, too
+        assert UNITS[row.unit].get(row.read_in) == pytest.approx(row.factor, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_can_be_drawn_checked_and_guessed(name: str) -> None:
+    row = row_of(name)
+    assert row is not None
+    assert row.usual[0] < row.usual[1] <= row.reach[1]
+    assert row.plausible is not None
+    assert row.names
+    assert max(np.abs(row.usual)) < row.plausible
+    assert not (is_shaft(name) and steers(name))
+
+
+def test_commands_are_told_by_their_last_name() -> None:
+    assert [is_shaft(name) for name in COMMANDS] == [True, False, False, False]
+    assert [steers(name) for name in COMMANDS] == [False, True, True, False]
+    assert [mirror_sign(name) for name in COMMANDS] == [1, -1, -1, 1]
+    assert [neutral(name) for name in COMMANDS] == [0.0, 0.0, 0.0, 0.8]
+    assert units(COMMANDS) == dict(zip(COMMANDS, ("rev/s", "rad", "rad", "-"), strict=True))
+    assert (signal_of("port.n"), signal_of("u")) == ("n", "u")
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("port.n", True),
+        ("p_2.alpha", True),
+        ("n", False),
+        ("port.u", False),
+        ("2.n", False),
+        ("a.b.n", False),
+        (".n", 0),
+    ],
+)
+def test_what_a_command_is_called(name: str, command: bool) -> None:
+    assert is_command(name) == command
+
+
+def test_units_of_sailors() -> None:
+    assert read_unit("r") == ("deg/s", pytest.approx(180 / np.pi))
+    assert read_unit("port.n") == ("rpm", pytest.approx(60.0))
+    assert read_unit("u_rw") == ("m/s", 1.0)
+    assert read_unit("cpp.pitch") == ("-", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("called", "signal"),
+    [
+        *(("rpm_port", "n"), ("rudder_angle", "delta"), ("azi_port", "alpha"), ("heading", "psi"), ("sog", None)),
+        *(
+            ("pitch", "theta"),
+            ("cpp", "pitch"),
+            ("port_pitch", "pitch"),
+            ("propeller_pitch", "pitch"),
+            ("p/d", "pitch"),
+        ),
+        *(("pitch_rate", "q"), ("pitch_ratio", "pitch")),
+    ],
+)
+def test_a_name_in_a_log_is_one_signal_at_most(called: str, signal: str | None) -> None:
+    found = [name for name, row in SIGNALS.items() if row.names and re.fullmatch(row.names, called)]
+    assert found == ([signal] if signal else [])
+
+
+def test_what_nobody_knows_has_no_row() -> None:
+    assert row_of("port.rocket") is None
+    assert (neutral("port.rocket"), mirror_sign("x"), steers("x.y"), is_shaft("x.y")) == (0.0, 1.0, False, False)

@@ -1,0 +1,254 @@
+"""One edit is enough: a signal, a term, a log reader or a family rule is one entry, added here while the tests run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import casadi as ca
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.checks import check_dataset
+from shipid.data.dataset import Dataset
+from shipid.data.windows import cut_windows
+from shipid.engine.rollout import rollout
+from shipid.errors import DataError, DocumentError
+from shipid.hybrid.features import choose_features
+from shipid.hybrid.ridge import _reflection
+from shipid.logs import readers
+from shipid.logs.guess.columns import guess
+from shipid.logs.importing import import_log, read_mapping
+from shipid.physics import TERMS, Term, signals
+from shipid.physics.frames import force_at
+from shipid.physics.signals import Signal
+from shipid.study.envelope import envelope_table
+from shipid.study.plan import Published, build_plan
+from shipid.units import DEGREE
+from shipid.vessel import perturb, schema
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.perturb import Rule
+from tests.logs.conftest import PLAIN, as_log, turning
+from tests.logs.simulated import as_bridge, si_log
+
+FLAP = Signal(
+    "command",
+    "rad",
+    "rudder flap",
+    shown="deg",
+    factor=DEGREE,
+    angle=True,
+    turns=1,
+    mirror=-1,
+    names=r"flap\w*",
+    plausible=1.0,
+    read_as_SI=1.6,
+    reach=(-0.5, 0.5),
+    usual=(-0.3, 0.3),
+    component="flap",
+)
+CACHES = (schema.vessel_model, schema.term_model)
+T = np.arange(0.0, 60.0, 0.5)
+
+
+def flap_force(nu_r: Any, flap: Any, *, x: Annotated[Any, "m"], k: Annotated[Any, "kg m^-1"]) -> Any:
+    """Sway force -k u|u| flap at x: a positive flap aft turns the ship to starboard."""
+    return force_at(x, ca.SX(0), ca.SX(0), ca.SX(0), -k * nu_r[0] * ca.fabs(nu_r[0]) * flap)
+
+
+@pytest.fixture
+def flap(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A signal `flap` and a term that takes it."""
+    monkeypatch.setitem(signals.SIGNALS, "flap", FLAP)
+    monkeypatch.setitem(TERMS, "thruster.flap", Term(flap_force))
+    for cached in CACHES:
+        cached.cache_clear()
+    yield
+    for cached in CACHES:
+        cached.cache_clear()
+
+
+def with_flap() -> Vessel:
+    """A tanker model with a flap behind her rudder, which follows its order with a lag."""
+    lag = {"flap": {"kind": "first_order", "T": 0.5, "rate": 0.2}}
+    document = load_vessel("kvlcc2-l7").document
+    block = {"kind": "flap", "x": -3.5, "k": 50.0, "actuator": lag}
+    return check_vessel({**document, "thruster": {**document["thruster"], "tail": block}}, "with a flap")
+
+
+def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
+    """A log with a flap in degrees, imported."""
+    log = as_log(turning(T), folder / "log.csv")
+    table = pd.read_csv(log).assign(flap=np.degrees(largest * np.sin(0.2 * T)))
+    table.to_csv(log, index=False)
+    mapping = folder / "mapping.toml"
+    mapping.write_text(PLAIN.read_text() + '[columns."tail.flap"]\nfrom = "flap"\nunit = "deg"\n')
+    return import_log(read_mapping(mapping), log)
+
+
+def test_without_the_row_nobody_knows_the_signal(tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=r"signal of n, alpha, delta, pitch"):
+        flap_log(tmp_path)
+    with pytest.raises(DocumentError, match="flap"):
+        with_flap()
+
+
+@pytest.mark.usefixtures("flap")
+def test_a_term_takes_it_and_its_actuator_lags() -> None:
+    model = dynamics(with_flap())
+    assert model.commands == ("propeller.n", "rudder.delta", "tail.flap")
+    assert model.memory == {"rudder.delta": "rad", "tail.flap": "rad"}
+    start = {**dict.fromkeys(("north", "east", "psi", "v", "r"), np.zeros(1)), "u": np.ones(1)}
+    orders = {"propeller.n": np.full(1, 10.0), "rudder.delta": np.zeros(1), "tail.flap": np.full(1, 0.3)}
+    path = rollout(
+        with_flap(), start, orders, {}, step=0.1, num_steps=100, memory=dict.fromkeys(model.memory, np.zeros(1))
+    )
+    assert path["r"][-1, 0, 0] > 0.01
+    lagged = path["actual.tail.flap"][:, 0, 0]
+    assert 0 == lagged[0] < lagged[5] < lagged[-1] == pytest.approx(0.3)
+
+
+@pytest.mark.usefixtures("flap")
+def test_the_importer_the_checks_and_windows_take_it(tmp_path: Path) -> None:
+    dataset = flap_log(tmp_path)
+    assert dataset.commands == ["propeller.n", "tail.flap"]
+    np.testing.assert_allclose(dataset.frame["tail.flap"], 0.2 * np.sin(0.2 * T), atol=1e-6)
+    windows = cut_windows(dataset, horizon=5)
+    assert windows.planned["tail.flap"].shape == (5, len(windows))
+    checks = check_dataset(dataset).set_index("check")
+    assert checks.loc["range tail.flap", "ok"]
+    assert checks.loc["range tail.flap", "limit"] == 1.0
+    assert not check_dataset(flap_log(tmp_path, 2.0)).set_index("check").loc["range tail.flap", "ok"]
+
+
+@pytest.mark.usefixtures("flap")
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_a_guess_knows_its_name_and_unit(tmp_path: Path, unit: str) -> None:
+    log = as_bridge(si_log()).rename(columns={"rudder": "flap"})
+    log.assign(flap=log["flap"] * (1.0 if unit == "deg" else DEGREE)).to_csv(tmp_path / "log.csv", index=False)
+    found = guess(tmp_path / "log.csv").column("flap.flap")
+    assert found is not None
+    assert (found.source, found.unit, found.confidence) == ("flap", unit, 0.95)
+    assert "turns the ship to starboard" in found.evidence
+
+
+@pytest.mark.usefixtures("flap")
+def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
+    rows = [{"set": "D_4", "quantity": "tail.flap", "min": -0.1, "mean": 0.0, "max": 0.2}]
+    published = Published(source="a table", envelope={"flap_deg": (-6.0, 0.0, 12.0)})
+    table = envelope_table(rows, published).set_index("set")
+    assert set(table["unit"]) == {"deg"}
+    assert table.loc["D_4", "max"] == pytest.approx(np.degrees(0.2))
+    assert table.loc["published", "max"] == pytest.approx(12.0)
+
+
+@pytest.mark.usefixtures("flap")
+def test_a_correction_mirrors_it() -> None:
+    rng = np.random.default_rng(1)
+    table = {name: rng.normal(size=40) for name in ("u", "v", "r", "propeller.n", "tail.flap")}
+    reflection = _reflection(table, choose_features(table))
+    assert reflection is not None
+    np.testing.assert_array_equal(reflection, np.diag([1, -1, -1, 1, -1]))
+
+
+def read_toy(file: Path, _: readers.Format, __: str) -> pd.DataFrame:
+    """Lines `name: value value ...` under a first line `TOY`."""
+    lines = file.read_text().splitlines()[1:]
+    return pd.DataFrame({name: values.split() for name, values in (line.split(": ") for line in lines)})
+
+
+def is_toy(_: Path, head: bytes) -> dict[str, Any] | None:
+    return {"kind": "toy"} if head.startswith(b"TOY\n") else None
+
+
+def as_toy(table: pd.DataFrame, file: Path) -> Path:
+    lines = [f"{name}: {' '.join(map(str, table[name]))}" for name in table]
+    file.write_text("\n".join(["TOY", *lines]))
+    return file
+
+
+@pytest.fixture
+def toy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(readers.READERS, "toy", readers.Reader(readers.Format, read_toy, is_toy))
+
+
+def toy_mapping(folder: Path) -> Path:
+    mapping = folder / "mapping.toml"
+    mapping.write_text(PLAIN.read_text().replace("[clock]", '[format]\nkind = "toy"\n[clock]'))
+    return mapping
+
+
+def test_without_the_reader_a_mapping_names_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=r"unknown kind 'toy'.*text, parquet, mat, nmea|unknown kind 'toy'"):
+        read_mapping(toy_mapping(tmp_path))
+    with pytest.raises(DataError):
+        guess(as_toy(as_bridge(si_log()), tmp_path / "log.toy"))
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_mapping_names_the_reader(tmp_path: Path) -> None:
+    table = pd.read_csv(as_log(turning(T), tmp_path / "plain.csv"))
+    frame = import_log(read_mapping(toy_mapping(tmp_path)), as_toy(table, tmp_path / "log.toy")).frame
+    for name in ("north", "east", "psi", "u", "v", "r"):
+        np.testing.assert_allclose(frame[name], turning(T)[name], atol=1e-6)
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_guess_recognises_it(tmp_path: Path) -> None:
+    found = guess(as_toy(as_bridge(si_log()).round(4), tmp_path / "log.toy"))
+    assert found.sniffed.form == {"kind": "toy"}
+    assert {column.name for column in found.columns} >= {"north", "east", "psi", "u", "v", "r", "rudder.delta"}
+
+
+SHIFT = Rule(
+    float | tuple[float, float],
+    lambda number, shift, u: number + (shift if isinstance(shift, float) else shift[0] + (shift[1] - shift[0]) * u),
+    drawn=lambda shift: isinstance(shift, tuple),
+)
+
+
+def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
+    """Shift of x_G [m] of each member of a study's family that says so."""
+    document = {
+        "question": "What if the centre of gravity is elsewhere?",
+        "truth": {"vessel": "gunnerus-28.9", "manoeuvres": 8, "duration": 20.0},
+        "split": {"test": 2},
+        "prediction": {"ahead": 5.0},
+        "grid": {"N_D": [4]},
+        "family": [
+            {
+                "name": "wrong",
+                "base": "gunnerus-28.9",
+                "members": 2,
+                "perturb": [{"parameters": ["inertia.x_G"], **block}],
+            }
+        ],
+    }
+    base = load_vessel("gunnerus-28.9").parameters["inertia.x_G"]
+    variants = [one.variant for one in build_plan(document, folder / "study.toml").foundations]
+    return [variant.values["inertia.x_G"] - base for variant in variants if variant and variant.family == "wrong"]
+
+
+def test_without_the_rule_a_study_names_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=r"unknown key: .*factor") as caught:
+        shifted(tmp_path, {"shift": 0.5})
+    assert caught.value.path == "family.0.perturb.0.shift"
+
+
+def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
+    for block, least, most in (({"shift": 0.5}, 0.5, 0.5), ({"shift": [0.1, 0.4]}, 0.1, 0.4)):
+        shifts = shifted(tmp_path, block)
+        assert len(shifts) == 2
+        assert all(least - 1e-12 <= shift <= most + 1e-12 for shift in shifts)
+        assert (shifts[0] == shifts[1]) == (least == most)
+
+
+def test_a_rule_refuses_a_value_at_its_own_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
+    with pytest.raises(DocumentError) as caught:
+        shifted(tmp_path, {"shift": "far"})
+    assert str(caught.value.path).startswith("family.0.perturb.0.shift")
