@@ -13,7 +13,6 @@ from shipid.data.windows import Windows, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.metrics import position_error
 from shipid.observer import MEASURED, Observer, at_windows, bank, observe, observed_paths
-from shipid.predictor import physics_paths
 from shipid.simulation.excitation import aprbs
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import logged
@@ -121,10 +120,11 @@ def errors(vessel: Vessel, made: World, settings: Observer | None = None, known:
     def mean(paths: Array, which: Windows = windows) -> float:
         return float(position_error(paths, which.future).mean())
 
-    alone = mean(physics_paths(vessel, windows.columns, HORIZON, ROW, "euler", planned=planned)[0][:, 0])
-    estimates = observe(vessel, made.data, settings)
-    columns = at_windows(made.data, estimates, windows)
-    filters = bank(vessel, settings)
+    filters, zero = bank(vessel, settings), np.zeros(len(windows))
+    unseen = {f"observer.{name}": zero for name in (*"XYN", "current_north", "current_east")}
+    plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED}}
+    alone = mean(observed_paths(filters, plain, HORIZON, ROW, planned=planned)[0])
+    columns = at_windows(made.data, observe(vessel, made.data, settings), windows)
     seen = mean(observed_paths(filters, columns, HORIZON, ROW, planned=planned)[0])
     low = cut_windows(smoothed(made.data), horizon=HORIZON, interval=5.0).select(late).columns
     current = np.array([made.current[str(run)] for run in windows.run]).T
