@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,11 +18,10 @@ from shipid.observer import MEASURED, Observer, at_windows, bank, observe, obser
 from shipid.simulation.excitation import aprbs
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import logged
-from shipid.study.plan import read_plan
 from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import uniform
+from shipid.vessel.perturb import Family, members, resolve, uniform
 
 Array = np.ndarray
 STEP, ROW, HORIZON, SETTLED = 0.05, 1.0, 30, 60.0
@@ -90,8 +91,10 @@ def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, cu
 
 def physics(names: tuple[str, ...]) -> dict[str, Vessel]:
     """Nominal model and perturbed variants of it, by name."""
-    variants = [one.variant for one in read_plan("simulation").models if one.variant is not None]
+    blocks = tomllib.loads((Path(__file__).parents[2] / "studies" / "simulation.toml").read_text())["family"]
     base = load_vessel("gunnerus-28.9")
+    families = resolve([Family(**block) for block in blocks if "base" in block or "extends" in block])
+    variants = [one for family in families for one in members(family, base)]
     return {one.name: base.with_values(one.values) for one in variants if one.name in names}
 
 
