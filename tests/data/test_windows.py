@@ -17,12 +17,12 @@ from shipid.data.windows import (
     from_frame,
     nested_runs,
     part_folds,
-    planned_means,
     split_folds,
     split_runs,
     to_frame,
 )
 from shipid.errors import DataError
+from shipid.hybrid.features import planned_means
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 60.5, 0.5)
