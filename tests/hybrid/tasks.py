@@ -23,7 +23,7 @@ def task_of(
     seed: int,
     **options: Any,
 ) -> Task:
-    """A task whose physics misses just the targets (T, S, 2): a ship that stays, and paths that are the targets less."""
+    """A task whose physics misses just the targets (T, S, 2) [m]: true paths of zero."""
     first = next(iter(targets.values()))
     count = len(columns["u"])
     windows = Windows(
