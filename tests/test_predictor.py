@@ -34,7 +34,7 @@ def predictor(tiny_run: Path) -> Predictor:
 def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
     first = Predictor.load(cell_file(tiny_run, cell))
     again = Predictor.load(first.save(tmp_path / "deep" / "again.npz"))
-    for name in ("physics", "method", "commands", "path", "past", "limits", "provenance"):
+    for name in ("physics", "method", "commands", "past", "limits", "provenance"):
         assert getattr(again, name) == getattr(first, name)
     assert (again.vessel is None) == (cell == PURE)
     assert again.vessel == first.vessel

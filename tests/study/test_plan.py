@@ -223,3 +223,20 @@ def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
     assert high["thruster.port.D_p"] == high["thruster.starboard.D_p"]
     assert 0.6 <= high["inertia.m"] <= 1.4
     assert models["moderate-1"].factors != models["moderate-2"].factors
+
+
+def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(tmp_path: Path) -> None:
+    block = {"parameters": ["hull.derivatives.N_ur"]}
+    families = [
+        {"name": "right", "base": "gunnerus-28.9"},
+        {"name": "fitted", "extends": "right", "identify": block},
+        {"name": "again", "extends": "fitted", "identify": {**block, "horizon": 9.0}},
+    ]
+    plan = tiny_plan(tmp_path, {"family": families})
+    assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
+    right, fitted, again, _ = plan.foundations
+    assert right.variant == fitted.variant == again.variant
+    assert plan.identified == {"fitted", "again"}
+    assert fitted.identify is not None
+    assert again.identify is not None
+    assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
