@@ -45,7 +45,7 @@ class PathDrawn(Searched):
     averaged : the compensation is the mean of the networks of so many best trials.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history; with
-        `memory.observer` also between its estimates alone and everything. Each is tried in an equal share of the trials.
+        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
