@@ -91,7 +91,7 @@ def test_the_main_job_of_the_documentation_runs(tmp_path: Path, monkeypatch: pyt
     exec(
         main_job.replace("PathDrawn()", "PathDrawn(trials=2, units=32)").replace('"members": 4', '"members": 2'), space
     )
-    cells = pd.DataFrame(space["cells"])
+    cells = pd.DataFrame(space["rows"])
     assert [*zip(cells["model"], cells["N_D"], strict=True)] == [(f"wrong-{i}", n) for i in (1, 2) for n in (4, 8)]
     assert (cells["H"] < 0.5 * cells["A"]).all()
     assert space["predictor"].method == "path-drawn"
