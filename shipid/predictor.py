@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
 from shipid.hybrid.physics import Physics, check_columns
+from shipid.observer import Observer
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
@@ -35,7 +36,6 @@ class Predictor:
     limits : column -> (least, greatest) seen in training: the region where the method has evidence.
     commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
         in force in each step, `Instants.planned`, name -> (T, S).
-    path : where positions of the past come from: logged positions, or the integral of u, v, psi.
     """
 
     physics: Physics
@@ -44,7 +44,6 @@ class Predictor:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     commands: Commands = "held"
-    path: Literal["position", "velocity"] = "position"
 
     @property
     def vessel(self) -> Vessel | None:
@@ -102,7 +101,8 @@ class Predictor:
             "step": self.physics.step,
             "integrator": self.physics.integrator,
             "commands": self.commands,
-            "path": self.path,
+            "path": self.physics.path,
+            "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "provenance": dict(self.provenance),
             "method": self.method,
@@ -138,13 +138,14 @@ class Predictor:
                     int(header["horizon"]),
                     float(header["step"]),
                     header["integrator"],
+                    None if header["observer"] is None else Observer(**header["observer"]),
+                    header["path"],
                 ),
                 method=header["method"],
                 corrector=METHODS[header["method"]].corrector.from_arrays(header["corrector"], arrays),
                 limits={name: (low, high) for name, (low, high) in header["limits"].items()},
                 provenance=dict(header["provenance"]),
                 commands=header["commands"],
-                path=header["path"],
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
@@ -179,7 +180,7 @@ def fit(
     Raises
     ------
     DataError : physics and windows differ in horizon or step; the windows hold too short a past, lack a command of the
-        vessel or are too few to be split; the physics or the training diverges.
+        vessel or are too few to be split; the physics has an observer; the physics or the training diverges.
     """
     if (physics.horizon, physics.step) != (windows.horizon, windows.step):
         message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
@@ -189,6 +190,8 @@ def fit(
         raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
     if physics.vessel is None and not method.meets_none:
         raise DataError(f"the method {kind_of(method)!r} needs a vessel: the physics has none")
+    if physics.observer is not None:
+        raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")
     if physics.vessel is not None:
         check_columns(physics.vessel, windows.columns, "the windows")
     name = "physics" if physics.vessel is not None else "none"
