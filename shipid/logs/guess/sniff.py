@@ -198,7 +198,7 @@ def _fault(values: Array) -> str:
     if not np.isfinite(values).all():
         return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
     row = int(np.argmax(np.diff(values) <= 0)) + 1
-    return f"{'is constant' if values[row] == values[row - 1] else 'goes back'} in row {row + 1}"
+    return f"{'repeats' if values[row] == values[row - 1] else 'goes back'} in row {row + 1}"
 
 
 def plain(name: str) -> str:
