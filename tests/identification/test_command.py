@@ -47,7 +47,7 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path) -> No
     assert found.parameters[ONE] == pytest.approx(0.8 * SHIP.parameters[ONE], rel=0.01)
     page = Page(Path("page.html").read_text())
     titles = " ".join(said for _, said in page.all("h3"))
-    for part in ("The estimates", "What moves with what", "Free runs", "Profile", "Candidates", "Standard manoeuvres"):
+    for part in ("The estimates", "Correlated estimates", "Free runs", "Profile", "Candidates", "Standard manoeuvres"):
         assert part in titles
     assert found.name == f"{SHIP.name}, identified"
 
