@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.method import Corrector
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
+from shipid.observer import Observer
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
@@ -34,7 +35,6 @@ class Predictor:
     limits : column -> (least, greatest) seen in training: the region where the method has evidence.
     commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
         in force in each step, `Instants.planned`, name -> (T, S).
-    path : where positions of the past come from: logged positions, or the integral of u, v, psi.
     """
 
     physics: Physics
@@ -43,7 +43,6 @@ class Predictor:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     commands: Commands = "held"
-    path: Literal["position", "velocity"] = "position"
 
     @property
     def vessel(self) -> Vessel | None:
@@ -101,7 +100,8 @@ class Predictor:
             "step": self.physics.step,
             "integrator": self.physics.integrator,
             "commands": self.commands,
-            "path": self.path,
+            "path": self.physics.path,
+            "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "provenance": dict(self.provenance),
             "method": self.method,
@@ -137,13 +137,14 @@ class Predictor:
                     int(header["horizon"]),
                     float(header["step"]),
                     header["integrator"],
+                    None if header["observer"] is None else Observer(**header["observer"]),
+                    header["path"],
                 ),
                 method=header["method"],
                 corrector=METHODS[header["method"]].corrector.from_arrays(header["corrector"], arrays),
                 limits={name: (low, high) for name, (low, high) in header["limits"].items()},
                 provenance=dict(header["provenance"]),
                 commands=header["commands"],
-                path=header["path"],
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None

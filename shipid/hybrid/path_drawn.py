@@ -41,7 +41,7 @@ class PathDrawn(Searched):
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
     averaged : the compensation is the mean of the networks of so many best trials.
-    memory : what the inputs hold of the past; `history_scale` and `error_scale` are the scales of these inputs.
+    memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history: each is
         tried in a third of the trials (without physics: no memory or history, a half each).
     """
@@ -52,6 +52,7 @@ class PathDrawn(Searched):
         "wind_scale",
         "history_scale",
         "error_scale",
+        "observer_scale",
         "offset",
         "ridge",
     )
@@ -70,6 +71,7 @@ class PathDrawn(Searched):
     memory: Memory = Memory()
     history_scale: Scale = (2.0, 32.0)
     error_scale: Scale = (2.0, 32.0)
+    observer_scale: Scale = (2.0, 32.0)
     choose: bool = False
 
     @property
@@ -81,6 +83,7 @@ class PathDrawn(Searched):
         """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""
         idle = set() if self.memory.history or self.memory.turned else {"history_scale"}
         idle |= set() if self.memory.error else {"error_scale"}
+        idle |= set() if self.memory.observer else {"observer_scale"}
         return {name: pair for name, pair in super().ranges().items() if name not in idle}
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:

@@ -165,6 +165,9 @@ class Family(BaseModel):
     seed: int = 0
     description: str | None = None
     perturb: list[Perturbation] = []
+    observer: dict[str, Any] | None = Field(
+        default=None, description="an observer filters the start and adds slow forces: an [observer] block"
+    )
     identify: dict[str, Any] | None = Field(
         default=None, description="numbers identified from the training runs of each batch: an [identify] block"
     )
@@ -229,7 +232,7 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         where = f"family.{list(by_name).index(family.name)}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
-        base, perturb, identify = family.base, family.perturb, family.identify
+        base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = choices(family.extends, by_name)
@@ -237,9 +240,11 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
             parent = written_out(by_name[family.extends], (*above, family.name))
             base, perturb = base or parent.base, [*parent.perturb, *perturb]
             identify = parent.identify if identify is None else identify
+            observer = parent.observer if observer is None else observer
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        return family.model_copy(update={"base": base, "perturb": perturb, "identify": identify, "extends": None})
+        changes = {"base": base, "perturb": perturb, "identify": identify, "observer": observer, "extends": None}
+        return family.model_copy(update=changes)
 
     return [written_out(family, ()) for family in families]
 

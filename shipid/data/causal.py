@@ -1,0 +1,69 @@
+"""Logs whose rows hold part of the future: values interpolated between fixes, replaced by what was known by then.
+
+A log that was brought to a regular clock by linear interpolation holds, in every row between two fixes, part of the
+next one. No column says so; but between fixes the second difference is zero, and it is not where a fix lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array, Dataset, stretches
+from shipid.errors import DataError, choices
+
+ROUNDING = 1e-7  # of a column's largest step: below it a second difference is zero
+
+
+def last_known(t: Array, values: Array) -> NDArray[np.intp]:
+    """For each row (N,) the latest row whose value depends on no fix after it; the first rows hold the first.
+
+    A bend at row i (slopes before and after differ) says that a fix lies within one step of row i. The line through row
+    j ends at the first fix after it, which has come by row i if a bend has been seen at a row between them: at j or
+    later, and before i. The row of a bend itself may be part of the next line, so the row before it counts. Where
+    a value holds still (equal to the one before), nothing new is known and it counts as known.
+    """
+    count = len(values)
+    slope = np.diff(values) / np.diff(t)
+    limit = ROUNDING * max(float(np.abs(slope).max(initial=0.0)), 1e-300)
+    bend = np.zeros(count, dtype=bool)
+    bend[1:-1] = np.abs(np.diff(slope)) > limit
+    known = np.zeros(count, dtype=np.intp)
+    latest = 0
+    for i in range(1, count):
+        still = abs(slope[i - 1]) <= limit
+        if i >= 2 and bend[i - 1]:  # seen with row i: a fix came between rows i - 2 and i
+            latest = max(latest, i - 2)
+        known[i] = i if still and known[i - 1] == i - 1 else latest
+        latest = max(latest, int(known[i]))
+    return known
+
+
+def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v"), *, extrapolate: bool = False) -> Dataset:
+    """Dataset whose `columns` hold in each row the last value that depends on no later fix.
+
+    extrapolate : go on from it along the slope between the last two known values, at most as long as they lie apart.
+    Raises DataError for a column that is not there.
+    """
+    frame = dataset.frame.copy()
+    for name in columns:
+        if name not in frame:
+            raise DataError(f"missing column: {choices(name, list(map(str, frame.columns)))}", path=name)
+        whole = frame[name].to_numpy(dtype=float).copy()
+        for _, rows in stretches(dataset):
+            t, values = frame["t"].to_numpy()[rows], whole[rows]
+            if len(rows) < 3:
+                continue
+            known = last_known(t, values)
+            held = values[known]
+            if extrapolate:
+                earlier = known[np.maximum(known - 1, 0)]
+                apart = np.maximum(t[known] - t[earlier], np.diff(t).min())
+                held = held + (held - values[earlier]) / apart * np.minimum(t - t[known], apart)
+            whole[rows] = held
+        frame[name] = whole
+    metadata = {**dataset.metadata, "causal": list(columns)}
+    return replace(dataset, frame=frame, metadata=metadata)

@@ -1,0 +1,557 @@
+"""Observer: a ship's motion without the waves', and what slowly pushes her, along a run and never looking ahead.
+
+A bank of extended Kalman filters on the vessel's equations of motion. The state x of each is
+
+    north, east, psi, u, v, r            low-frequency motion over ground [m, rad, m/s, rad/s],
+    a_u, a_v, a_r                        slow body-fixed disturbance M^-1 tau [m/s^2, rad/s^2],
+    current_north, current_east          current [m/s]; it sets towards north and east,
+    x_w, y_w, psi_w, u_w, v_w, r_w       wave-frequency motion in body axes [m, rad, m/s, rad/s],
+
+    nu' = f(nu - nu_c, commands, wind - current) + d(nu_c)/dt + a + white noise,   a' and current' white noise,
+    xi_w'' + 2 zeta omega xi_w' + omega^2 xi_w = white noise,   measured = low frequency + wave frequency + noise.
+
+Steady uniform current moves the water and everything in it, so the equations hold for nu - nu_c with any vessel, with
+or without a [current] block. Where an order changes the physics are least sure: the white noise of nu grows by the
+change of acceleration that they compute, and fades. Filters differ in the waves, the current and the model error that
+they assume; each weighs by the likelihood of its recent innovations. Sources: Fossen, Handbook of Marine Craft
+Hydrodynamics and Motion Control (2021), ch. 13 (wave model) and sec. 10.3 (current); Bar-Shalom, Li, Kirubarajan,
+Estimation with Applications to Tracking and Navigation (2001), ch. 11 (multiple models).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import product
+from typing import Annotated, Any, Literal
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, stretches
+from shipid.data.windows import Windows, cut_windows, to_frame
+from shipid.engine.casadi import summed_rates
+from shipid.engine.integrate import Method
+from shipid.engine.rollout import rollout
+from shipid.errors import DocumentError, ShipidError, choices
+from shipid.interrupts import uninterrupted
+from shipid.metrics import position_error
+from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.load import Vessel
+
+Array = np.ndarray
+
+Motion = Literal["north", "east", "psi", "u", "v", "r"]
+MEASURED: tuple[Motion, ...] = ("north", "east", "psi", "u", "v", "r")
+STATES = (*MEASURED, "a_u", "a_v", "a_r", "current_north", "current_east", "x_w", "y_w", "psi_w", "u_w", "v_w", "r_w")
+LOW = 11  # states before those of the waves
+NUMBERS = (
+    *("q_u", "q_v", "q_r", "force_u", "force_v", "force_r", "current", "jump", "settle", "memory"),
+    *("wave_u", "wave_v", "wave_r", "omega", "zeta"),
+)
+COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
+"""Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
+GRAVITY = 9.81  # m/s^2
+CALM = 1e-6  # m/s: keeps the direction of no wind defined
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class Observer(BaseModel):
+    """The `[observer]` block of a study. Without a unit: by the ship's size, in units of L, g, sqrt(g L), sqrt(L / g).
+
+    With L = 28.9 m these are 28.9 m, 9.81 m/s^2, 16.8 m/s, 1.72 s; for yaw g / L = 0.339 rad/s^2, sqrt(g / L) = 0.583
+    rad/s.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    measured: tuple[Motion, ...] = MEASURED
+    force: Annotated[NotNegative, Field(description="standard deviation of the slow force at first, x m g")] = 3e-3
+    moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
+    change: Annotated[
+        tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
+    ] = (2e-4,)
+    model_error: Annotated[
+        NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
+    ] = 10.0
+    jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
+    settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
+    current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
+    waves: Annotated[
+        tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
+    ] = (0.0, 2e-2)
+    period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
+    damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.2
+    noise: Annotated[
+        dict[str, Positive], Field(description="column -> standard deviation of a sample, SI; others by size")
+    ] = {}
+    memory: Annotated[Positive, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = 20.0
+    fade: Annotated[
+        NotNegative | None,
+        Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; none: never"),
+    ] = 12.0
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Numbers of every filter of one vessel in SI units.
+
+    numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
+    beside the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
+    """
+
+    vessel: Vessel
+    settings: Observer
+    numbers: Array
+    noise: Array
+    first: Array
+    fade: float
+    mass: Array
+
+    @cached_property
+    def model(self) -> Dynamics:
+        """Equations of the vessel."""
+        return dynamics(self.vessel)
+
+    @property
+    def num_filters(self) -> int:
+        """K."""
+        return len(self.numbers)
+
+
+def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
+    """Filters for a vessel of three degrees of freedom; DocumentError for another."""
+    settings, model = settings or Observer(), dynamics(vessel)
+    if model.num_dof != 3 or model.hidden:
+        message = f"{vessel.name} moves in {model.num_dof}: the observer takes 3, such as the model that she extends"
+        raise DocumentError(message, file=vessel.file, path="dof")
+    unknown = next((name for name in settings.noise if name not in MEASURED), None)
+    if unknown is not None:
+        raise DocumentError(f"no measured column: {choices(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
+    length = float(vessel.document["particulars"]["L_pp"])
+    time, speed, root = np.sqrt(length / GRAVITY), np.sqrt(GRAVITY * length), 1.0
+    linear, yaw = GRAVITY, GRAVITY / length
+    per_yaw = settings.moment / settings.force if settings.force else 3.0
+    currents = dict.fromkeys([0.0, settings.current])
+    omega = 2 * np.pi / (settings.period * time)
+    numbers, first = [], []
+    for change, current, wave in product(settings.change, currents, settings.waves):
+        a = change * linear * root, change * linear * root, change * per_yaw * yaw * root
+        w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
+        q = (settings.model_error * x for x in a)
+        numbers.append(
+            [
+                *(*q, *a, current / 300 * speed, settings.jump),
+                *(settings.settle * time, settings.memory * time, *w, omega, settings.damping),
+            ]
+        )
+        slow = [settings.force * linear, settings.force * linear, settings.moment * yaw]
+        first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
+    sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
+    noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
+    fade = np.inf if settings.fade is None else settings.fade * time
+    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), fade, _mass(vessel))
+
+
+def _mass(vessel: Vessel) -> Array:
+    """Inertia (3, 3) with added mass, from the equations: tau = mass @ acceleration."""
+    model, tau = dynamics(vessel), SX.sym("tau", 3)
+    zeros = [SX.zeros(len(names)) for names in (model.memory, model.commands, model.environment)]
+    rates = model.rates(SX.zeros(6), *zeros, SX(list(vessel.parameters.values())), tau)
+    return np.linalg.inv(np.array(ca.Function("inverse", [], [ca.jacobian(rates[3:6], tau)])()["o0"]))
+
+
+@lru_cache(maxsize=16)
+def filter_function(model: Dynamics) -> ca.Function:
+    """One filter's step as a pure SX function; the motion goes on by the midpoint rule.
+
+    (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
+    state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
+    remembered; see `unpacked`. commands and environment are those in force since the instant before; a measurement
+    (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction, before any update.
+    """
+    count, (num_memory, num_commands) = len(STATES), (len(model.memory), len(model.commands))
+    state = SX.sym("state", sum(sizes(model)))
+    x, packed, memory, unsettled, before, likelihood = ca.vertsplit(state, [0, *np.cumsum(sizes(model)).tolist()])
+    covariance = ca.reshape(packed, count, count)
+    commands, environment = SX.sym("commands", num_commands), SX.sym("environment", len(model.environment))
+    parameters, measured = SX.sym("parameters", len(model.parameters)), SX.sym("measured", 6)
+    noise, numbers, dt = SX.sym("noise", 6), SX.sym("numbers", len(NUMBERS)), SX.sym("dt")
+    number = dict(zip(NUMBERS, ca.vertsplit(numbers), strict=True))
+    assert memory.shape[0] == num_memory
+
+    def rates(low: SX, inner: SX, orders: SX) -> SX:
+        return _rates(model, low, inner, orders, environment, parameters)
+
+    def advance(inner: SX, step: Any) -> SX:
+        return model.advance(x[:6], inner, commands, environment, parameters, step)
+
+    middle = x[:LOW] + dt / 2 * rates(x[:LOW], memory, commands)
+    low = x[:LOW] + dt * rates(middle, advance(memory, dt / 2), commands)
+    reached = advance(memory, dt)
+    jump = ca.fabs(rates(x[:LOW], reached, commands) - rates(x[:LOW], memory, before))[3:6]
+    restless = unsettled * ca.exp(-dt / number["settle"]) + jump
+    wave, wave_noise = _waves(number, dt)
+    ahead = ca.vertcat(low, wave @ x[LOW:])
+    spread = ca.diagcat(_growth(number, x[2], restless, dt), wave_noise)
+    slope = ca.jacobian(ahead, x)
+    predicted = _symmetric(slope @ covariance @ slope.T + spread)
+    seen = SX.sym("seen", count)
+    output = _output(seen)
+    rows = ca.substitute(ca.jacobian(output, seen), seen, ahead)
+    output = ca.substitute(output, seen, ahead)
+    after, left, likelihood = ahead, predicted, likelihood * ca.exp(-dt / number["memory"])
+    innovations, spreads = [], []
+    for i in range(6):  # one at a time: independent noise, and no matrix to invert
+        given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
+        innovation = ca.if_else(given, measured[i], output[i]) - output[i]
+        innovations.append(innovation)
+        spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
+        column = left @ rows[i, :].T
+        variance = rows[i, :] @ column + noise[i] ** 2
+        surprise = innovation - rows[i, :] @ (after - ahead)
+        share = ca.if_else(given, 1 / variance, 0)
+        after, left = after + column * (share * surprise), _symmetric(left - column @ column.T * share)
+        likelihood -= ca.if_else(given, (surprise**2 / variance + ca.log(variance)) / 2, 0)
+    left = ca.reshape(ca.densify(left), -1, 1)
+    packed_after = ca.vertcat(after, left, reached, restless, commands, likelihood)
+    return ca.Function(
+        "observer_filter",
+        [state, commands, environment, parameters, measured, noise, numbers, dt],
+        [packed_after, after[:LOW], ca.vertcat(*innovations), ca.vertcat(*spreads)],
+        ["state", "commands", "environment", "parameters", "measured", "noise", "numbers", "dt"],
+        ["after", "estimate", "innovation", "spread"],
+        {"cse": True},
+    )
+
+
+@lru_cache(maxsize=16)
+def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
+    """The whole observer's step as a pure function, for K filters: what goes aboard.
+
+    (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
+    innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
+    """
+    one = filter_function(model)
+    inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
+    inputs[0] = ca.MX.sym("states", one.size1_in(0), num_filters)
+    inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
+    given = [part if i in (0, 6) else ca.repmat(part, 1, num_filters) for i, part in enumerate(inputs)]
+    after, estimate, innovation, spread = one.map(num_filters)(*given)
+    likelihood = after[-1, :]
+    weights = ca.exp(likelihood - ca.mmax(likelihood)).T
+    weights = weights / ca.sum1(weights)
+    results = [after, estimate @ weights, innovation @ weights, spread @ weights, weights]
+    names = [one.name_in(i) for i in range(one.n_in())]
+    return ca.Function("observer", inputs, results, names, ["after", "estimate", "innovation", "spread", "weights"])
+
+
+def _symmetric(matrix: SX) -> SX:
+    """The lower triangle on both sides: the other half is never computed."""
+    return ca.tril2symm(ca.tril(matrix))
+
+
+def sizes(model: Dynamics) -> tuple[int, ...]:
+    """Lengths of what a filter's state packs: x, P, memory, unsettled, commands before, log-likelihood."""
+    return len(STATES), len(STATES) ** 2, len(model.memory), 3, len(model.commands), 1
+
+
+def _rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: SX, parameters: SX) -> SX:
+    """d(low)/dt (11): the vessel's equations in water that moves with the current."""
+    psi, r, north, east = low[2], low[5], low[9], low[10]
+    c, s = ca.cos(psi), ca.sin(psi)
+    u_c, v_c = c * north + s * east, c * east - s * north
+    names = dict(zip(model.environment, ca.vertsplit(environment) if model.environment else [], strict=True))
+    if "V_w" in names:
+        ahead = names["V_w"] * ca.cos(names["beta_w"]) - north + CALM
+        across = names["V_w"] * ca.sin(names["beta_w"]) - east
+        names |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
+    names |= {name: SX(0) for name in ("V_c", "beta_c") if name in names}
+    through = ca.vertcat(low[:3], low[3] - u_c, low[4] - v_c, r)
+    still = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in model.drawn}
+    inputs = [through, memory, commands, ca.vertcat(SX(0, 1), *names.values()), parameters]
+    own = summed_rates(model, inputs, SX.zeros(3), still)
+    turning = ca.vertcat(r * v_c, -r * u_c, 0)
+    return ca.vertcat(c * low[3] - s * low[4], s * low[3] + c * low[4], r, own[3:6] + turning + low[6:9], SX.zeros(5))
+
+
+def _growth(number: Mapping[str, SX], psi: SX, restless: SX, dt: SX) -> SX:
+    """Covariance (11, 11) that white accelerations, changing forces and currents add in dt."""
+    turn = SX(3, 3)
+    turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1], turn[2, 2] = ca.cos(psi), -ca.sin(psi), ca.sin(psi), ca.cos(psi), 1
+    white = ca.vertcat(*(number[f"q_{name}"] for name in "uvr"))
+    power = ca.diag(white**2 + (number["jump"] * restless) ** 2)
+    force = ca.diag(ca.vertcat(*(number[f"force_{name}"] for name in "uvr")) ** 2)
+    cross = turn @ power * dt**2 / 2
+    moving = ca.blockcat([[turn @ power @ turn.T * dt**3 / 3, cross], [cross.T, power * dt]])
+    return ca.diagcat(moving, force * dt, SX.eye(2) * number["current"] ** 2 * dt)
+
+
+def _waves(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
+    """Exact transition (6, 6) of the three wave oscillators in dt, and the covariance that keeps them stationary."""
+    omega, zeta = number["omega"], number["zeta"]
+    damped = omega * ca.sqrt(1 - zeta**2)
+    decay, c, s = ca.exp(-zeta * omega * dt), ca.cos(damped * dt), ca.sin(damped * dt) / damped
+    block = SX(2, 2)
+    block[0, 0], block[0, 1] = decay * (c + zeta * omega * s), decay * s
+    block[1, 0], block[1, 1] = -decay * omega**2 * s, decay * (c - zeta * omega * s)
+    speeds = ca.vertcat(*(number[f"wave_{name}"] for name in "uvr")) ** 2
+    transition = ca.kron(block, SX.eye(3))
+    steady = ca.diag(ca.vertcat(speeds / omega**2, speeds))
+    return transition, steady - transition @ steady @ transition.T
+
+
+def _output(x: SX) -> SX:
+    """What is measured (6) of a state."""
+    c, s = ca.cos(x[2]), ca.sin(x[2])
+    return ca.vertcat(x[0] + c * x[11] - s * x[12], x[1] + s * x[11] + c * x[12], x[2] + x[13], x[3:6] + x[14:17])
+
+
+def begin(filters: Bank, measured: Array, commands: Array, memory: Array | None = None) -> Array:
+    """States (n, K) at the first instant: measured (6,), commands (nc,) and actuators' memory (nm,).
+
+    What is missing (NaN) is zero with a wide spread. Default memory: every actuator has reached its order.
+    """
+    model, wide = filters.model, np.array([1e3, 1e3, np.pi, 5.0, 1.0, 0.1])
+    missing = ~np.isfinite(measured) | ~np.isin(MEASURED, filters.settings.measured)
+    x = np.zeros(len(STATES))
+    x[:6] = np.where(missing, 0.0, measured)
+    if memory is None:
+        memory = np.asarray(commands)[[model.commands.index(name) for name in model.memory]]
+    columns = []
+    for first in filters.first:
+        deviations = first.copy()
+        motion = np.hypot(2 * filters.noise, first[LOW:])
+        deviations[:6] = np.where(missing, wide, motion)
+        columns.append(np.concatenate([x, np.diag(deviations**2).ravel(), memory, np.zeros(3), commands, [0.0]]))
+    return np.stack(columns, axis=1)
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What the observer knows at every row of a dataset, from that row and those before it alone.
+
+    columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS. `observer.test` is the normalised
+        innovation squared over the number of measurements: 1 in the mean where the assumptions hold.
+    innovation, spread : (N, 6), measured less predicted, and its variance; NaN in the first row of a stretch.
+    weights : (N, K) of the filters.
+    age : time [s] since the first row of the stretch, (N,): the observer needs some 20 sqrt(L / g) to settle.
+    """
+
+    columns: dict[str, Array]
+    innovation: Array
+    spread: Array
+    weights: Array
+    age: Array
+
+
+def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) -> Estimates:
+    """Run the observer along every unbroken stretch of a dataset, all of them together.
+
+    Wind that is not measured is zero. Raises DocumentError for a vessel that is not of three degrees of freedom,
+    ShipidError for a command that the dataset lacks.
+    """
+    filters, frame = bank(vessel, settings), dataset.frame
+    model = filters.model
+    missing = next((name for name in model.commands if name not in frame), None)
+    if missing is not None:
+        raise ShipidError(f"{vessel.name} takes {missing!r}: {choices(missing, dataset.commands)}")
+    places = [rows for _, rows in stretches(dataset)]
+    longest = max(map(len, places))
+    table = {name: frame[name].to_numpy(dtype=float) for name in map(str, frame) if name not in ("run", "flags")}
+    zero = np.zeros(len(frame))
+    commands = np.stack([table[name] for name in model.commands], axis=1)
+    weather = np.stack([table.get(name, zero) for name in model.environment] or [zero], axis=1)
+    weather = weather[:, : len(model.environment)]
+    measured = np.stack([table[name] for name in MEASURED], axis=1)
+    measured[:, [name not in filters.settings.measured for name in MEASURED]] = np.nan
+    noise = np.tile(filters.noise, (len(frame), 1))
+    for name, column in STANDARD_DEVIATIONS.items():
+        if column in table:
+            noise[:, MEASURED.index(name)] = np.hypot(noise[:, MEASURED.index(name)], table[column])
+    count = filters.num_filters
+    innovation, spread = np.full((len(frame), 6), np.nan), np.full((len(frame), 6), np.nan)
+    estimate, weights, age = np.zeros((len(frame), LOW)), np.full((len(frame), count), 1 / count), np.zeros(len(frame))
+    starts = np.array([rows[0] for rows in places])
+    states = np.concatenate([begin(filters, measured[row], commands[row]) for row in starts], axis=1)
+    estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
+    values = np.array(list(vessel.parameters.values()))[:, None]
+    step = observer_function(model, count)
+    order = sorted(range(len(places)), key=lambda i: -len(places[i]))  # those that end first last
+    states = np.concatenate([states[:, i * count : (i + 1) * count] for i in order], axis=1)
+    places = [places[i] for i in order]
+    for k in range(1, longest):
+        going = sum(len(rows) > k for rows in places)
+        now, past = (np.array([rows[i] for rows in places[:going]]) for i in (k, k - 1))
+        dt = (table["t"][now] - table["t"][past])[None]
+        inputs = states[:, : going * count], commands[past].T, weather[past].T, np.tile(values, (1, going))
+        given = measured[now].T, noise[now].T, np.tile(filters.numbers.T, (1, going)), dt
+        with uninterrupted():
+            results = [np.array(part) for part in _mapped(step, going)(*inputs, *given)]
+        states, estimate[now], weights[now] = results[0], results[1].T, results[4].T
+        innovation[now], spread[now] = np.where(np.isnan(measured[now]), np.nan, results[2].T), results[3].T
+        age[now] = age[past] + dt[0]
+    columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(COLUMNS)}
+    given = np.isfinite(innovation)
+    squares = np.where(given, innovation**2 / spread, 0.0).sum(axis=1)
+    columns["observer.test"] = squares / np.maximum(given.sum(axis=1), 1)
+    return Estimates(columns, innovation, spread, weights, age)
+
+
+@lru_cache(maxsize=64)
+def _mapped(step: ca.Function, count: int) -> ca.Function:
+    return step.map(count)
+
+
+def tau_extra(filters: Bank, columns: Mapping[str, Array], horizon: int, step: float) -> Array:
+    """Slow force (T, S, 3) [N, N m] over a horizon of T steps, fading from its estimate in `columns` (S,)."""
+    now = np.stack([columns[f"observer.{name}"] for name in "XYN"], axis=1) @ filters.mass.T
+    ages = (np.arange(horizon) + 0.5) * step
+    faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(horizon)
+    return np.asarray(faded[:, None, None] * now)
+
+
+def start(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Filtered state in place of the measured one: the columns given (S,), with north ... r replaced."""
+    return {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
+
+
+@dataclass(frozen=True)
+class ObservedStart:
+    """What the physics starts from with an observer, for S instants and T steps.
+
+    columns : (S,) the filtered state through the water, in place of the measured one.
+    environment : wind relative to the moving water, name -> (S,); the current itself is zero.
+    tau_extra : (T, S, 3) slow force [N, N m] over the horizon.
+    drift : (2, S) velocity of the water towards north and east [m/s], to be added to the path.
+    """
+
+    columns: dict[str, Array]
+    environment: dict[str, Array]
+    tau_extra: Array
+    drift: Array
+
+
+def observed_start(
+    filters: Bank,
+    columns: Mapping[str, Array],
+    horizon: int,
+    step: float,
+    path: Literal["position", "velocity"] = "position",
+) -> ObservedStart:
+    """The filtered state, the wind and the slow force that a rollout in moving water takes.
+
+    Parameters
+    ----------
+    columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
+    path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
+    """
+    model, zero = filters.model, np.zeros(len(columns["u"]))
+    begun = start(columns)
+    if path == "velocity":
+        begun |= {name: columns.get(name, zero) for name in ("north", "east")}
+    north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
+    begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)
+    begun["v"] = begun["v"] + north * np.sin(psi) - east * np.cos(psi)
+    environment = {name: columns.get(name, zero) for name in model.environment}
+    if "V_w" in environment:
+        V_w, beta_w = environment["V_w"], environment["beta_w"]
+        ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
+        environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
+    environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
+    return ObservedStart(begun, environment, tau_extra(filters, columns, horizon, step), np.stack([north, east]))
+
+
+def observed_paths(
+    filters: Bank,
+    columns: Mapping[str, Array],
+    horizon: int,
+    step: float,
+    method: Method = "euler",
+    *,
+    planned: Mapping[str, Array] | None = None,
+    memory: Mapping[str, Array] | None = None,
+    path: Literal["position", "velocity"] = "position",
+) -> tuple[Array, Array]:
+    """Paths (T, S, 2) [m] of the physics with the observer, in the frame (11), and which diverged (S,).
+
+    The vessel starts from the filtered state, in water that moves with the current, under the fading force.
+
+    Parameters
+    ----------
+    columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
+    planned : known commands, name -> (T, S); default: held.
+    path : as in `cut_windows`.
+    """
+    begun = observed_start(filters, columns, horizon, step, path)
+    result = rollout(
+        filters.vessel, begun.columns, {**columns, **(planned or {})}, begun.environment, step=step, num_steps=horizon,
+        method=method, memory=memory, tau_extra=begun.tau_extra, keep=("north", "east"),
+    )  # fmt: skip
+    ages, zero = step * np.arange(1, horizon + 1)[:, None], np.zeros(len(columns["u"]))
+    north, east = result["north"][1:, 0] + ages * begun.drift[0], result["east"][1:, 0] + ages * begun.drift[1]
+    x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
+    return np.stack([x, y], axis=-1), result.diverged[0]
+
+
+def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
+    """Columns of windows with the estimates of the last row at or before each instant: `observer.*` (S,) added."""
+    frame, found = dataset.frame, np.zeros(len(windows), dtype=np.intp)
+    t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
+    for run in windows.spans:
+        rows, chosen = np.flatnonzero(names == run), windows.run == run
+        slack = 1e-6 + 4 * float(np.spacing(np.abs(t[rows]).max()))
+        found[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + slack, side="right") - 1]
+    return {**windows.columns, **{name: values[found] for name, values in estimates.columns.items()}}
+
+
+def tune_observer(
+    vessel: Vessel,
+    dataset: Dataset,
+    settings: Observer | None = None,
+    *,
+    horizon: int,
+    step: float = 1.0,
+    method: Method = "euler",
+    interval: float = 5.0,
+    commands: Literal["held", "known"] = "held",
+    path: Literal["position", "velocity"] = "position",
+    runs: Sequence[str] | None = None,
+) -> tuple[Observer, dict[str, float]]:
+    """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.
+
+    In turn: whether there is a current, how fast the force changes, and how it fades. Returns the settings and the mean
+    error [m] of each that was tried, by what was changed. Windows that diverge count as twice the worst that does not.
+    """
+    best = settings or Observer()
+    windows = cut_windows(dataset, horizon=horizon, step=step, interval=interval, path=path)
+    if runs is not None:
+        windows = windows.select(np.isin(windows.run, list(runs)))
+    tried: dict[str, float] = {}
+
+    def fades(given: Observer, label: str) -> Observer:
+        estimates = observe(vessel, dataset, given)
+        columns = at_windows(dataset, estimates, windows)
+        found = {}
+        for fade in (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None):
+            one = given.model_copy(update={"fade": fade})
+            paths, diverged = observed_paths(
+                bank(vessel, one), columns, horizon, step, method, path=path,
+                planned=windows.planned if commands == "known" else None,
+            )  # fmt: skip
+            with np.errstate(invalid="ignore", over="ignore"):
+                errors = position_error(paths, windows.future).mean(axis=0)
+            worst = float(errors[~diverged].max(initial=0.0))
+            tried[f"{label}, fade {fade}"] = float(np.where(diverged, 2 * worst, errors).mean())
+            found[tried[f"{label}, fade {fade}"]] = one
+        return found[min(found)]
+
+    for name, values in (("current", (best.current, 0.0)), ("change", (best.change, *((c,) for c in best.change)))):
+        options = {f"{name} {value}": best.model_copy(update={name: value}) for value in dict.fromkeys(values)}
+        chosen = {label: fades(option, label) for label, option in options.items()}
+        least = min(chosen, key=lambda label: tried[f"{label}, fade {chosen[label].fade}"])
+        best = chosen[least]
+    return best, tried

@@ -1,0 +1,165 @@
+"""What the observer buys in seeded worlds with waves, wind and current; `python -m tests.benchmarks.observer`."""
+
+from __future__ import annotations
+
+import time
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Windows, cut_windows
+from shipid.engine.rollout import rollout
+from shipid.metrics import position_error
+from shipid.observer import MEASURED, Observer, at_windows, bank, observe, observed_paths
+from shipid.simulation.excitation import aprbs
+from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.truth import logged
+from shipid.units import DEGREE, RPM
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import Family, members, resolve, uniform
+
+Array = np.ndarray
+STEP, ROW, HORIZON, SETTLED = 0.05, 1.0, 30, 60.0
+SMOOTH = 11  # s: zero-phase Hann low pass, which takes out the waves; for the floor alone, because it looks ahead
+
+
+@dataclass(frozen=True)
+class World:
+    """Runs and the current in them: north and east [m/s] by run name."""
+
+    data: Dataset
+    current: dict[str, tuple[float, float]]
+
+
+def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, current: bool, changing: bool) -> World:
+    """Runs of a vessel, everything drawn by hash(seed, run, quantity): orders, weather, sea, current, start."""
+    truth = load_vessel(vessel).with_values({"current.kind": "uniform"})
+    model, count = dynamics(truth), round(duration / STEP)
+    length = float(truth.document["particulars"]["L_pp"])
+    pace = float(min(length / 28.9, 1.0) ** 0.5)  # speeds and times of a model, by Froude
+
+    def draw(name: str, low: float, high: float) -> Array:
+        return np.array([low + (high - low) * uniform(seed, "observer", run, name) for run in range(runs)])
+
+    def order(name: str, low: float, high: float) -> Array:
+        if not changing:
+            return np.tile(draw(name, low, high), (count, 1))
+        t = STEP * np.arange(count)
+        hold = 25.0 * pace, 70.0 * pace
+        series = [aprbs(t, hold=hold, levels=(low, high), key=(seed, run, name)) for run in range(runs)]
+        every = round(ROW / STEP)  # orders change in logged rows
+        return np.repeat(np.stack(series, axis=1)[::every], every, axis=0)[:count]
+
+    fast = pace if pace == 1.0 else 1 / pace
+    orders = {"n": order("n", 50 * RPM * fast, 200 * RPM * fast), "alpha": order("alpha", -50 * DEGREE, 50 * DEGREE)}
+    orders["delta"] = 0.6 * orders["alpha"]
+    commands = {name: orders[name.rpartition(".")[2]] for name in model.commands}
+    speed, towards = draw("V_c", 0.2 * pace, 0.7 * pace) * current, draw("beta_c", 0.0, 2 * np.pi)
+    weather = {"V_w": draw("V_w", 0.0, 6.0 * pace), "beta_w": draw("beta_w", 0.0, 2 * np.pi)}
+    weather |= {"V_c": speed, "beta_c": towards}
+    environment = {name: weather[name] for name in model.environment}
+    start = {name: np.zeros(runs) for name in model.state}
+    start |= {"psi": draw("psi", 0.0, 2 * np.pi), "u": draw("u", 0.5 * pace, 2.5 * pace)}
+    sea = None
+    if waves:
+        names = [(seed, "sea", run) for run in range(runs)]
+        sea = wave_loads(truth, draw_components(Sea(H_s=1.0, T_p=5.0), draw("chi", 0.0, 2 * np.pi), names))
+    every = round(ROW / STEP)
+    path = rollout(
+        truth, start, commands, environment, step=STEP, num_steps=count, every=every, method="rk4", components=sea,
+        keep=model.state,
+    )  # fmt: skip
+    assert not path.diverged.any()
+    log = logged(path, path.names)
+    rows = len(log["u"])
+    held = np.minimum(np.arange(rows) * every, count - 1)
+    columns = {name: log[name] for name in MEASURED} | {name: values[held] for name, values in commands.items()}
+    columns |= {name: np.tile(environment[name], (rows, 1)) for name in ("V_w", "beta_w") if name in environment}
+    names = [f"M{run:03d}" for run in range(runs)]
+    frame = pd.DataFrame({"run": np.repeat(names, rows), "t": np.tile(ROW * np.arange(rows), runs)})
+    frame = frame.assign(**{name: values.T.ravel() for name, values in columns.items()}, flags=0)
+    north, east = speed * np.cos(towards), speed * np.sin(towards)
+    return World(
+        Dataset(frame, {"clock": "run", "flags": []}), dict(zip(names, zip(north, east, strict=True), strict=True))
+    )
+
+
+def physics(names: tuple[str, ...]) -> dict[str, Vessel]:
+    """Nominal model and perturbed variants of it, by name."""
+    blocks = tomllib.loads((Path(__file__).parents[2] / "studies" / "simulation.toml").read_text())["family"]
+    base = load_vessel("gunnerus-28.9")
+    families = resolve([Family(**block) for block in blocks if "base" in block or "extends" in block])
+    variants = [one for family in families for one in members(family, base)]
+    return {one.name: base.with_values(one.values) for one in variants if one.name in names}
+
+
+def smoothed(data: Dataset) -> Dataset:
+    """The same runs without motion at wave frequency; it looks ahead."""
+    frame, weight = data.frame.copy(), np.hanning(SMOOTH + 2)[1:-1]
+    half, weight = SMOOTH // 2, weight / weight.sum()
+    for rows in data.frame.groupby("run", sort=False).indices.values():
+        for name in MEASURED:
+            x = frame[name].to_numpy()[rows]
+            padded = np.concatenate([2 * x[0] - x[half:0:-1], x, 2 * x[-1] - x[-2 : -half - 2 : -1]])
+            frame.loc[frame.index[rows], name] = np.convolve(padded, weight, "valid")
+    return Dataset(frame, data.metadata)
+
+
+def errors(vessel: Vessel, made: World, settings: Observer | None = None, known: bool = True) -> dict[str, float]:
+    """Mean error [m] over 30 s of windows after the first 60 s: physics alone, with the observer, and the floor.
+
+    The floor is the same physics from the low-passed start with the true current.
+    """
+    whole = cut_windows(made.data, horizon=HORIZON, interval=5.0)
+    late = whole.t >= SETTLED
+    windows = whole.select(late)
+    planned = windows.planned if known else None
+
+    def mean(paths: Array, which: Windows = windows) -> float:
+        return float(position_error(paths, which.future).mean())
+
+    filters, zero = bank(vessel, settings), np.zeros(len(windows))
+    unseen = {f"observer.{name}": zero for name in (*"XYN", "current_north", "current_east")}
+    plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED}}
+    alone = mean(observed_paths(filters, plain, HORIZON, ROW, planned=planned)[0])
+    columns = at_windows(made.data, observe(vessel, made.data, settings), windows)
+    seen = mean(observed_paths(filters, columns, HORIZON, ROW, planned=planned)[0])
+    low = cut_windows(smoothed(made.data), horizon=HORIZON, interval=5.0).select(late).columns
+    current = np.array([made.current[str(run)] for run in windows.run]).T
+    ideal = {**windows.columns, **{f"observer.{name}": low[name] for name in MEASURED}}
+    ideal |= {f"observer.{name}": np.zeros(len(windows)) for name in "XYN"}
+    ideal |= {"observer.current_north": current[0], "observer.current_east": current[1]}
+    floor = mean(observed_paths(filters, ideal, HORIZON, ROW, planned=planned)[0])
+    return {"alone": alone, "observer": seen, "floor": floor}
+
+
+def run() -> dict[str, float]:
+    """Figures of one vessel in three worlds; printed as a table by `python -m tests.benchmarks.observer`."""
+    vessels = physics(("nominal", "moderate-3", "moderate-10", "high-3", "high-4"))
+    how = {
+        "waves, current, changing": {"runs": 16, "duration": 210.0, "waves": True, "current": True, "changing": True},
+        "waves, constant orders": {"runs": 16, "duration": 210.0, "waves": True, "current": False, "changing": False},
+        "calm": {"runs": 16, "duration": 210.0, "waves": False, "current": False, "changing": True},
+    }
+    figures: dict[str, float] = {}
+    for label, given in how.items():
+        made = world("gunnerus-28.9-6dof", 11, **given)  # type: ignore[arg-type]
+        for name, vessel in vessels.items():
+            for known in (True, False):
+                found = errors(vessel, made, known=known)
+                text = f"{label}, {name}, {'known' if known else 'held'}"
+                figures |= {f"{text}: {key} [m]": round(value, 2) for key, value in found.items()}
+        begun = time.perf_counter()
+        observe(vessels["nominal"], made.data)
+        figures[f"{label}: update [ms]"] = round(1e3 * (time.perf_counter() - begun) / len(made.data.frame), 2)
+    return figures
+
+
+if __name__ == "__main__":
+    for label, figure in run().items():
+        print(f"{label:70s} {figure:g}")
