@@ -20,9 +20,9 @@ BLOCK = 256  # steps of one call of the function of `memory_along`: made once, w
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
     """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
     for term in model.sums:
-        own = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
-        columns = [ca.repmat(one, 1, own.shape[1]) for one in inputs]
-        tau = tau + ca.sum2(term.function.map(own.shape[1])(*columns, own))
+        entries = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
+        columns = [ca.repmat(one, 1, entries.shape[1]) for one in inputs]
+        tau = tau + ca.sum2(term.function.map(entries.shape[1])(*columns, entries))
     return model.rates(*inputs, tau)
 
 
@@ -95,8 +95,8 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
     records, worst = [], []
     for values in batch.parameters:
         with uninterrupted():
-            found = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
-        path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
+            result = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
+        path = result.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, list(job.rows)])
         worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so

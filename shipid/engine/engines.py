@@ -107,7 +107,7 @@ def named(name: str, device: str) -> Engine | None:
         raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
     engine = ENGINES[name]
     if device != "cpu" and not engine.any_device:
-        others = " or ".join(repr(other) for other, found in ENGINES.items() if found.any_device)
+        others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)
         raise ShipidError(f"engine {name!r} runs on the CPU: use {others} on {device!r}")
     return engine
 
@@ -123,9 +123,9 @@ def chosen(batch: Batch, job: Job) -> Engine:
 def differentiable(name: str, device: str) -> Engine:
     """The engine of a name that has gradients; for `auto` the first that does; ShipidError if it has none."""
     engine = named(name, device)
-    able = {key: found for key, found in ENGINES.items() if found.gradient is not None}
+    able = {key: entry for key, entry in ENGINES.items() if entry.gradient is not None}
     if engine is None:
-        fit = (found for found in able.values() if found.available() and (device == "cpu" or found.any_device))
+        fit = (entry for entry in able.values() if entry.available() and (device == "cpu" or entry.any_device))
         return next(fit)
     if engine.gradient is None:
         raise ShipidError(f"engine {name!r} has no gradient: use {' or '.join(map(repr, able))}")

@@ -89,15 +89,15 @@ def rollout_gradient(
     job = Job(step, num_steps, method, 1, places(keep, channels(model), vessel), device)
     with np.errstate(all="ignore"):
         assert way.gradient is not None
-        found = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
+        adjoint = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
     return Gradient(
-        loss=found.loss,
-        parameters=found.parameters.T,
+        loss=adjoint.loss,
+        parameters=adjoint.parameters.T,
         names=tuple(names),
-        tau_extra=found.tau_extra.transpose(0, 2, 1),
-        start=dict(zip((*model.state, *model.hidden), found.state, strict=True)),
-        path=found.path,
-        diverged=(~(found.worst <= SPEED_LIMIT) | ~finite(batch))[0],
+        tau_extra=adjoint.tau_extra.transpose(0, 2, 1),
+        start=dict(zip((*model.state, *model.hidden), adjoint.state, strict=True)),
+        path=adjoint.path,
+        diverged=(~(adjoint.worst <= SPEED_LIMIT) | ~finite(batch))[0],
     )
 
 

@@ -49,9 +49,9 @@ class Job:
 
 def cores() -> int:
     """Cores that this process may use: those it has, no more than `OMP_NUM_THREADS` says."""
-    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     limit = os.environ.get("OMP_NUM_THREADS", "")
-    return min(found, int(limit)) if limit.isdecimal() and int(limit) > 0 else found
+    return min(count, int(limit)) if limit.isdecimal() and int(limit) > 0 else count
 
 
 def integrate(

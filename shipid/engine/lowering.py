@@ -103,8 +103,8 @@ class Lowered:
         """Output channels for all inputs in the function's order: every stage, then main."""
         saved: list[Any] = []
         for number, stage in enumerate((*self.early, self.main)):
-            own = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
-            saved.append(stage(*own, *saved))
+            arguments = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
+            saved.append(stage(*arguments, *saved))
         return list(saved[-1])
 
 

@@ -101,11 +101,11 @@ def compiler() -> str | None:
     """The C compiler, if there is one that makes a library."""
     trial = "#include <math.h>\ndouble probe(double x) { return sin(x); }"
     for name in ("gcc", "cc", "clang"):
-        found = shutil.which(name)
-        if found is not None:
+        command = shutil.which(name)
+        if command is not None:
             with tempfile.TemporaryDirectory() as folder:
-                if _compile(found, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
-                    return found
+                if _compile(command, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
+                    return command
     return None
 
 
@@ -122,31 +122,31 @@ def _processor() -> frozenset[str]:
 @cache
 def target() -> Target:
     """Widest vectors of this processor; vector functions of glibc where they link, else one lane at a time."""
-    found, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
+    command, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
     if x86 and "avx512f" in _processor():
         best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
     elif x86 and {"avx2", "fma"} <= _processor():
         best = Target(4, ("-march=native",), "_ZGVdN4")
     else:
         best = Target(2, (), "")
-    if found is None or not best.prefix:
+    if command is None or not best.prefix:
         return best
     probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
     with tempfile.TemporaryDirectory() as folder:
         linked = _compile(
-            found, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
+            command, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
         )
     return best if linked is None else Target(best.lanes, best.flags, "")
 
 
-def _compile(found: str, source: str, library: Path, wanted: Target) -> str | None:
+def _compile(command: str, source: str, library: Path, wanted: Target) -> str | None:
     """Compile C into a shared library, whole or not at all; what the compiler says if it fails."""
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
         text.write_text(source, encoding="utf-8")
         mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-        command = [found, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
-        result = subprocess.run(command, capture_output=True, text=True)
+        arguments = [command, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
+        result = subprocess.run(arguments, capture_output=True, text=True)
         if result.returncode:
             return result.stderr.strip() or "it gave no reason"
         os.replace(fresh, library)
@@ -154,9 +154,9 @@ def _compile(found: str, source: str, library: Path, wanted: Target) -> str | No
 
 
 @cache
-def _version(found: str) -> str:
+def _version(command: str) -> str:
     """What a compiler calls itself."""
-    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout
+    return subprocess.run([command, "--version"], capture_output=True, text=True).stdout
 
 
 def _vector_functions(wanted: Target) -> str:
@@ -204,9 +204,9 @@ class _Source(Parts):
 
     def __init__(self, model: Dynamics, step: float, method: Method) -> None:
         self.model, self.step, self.method = model, step, method
-        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+        self.equations = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
-        self.all = [*self.own, *self.sums]
+        self.all = [*self.equations, *self.sums]
 
     def sum(self, i: int) -> str:
         """The loop over components of one sum."""
@@ -228,7 +228,7 @@ class _Source(Parts):
 
     def functions(self) -> str:
         """Stages, rates and advance."""
-        rates, advance = self.own
+        rates, advance = self.equations
         n = self.model.num_dof
         ends = [f"out[{i}] = {text};" for i, text in enumerate(rates.outputs)]
         lags = [f"out[{i}] = {text};" for i, text in enumerate(advance.outputs)]
@@ -258,7 +258,7 @@ const V dt[1] = {{ K(step) }};
 
         def rates(state: str, memory: str) -> str:
             out = name(num_states)
-            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, own, counts, {out});")
+            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, components, counts, {out});")
             return out
 
         def advance(memory: str, dt: float) -> str:
@@ -283,7 +283,7 @@ const V dt[1] = {{ K(step) }};
         nc, ne, parameters = len(model.commands), len(model.environment), len(model.parameters)
         widths = [sum(term.widths.values()) for term in model.drawn]
         block = 1 if widths else BLOCK
-        drawn = " ".join(f"own[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
+        drawn = " ".join(f"components[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
         return f"""{head(wanted)}
 {self.functions()}
 {_MEASURE}
@@ -313,7 +313,7 @@ for (long front = first; front < last; front += {block}) {{
   }}
   for (long k = 0; k < steps; ++k) EACH_GROUP(end) {{
     V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
-    const U *own[{max(1, len(widths))}];
+    const U *components[{max(1, len(widths))}];
     {drawn}
     if (k == 0 || k < lengths[2])
       for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, k * {n} + i);
@@ -352,9 +352,9 @@ def _folder(wanted: str) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        own = tempfile.TemporaryDirectory(prefix="shipid-")
-        atexit.register(own.cleanup)
-        return Path(own.name)
+        temporary = tempfile.TemporaryDirectory(prefix="shipid-")
+        atexit.register(temporary.cleanup)
+        return Path(temporary.name)
 
 
 @lru_cache(maxsize=64)
@@ -375,15 +375,15 @@ def compiled_for(source: Callable[[], str]) -> Any:
 
 def compiled(source: str) -> Any:
     """The `run` of C source, compiled or from the cache; ShipidError if the compiler fails. There must be one."""
-    found = compiler()
-    assert found is not None
-    words = "\n".join([source, *OPTIONS, found, _version(found), platform.machine(), *sorted(_processor())])
+    command = compiler()
+    assert command is not None
+    words = "\n".join([source, *OPTIONS, command, _version(command), platform.machine(), *sorted(_processor())])
     folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
     library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
     try:
         return _loaded(library)
     except OSError:  # not there, or not whole
-        failure = _compile(found, source, library, target())
+        failure = _compile(command, source, library, target())
     if failure is not None:
         raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]})")
     return _loaded(library)

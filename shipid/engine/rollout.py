@@ -138,15 +138,15 @@ def distances(
         total, counts, worst = way.measure(model, batch, job, goal.transpose(0, 2, 1))
         return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~finite(batch))
     few = max(1, PATHS_KEPT // goal.size)
-    found = []
+    parts = []
     for first in range(0, len(batch.parameters), few):
         part = replace(batch, parameters=batch.parameters[first : first + few])
         with np.errstate(all="ignore"):
             records, worst = way.run(model, part, job)
             apart = [position_error(records[1:, v], goal) for v in range(records.shape[1])]
         diverged = ~(worst <= SPEED_LIMIT) | ~finite(part)
-        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), diverged))
-    return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        parts.append((np.array([errors.sum(axis=0) for errors in apart]), np.array(list(map(tally, apart))), diverged))
+    return Distances(*(np.concatenate(parts) for parts in zip(*parts, strict=True)))
 
 
 def prepared(
@@ -249,12 +249,12 @@ def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -
     result = []
     for term in model.drawn:
         entries = sum(term.widths.values())
-        found = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
-        if found.ndim != 3 or found.shape[::2] != (num_samples, entries):
+        values = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
+        if values.ndim != 3 or values.shape[::2] != (num_samples, entries):
             raise ShipidError(
-                f"components of {term.path} must be ({num_samples}, count, {entries}), found {found.shape}"
+                f"components of {term.path} must be ({num_samples}, count, {entries}), found {values.shape}"
             )
-        result.append(np.ascontiguousarray(found.transpose(2, 0, 1)))
+        result.append(np.ascontiguousarray(values.transpose(2, 0, 1)))
     return tuple(result)
 
 

@@ -193,15 +193,15 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
                 target = records[:, :, group, block]
                 target[0] = both[rows]
                 greatest = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
-                own = [part[:, :, block].contiguous() for part in drawn]
+                drawn_here = [part[:, :, block].contiguous() for part in drawn]
                 known = saved if varying else program.held_stage(commands[0], environment[0], saved)
                 advance = _whole(program)
                 for k in range(num_steps):
                     if varying:
                         known = [_at(commands, k), _at(environment, k), *saved]
-                    inputs = [x, m, greatest, _at(tau, k), *own, *known]
+                    inputs = [x, m, greatest, _at(tau, k), *drawn_here, *known]
                     if compiled and k == 0:
-                        advance = _runner(program, job.method, inputs, len(own))
+                        advance = _runner(program, job.method, inputs, len(drawn_here))
                     x, m, greatest, record = advance(*inputs)
                     if (k + 1) % every == 0:
                         target[(k + 1) // every] = record
@@ -231,15 +231,15 @@ def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, .
         x, m, worst, record = _whole(program)(x, m, worst.detach(), force[k], *known)
         records.append(record)
     path = torch.stack(records)[:, :, 0].transpose(1, 2)  # (T + 1, S, C)
-    found = path.detach().cpu().numpy()
-    losses, slopes = checked_loss(loss, found)
+    numbers = path.detach().cpu().numpy()
+    losses, slopes = checked_loss(loss, numbers)
     inputs = [start, values, force]
     gradients = torch.autograd.grad(path, inputs, torch.tensor(slopes, device=place), allow_unused=True)
     state, parameters, tau = (
         (torch.zeros_like(one) if gradient is None else gradient).squeeze(-2).cpu().numpy()
         for one, gradient in zip(inputs, gradients, strict=True)
     )
-    return Adjoint(losses, found, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
+    return Adjoint(losses, numbers, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
 
 
 def _at(series: torch.Tensor, k: int) -> torch.Tensor:

@@ -112,20 +112,20 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden(terms)
     ordered = _orders_taken(terms)
-    state, state_of = _symbols("state", [*names, *(name for own in hidden.values() for name in own)])
-    commands, told = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
+    state, state_of = _symbols("state", [*names, *(name for entries in hidden.values() for name in entries)])
+    commands, input_of = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
     environment, weather = _symbols("environment", _environment(vessel))
     parameters, value_of = _symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     bound = bindings(vessel.document)
 
     helm: dict[str, SX] = {name: SX.sym(name) for name in (helmsman.memory if helmsman else ())}
-    orders, helm_after = dict(told), list(helm.values())
+    orders, helm_after = dict(input_of), list(helm.values())
     if helmsman:
         seen = {name: state_of[name] for name in names}
-        orders = _ordered(helmsman, ordered, helmsman.orders(seen, told, helm), vessel)
+        orders = _ordered(helmsman, ordered, helmsman.orders(seen, input_of, helm), vessel)
         if helmsman.advance:
-            after = helmsman.advance(seen, told, helm, dt)
+            after = helmsman.advance(seen, input_of, helm, dt)
             helm_after = [after[name] for name in helm]
     lags, actual, lags_after = _actuators(terms, bound, orders, value_of, dt)
     memory = {**{f"{HELM}.{name}": symbol for name, symbol in helm.items()}, **lags}
@@ -137,7 +137,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     if "current" in vessel.document:
         nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"])
     nu_r = nu - nu_c
-    own = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
+    states_of = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
     available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
@@ -146,13 +146,13 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     force = _added_mass_force(M_A, nu_r, nu_c_dot, kept) - coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
-    summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
+    summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
-        _rates(TERMS[key], {**available, "state": own[path]}, _values(bound[path], value_of))
+        _rates(TERMS[key], {**available, "state": states_of[path]}, _values(bound[path], value_of))
         for path, key, _ in terms
-        if path in own
+        if path in states_of
     ]
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
 
@@ -171,7 +171,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         state=names,
         hidden=tuple(name for entries in hidden.values() for name in entries),
         memory={**dict.fromkeys(memory, "-"), **units(lags)},
-        commands=tuple(told),
+        commands=tuple(input_of),
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
         ordered=ordered,
@@ -197,8 +197,8 @@ def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX, kept: tuple[int, ...]) ->
     """
     heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
     plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
-    own = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
-    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - own @ coriolis(plane @ M_A @ plane, plane @ nu_r)
+    turning = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
+    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - turning @ coriolis(plane @ M_A @ plane, plane @ nu_r)
 
 
 def _upright(eta: SX, nu: SX, m: SX) -> SX:
@@ -221,8 +221,8 @@ def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, li
 def _rates(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
     """Rates of a term's own states."""
     assert term.rates is not None
-    own = {parameter.name for parameter in declared(term.rates)}
-    kept = {keyword: value for keyword, value in keywords.items() if keyword in own}
+    taken = {parameter.name for parameter in declared(term.rates)}
+    kept = {keyword: value for keyword, value in keywords.items() if keyword in taken}
     return SX(term.rates(*(available[name] for name in signals(term.rates)), **kept))
 
 
@@ -241,7 +241,7 @@ def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any
 def _sum_of_terms(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
-    own_states: Mapping[str, SX],
+    states_of: Mapping[str, SX],
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
 ) -> tuple[SX, list[tuple[str, SX, SX, dict[str, int], np.ndarray | None]]]:
@@ -250,10 +250,10 @@ def _sum_of_terms(
     given = _given(terms, available, bound, value_of)
     for path, key, block in terms:
         term = TERMS[key]
-        own = _own_commands(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
-        if path in own_states:
-            own["state"] = own_states[path]
-        wrench = partial(_wrench, term, {**available, **own}, _values(bound[path], value_of))
+        extra = _commands_of(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
+        if path in states_of:
+            extra["state"] = states_of[path]
+        wrench = partial(_wrench, term, {**available, **extra}, _values(bound[path], value_of))
         widths, arrays = _components(term, block)
         if arrays is not None and len(arrays) <= UNROLL_UP_TO:
             for row in arrays:
@@ -265,7 +265,7 @@ def _sum_of_terms(
     return total, mapped
 
 
-def _own_commands(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
+def _commands_of(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
     """Commands of one component by signal: what its actuators have reached."""
     component = path.rsplit(".", 1)[-1]
     return {name: available[f"{component}.{name}"] for name in named("command") if f"{component}.{name}" in available}
@@ -278,14 +278,14 @@ def _given(
     value_of: Mapping[str, SX],
 ) -> dict[str, SX]:
     """Signals that components give to those behind them: `propeller.wash`."""
-    found = {}
+    result = {}
     for path, key, _ in terms:
         for name, function in TERMS[key].gives.items():
-            here = {**available, **_own_commands(path, available)}
+            here = {**available, **_commands_of(path, available)}
             taken = {parameter.name for parameter in declared(function)}
-            own = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
-            found[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **own)
-    return found
+            kept = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
+            result[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **kept)
+    return result
 
 
 def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
@@ -307,8 +307,8 @@ def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]
     here = {**available, **entries}
     only = {parameter.name for parameter in declared(term.rates)} if term.rates else set()
     only -= {parameter.name for parameter in declared(term.function)}
-    own = {keyword: value for keyword, value in keywords.items() if keyword not in only}
-    return term.function(*(here[name] for name in signals(term.function)), **own)
+    kept = {keyword: value for keyword, value in keywords.items() if keyword not in only}
+    return term.function(*(here[name] for name in signals(term.function)), **kept)
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:

@@ -124,11 +124,11 @@ def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
 
 def _with_tables(document: Document, file: Path) -> Document:
     """Named tables as columns: what a document says does not change with a file that it names."""
-    found = {}
+    tables = {}
     for path, key, block in (*term_blocks(document), *term_blocks(document, off=True)):
         if key in TERMS and isinstance(block.get(TABLE), str):
-            found[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
-    return documents.replace(document, found) if found else dict(document)
+            tables[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
+    return documents.replace(document, tables) if tables else dict(document)
 
 
 def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
@@ -155,12 +155,12 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
 def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
     """File of the vessel that a document stands on."""
     try:
-        found = documents.find(str(name), "models", file.parent)
+        other = documents.find(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-    if found.resolve() in (*above, file.resolve()):
+    if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} stands on this very document: name a vessel that does not", file=file, path=path)
-    return found
+    return other
 
 
 class Patch(BaseModel):
@@ -273,8 +273,8 @@ def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
     lists = {key: value for key, value in block.items() if isinstance(value, list)}
     if len({len(value) for value in lists.values()}) > 1:
-        found = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
-        raise DocumentError(f"the columns of a table must be equally long, found {found}", file=file, path=path)
+        counts = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
+        raise DocumentError(f"the columns of a table must be equally long, found {counts}", file=file, path=path)
 
 
 def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tuple[str, ...], file: str) -> None:
@@ -312,8 +312,8 @@ def _check_inertia(vessel: Vessel) -> None:
         for block in ("inertia", "added_mass")
     }
     M = rigid_body(**known["inertia"]) + added_mass(**known["added_mass"])
-    own = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
-    if np.linalg.eigvalsh(own + own.T)[0] <= 0:
+    mass = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
+    if np.linalg.eigvalsh(mass + mass.T)[0] <= 0:
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )

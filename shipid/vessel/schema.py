@@ -46,7 +46,7 @@ class Parameter:
 def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     """Parameters of a physics function, in order, from its keyword-only arguments and `**` table."""
     hints = get_type_hints(function, include_extras=True)
-    found = []
+    result = []
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
             continue
@@ -61,17 +61,17 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
         elif isinstance(unit, Grammar):
             kind = "table"
         default = None if argument.default is argument.empty else float(argument.default)
-        found.append(Parameter(name, unit, kind, POSITIVE in marks, default))
-    return tuple(found)
+        result.append(Parameter(name, unit, kind, POSITIVE in marks, default))
+    return tuple(result)
 
 
 @cache
 def term_parameters(term: Term) -> tuple[Parameter, ...]:
     """Parameters of a term: of its function, then those that only its rates take."""
-    own = parameters(term.function)
-    names = {parameter.name for parameter in own}
+    declared = parameters(term.function)
+    names = {parameter.name for parameter in declared}
     more = parameters(term.rates) if term.rates else ()
-    return own + tuple(parameter for parameter in more if parameter.name not in names)
+    return declared + tuple(parameter for parameter in more if parameter.name not in names)
 
 
 @cache

@@ -212,14 +212,14 @@ def wind(given: Particulars) -> Values:
     """Blendermann's coefficients of the type of ship; areas guessed where not given."""
     B, L_oa = given.beam, 1.05 * given.length
     names = ("C_Dt", "C_Dl_bow", "C_Dl_stern", "delta", "kappa")
-    found = {
+    coefficients = {
         name: Value(number, "-", f"Blendermann (1994), {given.ship_type}")
         for name, number in zip(names, WIND[given.ship_type], strict=True)
     }
     frontal, lateral = given.frontal_area, given.lateral_area
     A_F = Value(0.8 * B**2, "m^2", "0.8 B^2: a guess") if frontal is None else Value(frontal, "m^2", "given")
     A_L = Value(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess") if lateral is None else Value(lateral, "m^2", "given")
-    return found | {
+    return coefficients | {
         "A_FW": A_F,
         "A_LW": A_L,
         "L_oa": Value(L_oa, "m", "1.05 L: a guess"),
@@ -288,7 +288,7 @@ def rudder(given: Particulars) -> Values:
 def azimuth(given: Particulars, side: int) -> Values:
     """One of two azimuth units at the stern; side -1 is port."""
     unit = get(read(bundled("models")["gunnerus-28.9"]), "thruster.port")
-    own = {
+    placed = {
         "x": Value(-0.46 * given.length, "m", "-0.46 L: a guess"),
         "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess"),
         "z": Value(0.75 * given.draught, "m", "0.75 T: a guess"),
@@ -296,12 +296,12 @@ def azimuth(given: Particulars, side: int) -> Values:
     }
     copied: Values = {}
     for name, number in unit.items():
-        if isinstance(number, float) and name not in own:
+        if isinstance(number, float) and name not in placed:
             copied[name] = Value(number, "-", "unit of R/V Gunnerus")
         elif isinstance(number, Mapping):
             copied |= {f'{name}."{key}"': Value(v, "-", "unit of R/V Gunnerus") for key, v in number.items()}
     return (
-        own
+        placed
         | copied
         | {
             "actuator.alpha.T": Value(0.5, "s", "a guess"),
@@ -359,13 +359,13 @@ def _accelerations(vessel: Vessel) -> Callable[[tuple[float, float, float], floa
     model = dynamics(vessel)
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
 
-    def found(nu: tuple[float, float, float], n: float) -> np.ndarray:
+    def accelerations(nu: tuple[float, float, float], n: float) -> np.ndarray:
         commands = [n if is_shaft(name) else neutral(name) for name in model.commands]
         memory = [n if is_shaft(name) else neutral(name) for name in model.memory]
         rates: Any = model.rates([0.0, 0.0, 0.0, *nu], memory, commands, calm, values, np.zeros(3))
         return np.array(rates).ravel()[3:]
 
-    return found
+    return accelerations
 
 
 def _shaft(vessel: Vessel, speed: float) -> float:
