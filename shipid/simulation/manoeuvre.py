@@ -458,7 +458,7 @@ class StationKeeping(Approached):
         used = {f"{unit.name}.{signal}" for unit in units for signal in ("n", "alpha")}
         return helm.station_keeping(units, tuple(name for name in controls.commands if name not in used))
 
-    def values(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
         """Name -> (T,): position and heading to hold, natural frequency, bias and limit of the shaft speeds [SI]."""
         heading = self.course_deg if self.heading_deg is None else self.heading_deg
         values = {"north": self.north, "east": self.east, "heading": heading * DEGREE}

@@ -1,4 +1,4 @@
-"""Which number of a document feeds which keyword of the physics, and in what unit."""
+"""Bindings of the numbers of a vessel document to the keyword arguments of the physics functions, with units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ Binding = dict[str, str | list[str] | dict[str, str] | float]
 
 
 def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
-    """Keyword -> dotted path (or list, table of paths, or default value) for one physics function."""
+    """Keyword -> dotted path, list or table of paths, or default value, for one physics function.
+
+    path, block : of the document. declared : parameters of the function.
+    """
     result: Binding = {}
     for parameter in declared:
         name = parameter.name

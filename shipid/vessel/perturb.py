@@ -1,4 +1,4 @@
-"""Families of degraded vessels: a variant is a named patch on a digested base, never a copied file.
+"""Families of perturbed vessels: a variant is a named patch on a base vessel with a given digest.
 
 Each draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a family never
 changes another draw.
@@ -317,7 +317,7 @@ def _draw(
 
 
 def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float], file: str | Path | None) -> None:
-    """Refuse a member that is no vessel, such as one of negative mass."""
+    """DocumentError for a member that is no valid vessel, such as one of negative mass."""
     try:
         base.with_values(values)
     except DocumentError as error:
@@ -332,7 +332,7 @@ def uniform(*key: Any) -> float:
 
 
 def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
-    """Paths that the patterns select, each once, in the vessel's order; a pattern that selects nothing is an error."""
+    """Paths that the patterns select, each once, in the order of `paths`; DocumentError if a pattern has no match."""
     chosen: set[str] = set()
     for pattern in patterns:
         parsed = _CONDITION.fullmatch(pattern)

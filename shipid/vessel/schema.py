@@ -1,4 +1,4 @@
-"""What a vessel document may say, read off the signatures of the physics: no second list to keep in step."""
+"""Schema of vessel documents, derived from the signatures of the physics functions."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ TABLE = "table"  # the structural key that names a file of columns; every other 
 
 
 class Block(BaseModel):
-    """Part of a vessel document: nothing but what is declared, and a word on where the numbers come from."""
+    """Base model of a block of a vessel document: only declared keys, and `source`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
     source: str | None = Field(default=None, description="where the numbers come from")
@@ -190,7 +190,7 @@ def term_model(key: str) -> type[Block]:
         fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
     if behind(term):
-        extra[BEHIND] = (Annotated[str, Field(description="the thruster in whose wash it stands")], ...)
+        extra[BEHIND] = (Annotated[str, Field(description="the propeller in whose slipstream it is")], ...)
     return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 

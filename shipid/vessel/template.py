@@ -1,6 +1,6 @@
-"""A first guess of a vessel from its main particulars, by regression formulae; every value says which one.
+"""First estimate of a vessel from its main particulars, by regression formulae; each value names its formula.
 
-The result is a document like any other, to be replaced value by value as better numbers come.
+The result is a normal vessel document. Replace its values when better ones are known.
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
     )
     head = [
         "# A FIRST GUESS from main particulars by regression formulae: nothing is measured. Replace what you know.",
-        f"# At {given.service:.3g} m/s she needs {60 * n:.4g} rpm and is {verdict}.",
+        f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
     return FirstGuess("\n".join([*head, body]), vessel, n, growth)
 
 
 def _check(given: Particulars) -> None:
-    """Refuse what lies outside the ships behind the formulae."""
+    """ShipidError for particulars outside the range of the formulae."""
     if given.propulsor not in PROPULSORS:
         raise ShipidError(f"propulsor {given.propulsor!r}: {choices(given.propulsor, PROPULSORS)}")
     if given.ship_type not in WIND:
@@ -122,7 +122,7 @@ def _check(given: Particulars) -> None:
 
 
 def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
-    """What, its value, least and most; sizes before what is worked out from them."""
+    """Name, value, lower and upper limit of each quantity; sizes before the ratios derived from them."""
     yield "length [m]", given.length, 1.0, 450.0
     yield "beam [m]", given.beam, 0.1, 80.0
     yield "draught [m]", given.draught, 0.02, 30.0
@@ -229,7 +229,7 @@ def wind(given: Particulars) -> Values:
 
 
 def waves() -> Values:
-    """Wave resistance: no formula here, but a place for what trials at speed tell."""
+    """Wave resistance: 0 by default; to be identified from trials at speed."""
     note = "wave resistance grows with about the sixth power of speed: 0 until it is measured or identified"
     return {"R_4": Value(0.0, "kg m^-5 s^4", note)}
 
@@ -322,7 +322,7 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
     }
     yield f"name = {_quoted(name)}"
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
-    yield 'source = "shipid vessel new: the formula of each number stands beside it"\ndof = 3\n'
+    yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
     yield from _block("particulars", main)
     yield from _block("constants", {"rho": Value(RHO, "kg m^-3", "sea"), "rho_a": Value(RHO_AIR, "kg m^-3", "air")})
     yield from _block("inertia", inertia(given))
