@@ -16,7 +16,7 @@ def learned(
     *,
     u_scale: Annotated[SX, "m s^-1", POSITIVE],
     v_scale: Annotated[SX, "m s^-1", POSITIVE],
-    r_scale: Annotated[SX, "rad s^-1", POSITIVE],
+    r_scale: Annotated[SX, "s^-1", POSITIVE],
     X_max: Annotated[SX, "N", POSITIVE],
     Y_max: Annotated[SX, "N", POSITIVE],
     N_max: Annotated[SX, "N m", POSITIVE],
