@@ -142,7 +142,7 @@ def estimates(content: IdentificationContent) -> Figure:
         title="The estimates",
         takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
-        "an interval wider than ±100 % of the base value, or the estimate stands at a bound or was dropped."
+        "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,
