@@ -35,6 +35,7 @@ class Predictor:
     limits : column -> (least, greatest) seen in training: the region where the method has evidence.
     commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
         in force in each step, `Instants.planned`, name -> (T, S).
+    causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
     """
 
     physics: Physics
@@ -43,6 +44,7 @@ class Predictor:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     commands: Commands = "held"
+    causal: tuple[str, ...] = ()
 
     @property
     def vessel(self) -> Vessel | None:
@@ -100,6 +102,7 @@ class Predictor:
             "step": self.physics.step,
             "integrator": self.physics.integrator,
             "commands": self.commands,
+            "causal": list(self.causal),
             "path": self.physics.path,
             "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
@@ -145,6 +148,7 @@ class Predictor:
                 limits={name: (low, high) for name, (low, high) in header["limits"].items()},
                 provenance=dict(header["provenance"]),
                 commands=header["commands"],
+                causal=tuple(header["causal"]),
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
+from pydantic import BaseModel, ConfigDict, PositiveFloat, field_validator
 
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
@@ -70,19 +70,25 @@ class Memory(BaseModel):
     observer : the estimates of the observer of the physics: slow forces as accelerations, current, and the filtered
         velocities less the measured ones. Nothing where the physics has no observer.
     error : what the physics, started so long ago with the commands then given, gets wrong by now: along and across the
-        present heading, and in u, v, r. It holds wind, current, and what the model lacks. 0: not taken.
+        present heading, and in u, v, r. It holds wind, current, and what the model lacks. One number or several.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     history: tuple[PositiveFloat, ...] = ()
     turned: tuple[PositiveFloat, ...] = ()
-    error: NonNegativeFloat = 0.0
+    error: tuple[PositiveFloat, ...] = ()
     observer: bool = False
+
+    @field_validator("history", "turned", "error", mode="before")
+    @classmethod
+    def _several(cls, value: Any) -> Any:
+        """Take one number as a list of one; 0 as none."""
+        return ((value,) if value else ()) if isinstance(value, int | float) else value
 
     @property
     def past(self) -> float:
         """Length of the past that is needed [s]."""
-        return max((*self.history, *self.turned, self.error), default=0.0)
+        return max((*self.history, *self.turned, *self.error), default=0.0)
 
 
 NOTHING = Memory()
@@ -115,7 +121,7 @@ class Inputs:
         if physics.vessel is None:
             return {}
         table = estimates(instants) if self.memory.observer and physics.observer is not None else {}
-        if seconds := self.memory.error:
+        for seconds in self.memory.error:
             errors = past_error(replace(physics, observer=None), instants, seconds)
             table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
         return table

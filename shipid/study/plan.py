@@ -56,6 +56,9 @@ class Data(Strict):
     log: str | None = Field(default=None, description="raw log, if not the public original")
     dataset: str | None = Field(default=None, description="Parquet file written by `shipid data import`")
     without: list[str] = Field(default=[], description="repairs of the mapping to leave out")
+    causal: list[str] = Field(
+        default=[], description="columns interpolated between fixes: inputs hold the last fix, such as u and v"
+    )
     path: Literal["position", "velocity"] = Field(
         default="position", description="true path: logged positions, or the integral of u, v, psi"
     )
@@ -327,6 +330,11 @@ class Plan:
         return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
 
     @property
+    def causal(self) -> tuple[str, ...]:
+        """Columns whose inputs hold the last fix."""
+        return tuple(self.study.data.causal) if self.study.data else ()
+
+    @property
     def past(self) -> int:
         """Steps of the past that every window holds: the run-up, what the study asks for, or more for a method."""
         prediction, truth = self.study.prediction, self.study.truth
@@ -504,7 +512,7 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
         root = _root(study.family, index, file)
         parent = families[root]
         settings = None if family.identify is None else _identify(study, family, index, vessel, file)
-        observer = None if family.observer is None else _observer(family, index, vessel, file)
+        observer = None if family.observer is None else _observer(study, family, index, vessel, file)
         ways = (IDENTIFIED if settings else "", OBSERVED if observer else "")
         described = words or ", ".join(filter(None, (parent.description, *ways)))
         for variant in members(parent, vessel, file):
@@ -535,9 +543,14 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     return index
 
 
-def _observer(family: Family, index: int, vessel: Vessel, file: Path) -> Observer:
-    """Settings of an observer of this vessel; DocumentError with the path of a wrong key or value."""
-    settings: Observer = documents.parse(Observer, family.observer or {}, file, f"family.{index}.observer")
+def _observer(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Observer:
+    """Settings of an observer of this vessel; DocumentError with the path of a wrong key or value.
+
+    Where velocities make the true path, positions are too coarse to be measurements; then no current can be seen.
+    """
+    coarse = study.data is not None and study.data.path == "velocity"
+    default: dict[str, Any] = {"measured": ["psi", "u", "v", "r"], "current": 0.0} if coarse else {}
+    settings: Observer = documents.parse(Observer, default | (family.observer or {}), file, f"family.{index}.observer")
     try:
         bank(vessel, settings)
     except DocumentError as error:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.profiler import ProfilerActivity, profile
-
 from shipid.hybrid.recipe import Recipe, RidgeRecipe
 from shipid.hybrid.tuning import tune
+from torch.profiler import ProfilerActivity, profile
+
 from tests.benchmarks.timing import best_of
 
 ORDER = 2048  # of the big matrices

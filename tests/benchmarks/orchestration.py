@@ -21,10 +21,10 @@ from unittest.mock import patch
 
 import numpy as np
 import torch
-
-from shipid import cli
 from shipid.hybrid.recipe import Recipe
 from shipid.hybrid.tuning import Tuned, tune
+
+from shipid import cli
 from shipid.study import run as study
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare

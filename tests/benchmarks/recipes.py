@@ -8,8 +8,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-
 from shipid.hybrid.recipe import Recipe
+
 from shipid.study.run import run_batch
 from tests.benchmarks.yardstick import KEPT, Cell, tune_cell, world
 

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.tuning import tune
 
 from shipid.hybrid import gradient
-from shipid.hybrid.recipe import Recipe
 from shipid.hybrid.training import use_threads
-from shipid.hybrid.tuning import tune
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare
