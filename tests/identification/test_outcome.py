@@ -188,7 +188,7 @@ def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> N
     mended = changed(log, v=log.frame["v"] + drift)
     own = run_identification(off(), mended, settings(horizon=20.0), ahead=30.0)
     told = " ".join(own.warnings)
-    assert "are correlated in time" in told
+    assert "are correlated over" in told
     assert "the horizon of 20 s is short" in told
     assert "no run was held out" in told
 
