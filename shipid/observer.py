@@ -73,7 +73,7 @@ class Observer(BaseModel):
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
-    ] = (2e-4,)
+    ] = (1e-5, 2e-4)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
     ] = 10.0
