@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.test_cli import said, shell
 
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.vessel.load import load_vessel
+from tests.cli.running import said, shell
 from tests.identification.trials import trials
 from tests.report.test_page import Page
 

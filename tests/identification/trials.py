@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.simulation import truth
+from shipid.simulation.log import logged
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from tests.conftest import pace
@@ -50,7 +50,7 @@ def trials(
     rng = np.random.default_rng(seed + 1000)
     start = {name: np.zeros(runs) for name in model.state}
     start |= {"psi": rng.uniform(-3, 3, runs), "u": pace(vessel) * rng.uniform(2, 5, runs)}
-    logged = orders(vessel, runs, steps, seed)
+    ordered = orders(vessel, runs, steps, seed)
     environment = {name: np.zeros(runs) for name in model.environment} | dict(weather or {})
     values = np.tile(list(vessel.parameters.values()), (runs, 1)) if parameters is None else parameters
     names = [f"M{number + 1:02d}" for number in range(runs)]
@@ -59,7 +59,7 @@ def trials(
         path = rollout(
             vessel,
             {key: value[[i]] for key, value in start.items()},
-            {key: value[:-1, [i]] for key, value in (told or logged).items()},
+            {key: value[:-1, [i]] for key, value in (told or ordered).items()},
             {key: value[[i]] for key, value in environment.items()},
             step=step,
             num_steps=steps,
@@ -68,14 +68,14 @@ def trials(
             engine="casadi",
         )
         assert not path.diverged.any()
-        columns = {key: values[:, 0] for key, values in truth.logged(path, model.state).items()}
+        columns = {key: values[:, 0] for key, values in logged(path, model.state).items()}
         frames.append(
             pd.DataFrame(
                 {
                     "run": name,
                     "t": step * np.arange(steps + 1),
                     **columns,
-                    **{key: value[:, i] for key, value in logged.items()},
+                    **{key: value[:, i] for key, value in ordered.items()},
                 }
             )
         )
