@@ -8,8 +8,8 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
-from shipid.simulation.log import logged
 from shipid.simulation.gusts import Gusts, series
+from shipid.simulation.log import logged
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import FirstGuess, Particulars, first_guess
