@@ -23,6 +23,7 @@ ROW, GAP, MARGIN = 118, 26, 56  # heights of a row of a stacked figure, between 
 FEW = 6  # models that have a line in a figure
 MOST_ROWS = 24  # models on the map of differences
 CELL = 30  # height of a model there [px]
+LONGEST = 16  # characters of a name at the axis
 SMALL = 1e-6  # m/s: no current was looked for
 DRAWN = {"measured": MUTED, "filtered": category(0), "ahead": category(1), "across": category(2)}
 
@@ -230,7 +231,7 @@ def _differences(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
     for i, name in enumerate(shown):
         mine = frame[frame.model.eq(name)].sort_values("N_D")
         shift = 0.09 * (i - (len(shown) - 1) / 2)  # intervals of several models would hide each other
-        x = np.array([amounts.index(int(value)) for value in mine.N_D]) + shift
+        x = np.array([amounts.index(int(value)) for value in mine.N_D], dtype=float)
         ink = {"color": category(list(models).index(name)), "width": 2}
         mark = {"color": ink["color"], "size": 6}
         for side, column, dash in (("without", "H_without", "dot"), ("with", "H_with", "solid")):
@@ -242,14 +243,16 @@ def _differences(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
         middle, low, high = (mine[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         reach = {"type": "data", "symmetric": False, "color": ink["color"], "thickness": 1.5, "width": 4}
         reach |= {"array": np.nan_to_num(high - middle), "arrayminus": np.nan_to_num(middle - low)}
-        points = line(f"{name}, difference", x, middle, [f"model:{name}"], mode="markers", marker=mark, yaxis="y2")
+        points = line(
+            f"{name}, difference", x + shift, middle, [f"model:{name}"], mode="markers", marker=mark, yaxis="y2"
+        )
         points.update(error_y=reach, customdata=[_interval(row) for row in mine.to_dict("records")])
         points.update(hovertemplate=f"{label(name)}: %{{customdata}}<extra></extra>")
         traces.append(points)
     ends = [-0.5, len(amounts) - 0.5]
     title = "manoeuvres, N_D [1]" if amounts != [0] else ""
     across = axis(title, anchor="y2", tickvals=list(range(len(amounts))), ticktext=names, range=ends, showgrid=False)
-    y = axis("position error, H [m]", rangemode="tozero", domain=[0.52, 1.0])
+    y = axis("position error, H [m]", domain=[0.52, 1.0])
     below = axis("difference of H [m]", domain=[0.0, 0.44], anchor="x")
     zero = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y2", "y0": 0, "y1": 0}
     shapes = [{**zero, "line": {"color": INK, "width": 1}}]
@@ -324,7 +327,8 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> go.Figure:
     x = axis("time of the recording [s]", anchor="y2")
     y = axis("position error [m]", rangemode="tozero", domain=[0.45, 1.0])
     below = axis("difference [m]", domain=[0.0, 0.36], anchor="x", nticks=5, zeroline=True, zerolinecolor=INK)
-    return go.Figure(traces, layout(x, y, hovermode="x unified", yaxis2=below, shapes=_upright(moments)))
+    inside = moments[(moments >= t.min()) & (moments <= t.max())]
+    return go.Figure(traces, layout(x, y, hovermode="x unified", yaxis2=below, shapes=_upright(inside)))
 
 
 def _takeaway_windows(frame: pd.DataFrame, comparison: str, model: str) -> str:
@@ -394,17 +398,29 @@ def _cells(frame: pd.DataFrame, span: float) -> go.Figure:
         textfont={"color": INK, "size": 12},
         hoverinfo="skip",
     )
-    ticks = [f"{value:.2f}" if math.isfinite(value) else "none" for value in accuracy]
+    ticks = [
+        label(_shortened(name)) + (f", {number(value)}" if math.isfinite(value) else "")
+        for name, value in zip(models, accuracy, strict=True)
+    ]
     x = axis("manoeuvres, N_D [1]", tickvals=list(range(len(amounts))), ticktext=names, showgrid=False)
     y = axis(
-        "A [m]", tickvals=list(range(len(models))), ticktext=ticks, range=[-0.6, len(models) - 0.4], showgrid=False
+        "model, A [m]",
+        tickvals=list(range(len(models))),
+        ticktext=ticks,
+        range=[-0.6, len(models) - 0.4],
+        showgrid=False,
     )
     return go.Figure([boxes, words], layout(x, y, hovermode="closest", barmode="overlay"))
 
 
 def _written(row: dict[Any, Any]) -> str:
-    value = number(float(row["difference"]))
+    value = number(round(float(row["difference"]), 2) + 0.0)  # no minus before a zero
     return f"<b>{value}</b>" if _sure(row) else value
+
+
+def _shortened(name: str) -> str:
+    """Cut the middle of a long name: its end is the number of the member."""
+    return name if len(name) <= LONGEST else f"{name[: LONGEST - 7]}…{name[-6:]}"
 
 
 def _sure(row: dict[Any, Any]) -> bool:
@@ -416,7 +432,8 @@ def _takeaway_map(frame: pd.DataFrame) -> str:
     mine = frame[frame.comparison.eq(_comparisons(frame)[0])]
     means = mine.groupby("N_D").difference.mean()
     few, many = int(means.index.min()), int(means.index.max())
-    text = f"{_comparisons(frame)[0]}: over {counted(mine.model.nunique(), 'model')}, H changes by {metres(means[few])}"
+    first = _comparisons(frame)[0]
+    text = f"{first[0].upper()}{first[1:]}: over {counted(mine.model.nunique(), 'model')}, H changes by {metres(means[few])}"
     return text + (
         f" at N_D = {few} and by {metres(means[many])} at {many}, in the mean." if few != many else " on average."
     )
@@ -430,7 +447,7 @@ def table(content: ReportContent) -> Table | None:
     rows: list[list[Cell]] = []
     for row in frame.to_dict("records"):
         bracket = f"{number(row['low'])} to {number(row['high'])}" if math.isfinite(row["low"]) else "–"
-        named = [text(row[name]) for name in ("comparison", "without", "with")]
+        named = [text(row[name]) for name in ("without", "with")]
         numbers = [
             figure(row["N_D"], 0),
             *(figure(row[name], 2) for name in ("A", "H_without", "H_with", "difference")),
@@ -438,13 +455,13 @@ def table(content: ReportContent) -> Table | None:
         rows.append(
             [*named, *numbers, Cell(bracket, row["low"]), Cell(f"{row['better']} of {row['runs']}", row["better"])]
         )
-    headings = ["compared", "without", "with", "N_D [1]", "A [m]", "H without [m]", "H with [m]", "difference [m]"]
+    headings = ["without", "with", "N_D [1]", "A [m]", "H without [m]", "H with [m]", "difference [m]"]
     headings += ["95 % interval [m]", "better runs"]
     seeds = sorted({int(count) for count in frame.seeds})
     takeaway = (
         f"{counted(len(frame), 'comparison')}, N_D = 0 is physics alone; mean over {listed([str(s) for s in seeds])} "
     )
-    return Table("memory-table", "Every comparison", takeaway + "seeds.", headings, [False] * 3 + [True] * 7, rows)
+    return Table("memory-table", "Every comparison", takeaway + "seeds.", headings, [False] * 2 + [True] * 7, rows)
 
 
 SECTION = Section(
