@@ -433,7 +433,8 @@ def _takeaway_map(frame: pd.DataFrame) -> str:
     means = mine.groupby("N_D").difference.mean()
     few, many = int(means.index.min()), int(means.index.max())
     first = _comparisons(frame)[0]
-    text = f"{first[0].upper()}{first[1:]}: over {counted(mine.model.nunique(), 'model')}, H changes by {metres(means[few])}"
+    text = f"{first[0].upper()}{first[1:]}: over {counted(mine.model.nunique(), 'model')}, H changes "
+    text += f"by {metres(means[few])}"
     return text + (
         f" at N_D = {few} and by {metres(means[many])} at {many}, in the mean." if few != many else " on average."
     )
