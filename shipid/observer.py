@@ -55,6 +55,7 @@ NUMBERS = (
 COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
 GRAVITY = 9.81  # m/s^2
+DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -73,7 +74,7 @@ class Observer(BaseModel):
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
-    ] = (2e-4,)
+    ] = (1e-5, 2e-4)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
     ] = 10.0
@@ -241,12 +242,22 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
     given = [part if i in (0, 6) else ca.repmat(part, 1, num_filters) for i, part in enumerate(inputs)]
     after, estimate, innovation, spread = one.map(num_filters)(*given)
-    likelihood = after[-1, :]
+    sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
+    after = _finite(after)
+    likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)
     weights = ca.exp(likelihood - ca.mmax(likelihood)).T
     weights = weights / ca.sum1(weights)
-    results = [after, estimate @ weights, innovation @ weights, spread @ weights, weights]
+    best = likelihood == ca.mmax(likelihood)
+    likely = after @ (best / ca.sum2(best)).T
+    after = after * ca.repmat(sound, after.size1(), 1) + likely @ (1 - sound)  # a filter that diverged begins again
+    results = [after, *(_finite(part) @ weights for part in (estimate, innovation, spread)), weights]
     names = [one.name_in(i) for i in range(one.n_in())]
     return ca.Function("observer", inputs, results, names, ["after", "estimate", "innovation", "spread", "weights"])
+
+
+def _finite(matrix: ca.MX) -> ca.MX:
+    """The matrix within +-DIVERGED; what is not a number becomes a bound, since fmax and fmin leave NaN out."""
+    return ca.fmin(ca.fmax(matrix, -DIVERGED), DIVERGED)
 
 
 def _symmetric(matrix: SX) -> SX:

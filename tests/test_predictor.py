@@ -249,7 +249,7 @@ def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path
     with pytest.raises(DataError, match="cannot be read"):
         predict_log(tiny_run, CELL, tmp_path / "gone.parquet", None, out)
     dataset = read_dataset(log)
-    for missing, said in (("port.n", "takes this command"), ("V_w", "measure wind")):
+    for missing, said in (("port.n", "needs this command"), ("V_w", "measure wind")):
         columns = ["V_w", "beta_w"] if missing == "V_w" else [missing]
         fewer = Dataset(dataset.frame.drop(columns=columns), {**dataset.metadata, "units": {}})
         file = write_dataset(fewer, tmp_path / "fewer.parquet")

@@ -20,7 +20,9 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched, spread
 
 RIDGES = 9  # of a range
-MEMORIES = ((), ("error",), ("history", "error"))  # that validation chooses from
+KINDS = ("history", "error", "observer")  # of memory
+CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from
+OBSERVED = (("observer",), KINDS)  # and with estimates of an observer
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
@@ -42,8 +44,8 @@ class PathDrawn(Searched):
     mirror : share of the trials in which port and starboard are mirror images.
     averaged : the compensation is the mean of the networks of so many best trials.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
-    choose : whether validation chooses between no memory, the error of the physics, and that with history: each is
-        tried in a third of the trials (without physics: no memory or history, a half each).
+    choose : whether validation chooses between no memory, the error of the physics, and that with history; with
+        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -88,8 +90,13 @@ class PathDrawn(Searched):
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
         """Return the kinds of memory that a trial does without."""
-        taken = MEMORIES[int(point["memory"])] if "memory" in point else ("history", "error")
-        return frozenset({"history", "error"} - set(taken))
+        taken = self.memories[int(point["memory"])] if "memory" in point else KINDS
+        return frozenset(set(KINDS) - set(taken))
+
+    @property
+    def memories(self) -> tuple[tuple[str, ...], ...]:
+        """Kinds of memory that validation chooses from."""
+        return (*CHOICES, *OBSERVED) if self.memory.observer else CHOICES
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
@@ -108,7 +115,7 @@ class PathDrawn(Searched):
         for number, shares in enumerate(spread(len(ranges) + 1, self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
-                point["memory"] = float(number % len(MEMORIES))
+                point["memory"] = float(number % len(self.memories))
             for share, (name, (low, high)) in zip(shares[1:], ranges.items(), strict=True):
                 point[name] = exp(log(low) + share * (log(high) - log(low)))
             found.append(point)

@@ -205,7 +205,7 @@ def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> No
     if missing:
         commands = sorted(name for name in columns if "." in name)
         raise DataError(
-            f"{vessel.name} takes this command; the data have {', '.join(commands) or 'no commands'}",
+            f"{vessel.name} needs this command; the data have {', '.join(commands) or 'no commands'}",
             file=file,
             path=missing[0],
         )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.windows import Instants, from_frame, past_of
 from shipid.errors import DataError, ResultError, choices
@@ -34,6 +35,8 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
+    if predictor.causal:
+        dataset = causal_columns(dataset, predictor.causal)
     estimates = None
     if predictor.vessel is not None and predictor.physics.observer is not None:
         estimates = observe(predictor.vessel, dataset, predictor.physics.observer)

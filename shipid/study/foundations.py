@@ -103,7 +103,7 @@ def _identified(
             return _nothing(foundation, windows, prepared.test, solution.sentence)
         values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
         now = replace(foundation, variant=replace(foundation.variant, values=values))
-        estimates = estimates_of(now, prepared.data) if now.observer is not None else None
+        estimates = estimates_of(plan, now, prepared.data) if now.observer is not None else None
         pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
         return _nothing(foundation, windows, prepared.test, error.message)

@@ -56,6 +56,9 @@ class Data(Strict):
     log: str | None = Field(default=None, description="raw log, if not the public original")
     dataset: str | None = Field(default=None, description="Parquet file written by `shipid data import`")
     without: list[str] = Field(default=[], description="repairs of the mapping to leave out")
+    causal: list[str] = Field(
+        default=[], description="columns interpolated between fixes: inputs hold the last fix, such as u and v"
+    )
     path: Literal["position", "velocity"] = Field(
         default="position", description="true path: logged positions, or the integral of u, v, psi"
     )
@@ -325,6 +328,11 @@ class Plan:
         """Name of the method that findings and the answer speak of."""
         named = self.study.claims.method if self.study.claims else None
         return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
+
+    @property
+    def causal(self) -> tuple[str, ...]:
+        """Columns whose inputs hold the last fix."""
+        return tuple(self.study.data.causal) if self.study.data else ()
 
     @property
     def past(self) -> int:

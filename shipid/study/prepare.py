@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
+from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
@@ -146,17 +147,21 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     """Every window of a study, test and training; DocumentError where no run is as long as the horizon."""
     prediction = plan.study.prediction
+    cut = partial(
+        cut_windows,
+        horizon=prediction.horizon,
+        step=prediction.step,
+        interval=prediction.interval,
+        path=path_of(plan),
+        past=plan.past,
+    )
     try:
-        windows = cut_windows(
-            dataset,
-            horizon=prediction.horizon,
-            step=prediction.step,
-            interval=prediction.interval,
-            path=path_of(plan),
-            past=plan.past,
-        )
+        windows = cut(dataset)
     except DataError as error:
         raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
+    if plan.causal:
+        known = cut(known_by_then(plan, dataset))  # the truth is that of the log, inputs are what was known
+        windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
         windows = windows.select(_place_in_run(windows) < prediction.samples)
     return windows
@@ -266,7 +271,7 @@ def _roll_out(
             same, paths = finished[foundation.variant.name]
             derived = replace(foundation, variant=same.variant)
             if derived.observer is not None and derived.identify is None:
-                estimates[derived.name] = known = estimates_of(derived, dataset)
+                estimates[derived.name] = known = estimates_of(plan, derived, dataset)
                 paths = paths_of(plan, dataset, parts, derived, device, known)
             finished[foundation.name] = (derived, paths)
         finished.setdefault(foundation.name, (foundation, zeros))
@@ -280,15 +285,25 @@ def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = No
     return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_of(plan))
 
 
+def known_by_then(plan: Plan, dataset: Dataset) -> Dataset:
+    """The runs as a predictor sees them: columns that the study calls `causal` hold their last fix."""
+    if not plan.causal:
+        return dataset
+    try:
+        return causal_columns(dataset, plan.causal)
+    except DataError as error:
+        raise DocumentError(error.message, file=plan.file, path="data.causal") from None
+
+
 def path_of(plan: Plan) -> Literal["position", "velocity"]:
     """Where the true path of a study comes from."""
     return plan.study.data.path if plan.study.data else "position"
 
 
-def estimates_of(foundation: Foundation, dataset: Dataset) -> Estimates:
+def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estimates:
     """What the observer of a foundation knows at every row of the runs."""
     assert foundation.vessel is not None
-    return observe(foundation.vessel, dataset, foundation.observer)
+    return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer)
 
 
 def instants_of(

@@ -22,7 +22,7 @@ from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
-from shipid.study.prepare import constant_motion, instants_of
+from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
@@ -72,7 +72,9 @@ def read_results(folder: Path) -> Results:
         if row["status"] == "ok":
             predictor = Predictor.load(store.cell_file(folder, row["cell"]))
             alone = physics.get(row["foundation"])  # None where its numbers depend on the cell
-            instants = instants_of(plan, predictor.vessel, dataset, test, _observed(predictor, dataset, known))
+            instants = instants_of(
+                plan, predictor.vessel, dataset, test, _observed(predictor, known_by_then(plan, dataset), known)
+            )
             paths[row["cell"]] = predictor.predict(instants, alone)
     return Results(
         folder=folder,

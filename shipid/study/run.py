@@ -244,6 +244,7 @@ def _predictor(
         corrector=corrector,
         limits=limits(windows, prepared.commands),
         commands=plan.study.prediction.commands,
+        causal=plan.causal,
         provenance={
             "study": plan.name,
             "digest": plan.digest,

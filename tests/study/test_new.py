@@ -216,7 +216,7 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
 @pytest.mark.parametrize(
     ("vessels", "runs", "said"),
     [
-        (["kvlcc2-l7"], 5, "propeller.n: KVLCC2 tanker, 7 m model (MMG) takes this command; the data have"),
+        (["kvlcc2-l7"], 5, "propeller.n: KVLCC2 tanker, 7 m model (MMG) needs this command; the data have"),
         ([SHIP], 2, "2 runs of 20 s or more, a study needs 3"),
         ([SHIP], 1, "1 run of 20 s or more, a study needs 3"),
         (["gunnerus"], 5, "no vessel of this name comes with shipid"),

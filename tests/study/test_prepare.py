@@ -301,7 +301,7 @@ def test_a_log_without_the_ships_commands(recorded: Callable[..., tuple[Plan, Da
     dataset = logged({name: {"u": 2.0} for name in "abcd"}, t)
     fewer = Dataset(dataset.frame.drop(columns=["starboard.n"]), dataset.metadata)
     plan, _ = recorded(fewer, split={"test": 1})
-    with pytest.raises(DataError, match=r"takes this command; the data have port\.alpha, port\.n") as caught:
+    with pytest.raises(DataError, match=r"needs this command; the data have port\.alpha, port\.n") as caught:
         prepare(plan, fewer)
     assert caught.value.path == "starboard.n"
 
