@@ -1,4 +1,4 @@
-"""Tuning by gradients: an Optuna study per model, asked and told in step; equal architectures train as one stack."""
+"""Tuning by gradients: an Optuna study per model; models with equal architectures train as one stack."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def _study(seed: int) -> optuna.Study:
 
 
 def _suggest(trial: Trial, method: Trained) -> Parameters:
-    """Take each hyperparameter from the trial where the recipe has a range, else from the method."""
+    """Take each hyperparameter from the trial where the method has a range, else from the method."""
     parameters: Parameters = {name: getattr(method, name) for name in method.SEARCHED}
     for name, (low, high) in method.ranges().items():
         if name in method.COUNTS:

@@ -239,7 +239,7 @@ def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
 
 def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
     """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image."""
-    standing = {column: name for name, columns in features.items() for column in columns}
+    kept = {column: name for name, columns in features.items() for column in columns}
     names = list(features)
     matrix = np.zeros((len(names), len(names)))
     for column, values in table.items():
@@ -250,9 +250,9 @@ def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ..
             return None
         partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
         sign = mirror_sign(column)
-        if column in standing and partner in standing:
-            matrix[names.index(standing[partner]), names.index(standing[column])] = sign
-        elif column in standing or partner not in table or not np.allclose(values, sign * table[partner]):
+        if column in kept and partner in kept:
+            matrix[names.index(kept[partner]), names.index(kept[column])] = sign
+        elif column in kept or partner not in table or not np.allclose(values, sign * table[partner]):
             return None
     return matrix if (np.abs(matrix).sum(axis=0) == 1).all() and (np.abs(matrix).sum(axis=1) == 1).all() else None
 
@@ -322,8 +322,8 @@ def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], 
 
 def _many_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
     """The same by solving for the output weights without each block, (M, M)."""
-    own, product = rows.mT @ rows, part.product - rows.mT @ targets
-    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - own, product)
+    block, product = rows.mT @ rows, part.product - rows.mT @ targets
+    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - block, product)
 
 
 def _network(
