@@ -116,7 +116,7 @@ def test_one_run_is_split_in_time() -> None:
         (SMALL, Physics(None, 4, 1.0), None, "the physics has 4 steps of 1 s, the windows have 5 steps of 1 s"),
         (PathDrawn(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
         (Alone(), NONE, None, "'alone' needs a vessel"),
-        (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "takes this command"),
+        (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "needs this command"),
         (SMALL, NONE, ["M1", "M9"], "validation_runs: no run with windows"),
         (SMALL, NONE, WINDOWS.spans, "no training window is left"),
     ],
