@@ -147,13 +147,15 @@ class Inputs:
 
 
 def group_of(name: str) -> str:
-    """Kind of an input by its name: `motion`, `wind`, `command` (a plan too), `history` or `error`."""
+    """Kind of an input by its name: `motion`, `wind`, `command` (a plan too), `history`, `error` or `physics`."""
     if name in MOTIONS:
         return "motion"
     if name.endswith("_rw"):
         return "wind"
-    kind = re.match(r"(?:.*\.)?(past|turned|error)-", name)
-    return "command" if kind is None else "error" if kind[1] == "error" else "history"
+    kind = re.match(r"(?:.*\.)?(past|turned|error|physics)-", name)
+    if kind is None:
+        return "command"
+    return kind[1] if kind[1] in ("error", "physics") else "history"
 
 
 def steps_of(seconds: float, step: float) -> int:

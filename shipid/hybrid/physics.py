@@ -57,17 +57,26 @@ class Physics:
             x, y = to_frame(north[1:], east[1:], north[0], east[0], instants.columns["psi"])
         return np.stack([x, y], axis=-1), found.diverged
 
-    def states(self, instants: Instants, tau_extra: Array | None = None) -> dict[str, Array]:
+    def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = "auto") -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
 
         tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none.
+        engine : as in `rollout`.
         """
         assert self.vessel is not None
-        found = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra)
+        found = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
         with np.errstate(invalid="ignore"):
             origin = found["north"][0, 0], found["east"][0, 0], instants.columns["psi"]
             x, y = to_frame(found["north"][1:, 0], found["east"][1:, 0], *origin)
         return {"x": x, "y": y, **{name: found[name][1:, 0] for name in MOTION}}
+
+    def reached(self, instants: Instants) -> dict[str, Array]:
+        """What the actuators have reached after 0..T steps, name -> (T + 1, S); none where orders act at once."""
+        names = () if self.vessel is None else tuple(dynamics(self.vessel).memory)
+        if not names:
+            return {}
+        found = self._rollout(instants, tuple(f"actual.{name}" for name in names), None, "cpu")
+        return {name: found[f"actual.{name}"][:, 0] for name in names}
 
     def gradient(
         self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None
@@ -129,6 +138,7 @@ class Physics:
         parameters: Array | None,
         device: str,
         tau_extra: Array | None = None,
+        engine: str = "auto",
     ) -> Any:
         assert self.vessel is not None
         return rollout(
@@ -141,6 +151,7 @@ class Physics:
             memory=instants.hidden,
             tau_extra=tau_extra,
             keep=keep,
+            engine=engine,
             device=device,
         )
 
