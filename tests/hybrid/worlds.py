@@ -151,3 +151,14 @@ def fitted(method: Method, world_: World, seed: int = 0) -> Corrector:
     found = method.fit(world_.task(seed=seed))["physics"].corrector
     assert found is not None
     return found
+
+
+def missed(world_: World, error: Callable[[World, Windows], Array]) -> World:
+    """The world whose true paths are those of the physics plus an error (T, S, 2) [m]: the master knows it."""
+
+    def changed(windows: Windows) -> Windows:
+        paths = world_.physics.paths(windows.instants(known=world_.known))
+        return replace(windows, future=paths + error(world_, windows))
+
+    test = changed(world_.test)
+    return replace(world_, train=changed(world_.train), test=test, perfect=test.future)
