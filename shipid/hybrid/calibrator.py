@@ -1,8 +1,8 @@
 """Calibrator: networks that see where the physics says the ship will go, and correct the path by it.
 
 [dx, dy] = f(u, v, r, commands, wind, trajectory of the physics): where the physics puts the ship at a few instants of
-the horizon (x, y in the frame (11), and u, v, r) are inputs beside those of `path-drawn`, and f is solved in closed form
-as there. A network that calibrates a model's prediction of ship motion by that prediction: Wang et al. (2021).
+the horizon (x, y in the frame (11), and u, v, r) are inputs beside those of `path-drawn`, and f is solved in closed
+form as there. A network that calibrates a model's prediction of ship motion by that prediction: Wang et al. (2021).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Probability, Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, points_of, sound, taken, used
+from shipid.hybrid.units import diverged, mean_square, points_of, row_of, sound, taken, used
 
 Array = NDArray[np.float64]
 LEAF = -1  # the child of a node that has none
@@ -129,7 +129,7 @@ class ForestCorrector:
             or whole[3].max(initial=0) >= len(names)
         ):
             raise ResultError("the arrays of the saved trees do not fit together", path="value")
-        trees = Trees(*whole, threshold, value)
+        trees = Trees(whole[0], whole[1], whole[2], whole[3], threshold, value)
         return cls(Inputs.from_header(header["inputs"]), names, basis, trees, dict(header["hyperparameters"]))
 
 
@@ -183,7 +183,7 @@ class Forest(Searched):
         targets, paths = task.targets[name], task.cases[name].paths
         basis = smooth_basis(task.windows.horizon, self.terms)
         weights = np.tensordot(basis.T, targets, 1)  # (r, S, 2)
-        physics, rows = task.cases[name].physics, []
+        physics, rows = task.cases[name].physics, list[dict[str, Any]]()
         for number, point in enumerate(points_of(self)):
             start, losses = time.perf_counter(), []
             seed = seed_of(task.seed, number)
@@ -192,10 +192,7 @@ class Forest(Searched):
                 judged = task.instants(name).select(validation)
                 predicted = grown.predict(physics, judged, paths[:, validation])
                 losses.append(mean_square(predicted, task.windows.future[:, validation]))
-            value = float(np.mean(losses))
-            row = {"number": number, "params": point, "value": value, "epochs": 0}
-            row |= {"state": "complete" if np.isfinite(value) else "diverged", "seconds": time.perf_counter() - start}
-            rows.append(row)
+            rows.append(row_of(number, point, float(np.mean(losses)), start))
         best = min(rows, key=lambda row: row["value"])
         seed = seed_of(task.seed, best["number"])
         grown = self._grown(inputs, table, weights, basis, used(task), best["params"], seed)

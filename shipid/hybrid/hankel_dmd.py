@@ -2,8 +2,9 @@
 
 a_k = A [nu_k, nu_(k-1) ... nu_(k-d), a_(k-1) ... a_(k-d), commands_k ... commands_(k-d), wind_k] + b, with a_k the
 acceleration that a single step of the physics misses (without physics: the acceleration itself, and its delays are
-left out, for those of nu hold them). A, b are a ridge regression on true steps; then nu_(k+1) = physics(nu_k) + step a_k.
-Dynamic mode decomposition with delays and control for ships: Diez et al. (2021-24).
+left out, for those of nu hold them). A, b are a ridge regression on true steps; then
+nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and control for ships: Diez et al.
+(2021-24).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import diverged, mean_square, ridges_of, solve, some_of, sound, taken, used
+from shipid.hybrid.units import diverged, mean_square, ridges_of, row_of, solve, some_of, sound, taken, used
 
 Array = NDArray[np.float64]
 MISSED = ("missed.u", "missed.v", "missed.r")
@@ -54,7 +55,9 @@ class Law:
         return np.asarray((full.reshape(len(self.weights), -1, full.shape[1]) @ self.weights).reshape(-1, 3))
 
 
-def delayed(now: Mapping[str, Array], before: Mapping[str, Array], delays: int, commands: tuple[str, ...]) -> Any:
+def delayed(
+    now: Mapping[str, Array], before: Mapping[str, Array], delays: int, commands: tuple[str, ...]
+) -> dict[str, Array]:
     """Inputs (S,) of the law: those at the instant and, for each name of `before` (P, S), the last `delays` of them.
 
     The name of a delay says how many steps ago it was: `past-2.u`, `port.past-1.n`, `missed.past-1.v`.
@@ -71,7 +74,7 @@ class _History:
     """The last steps of a rollout: velocities, commands and what the physics missed, (P, S) by name."""
 
     def __init__(self, physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> None:
-        held = len(instants.past.get("u", ()))
+        self.delays, held = delays, len(instants.past.get("u", ()))
         if held < delays:
             raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
         past = {name: instants.past[name][held - delays :] for name in (*MOTIONS, *commands)}
@@ -86,8 +89,8 @@ class _History:
             values.append(missed[:, MISSED.index(name)] if name in MISSED else at.columns[name])
 
     def before(self) -> dict[str, Array]:
-        """The past, the oldest first; only its last steps are used."""
-        return {name: values for name, values in self.rows.items()}  # type: ignore[misc]
+        """The last steps (P, S) by name, the oldest first."""
+        return {name: np.stack(values[-self.delays :]) for name, values in self.rows.items()}
 
 
 def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Array]:
@@ -208,9 +211,7 @@ class HankelDMD(Searched):
                 errors += [mean_square(path, future) for path in np.split(found, len(ridges), axis=1)]
             best = int(errors.argmin())
             value = float(errors[best]) / len(task.folds)
-            row = {"number": number, "params": {"delays": seconds, "ridge": ridges[best]}, "value": value, "epochs": 0}
-            row |= {"state": "complete" if np.isfinite(value) else "diverged", "seconds": time.perf_counter() - start}
-            rows.append(row)
+            rows.append(row_of(number, {"delays": seconds, "ridge": ridges[best]}, value, start))
         complete = [row for row in rows if row["state"] == "complete"]
         if not complete:
             return Fitted(None, rows, time.perf_counter() - begin)
@@ -221,7 +222,13 @@ class HankelDMD(Searched):
         return Fitted(corrector, rows, time.perf_counter() - begin)
 
     def _law(
-        self, task: Task, table: Mapping[str, Array], steps: TrueSteps, chosen: Index, seconds: float, ridges: list[float]
+        self,
+        task: Task,
+        table: Mapping[str, Array],
+        steps: TrueSteps,
+        chosen: Index,
+        seconds: float,
+        ridges: list[float],
     ) -> Law:
         """The law on the chosen steps, for each ridge."""
         here = {key: values[chosen] for key, values in table.items()}
@@ -244,7 +251,9 @@ def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[st
     """Inputs (N,) of the law at the true steps: what came before them is the past and the horizon of their windows."""
     windows, case = task.windows, task.cases[name]
     if windows.num_past < delays:
-        raise DataError(f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past")
+        raise DataError(
+            f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past"
+        )
     first = windows.num_past - delays
     before: dict[str, Array] = {}
     for key in MOTIONS:
@@ -263,6 +272,8 @@ def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[st
             past = _missed_before(case.physics, instants, delays)[axis]
             before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])
     at = delays + steps.number
-    chosen = {key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)]) for key, values in before.items()}
-    table: dict[str, Array] = delayed(steps.at.columns, chosen, delays, task.commands)
-    return table
+    chosen = {
+        key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)])
+        for key, values in before.items()
+    }
+    return delayed(steps.at.columns, chosen, delays, task.commands)

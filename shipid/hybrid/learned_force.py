@@ -2,8 +2,9 @@
 
 M nu_dot = (forces of the vessel) + tau(u, v, r), tau = tau_max tanh(c h(u, v, r)), the term `hull.learned`. Its numbers
 minimise the mean squared position error over the horizon plus a ridge on them, by L-BFGS on exact gradients of the
-rollout, from output weights that a ridge regression on the forces of single true steps gives. A network inside an equation: universal differential equations (Rackauckas et al. 2020); a network as the
-damping of a ship: van de Ven et al. (2007).
+rollout; output weights start from a ridge regression on the forces that single true steps miss. A network inside an
+equation: universal differential equations (Rackauckas et al. 2020); a network as the damping of a ship: van de Ven et
+al. (2007).
 """
 
 from __future__ import annotations

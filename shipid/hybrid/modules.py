@@ -36,6 +36,7 @@ from shipid.hybrid.units import (
     part_of,
     points_of,
     ridges_of,
+    row_of,
     solve,
     some_of,
     sound,
@@ -64,7 +65,8 @@ def modules_of(physics: Physics) -> dict[str, tuple[str, ...]]:
 
 def without(physics: Physics) -> list[Physics]:
     """The physics without the first module, without the first two, ... of `modules_of`."""
-    found, off = [], {}
+    found: list[Physics] = []
+    off: dict[str, bool] = {}
     for paths in modules_of(physics).values():
         off |= {f"{path}.off": True for path in paths}
         found.append(physics.with_values(off))
@@ -180,7 +182,10 @@ class ModulesCorrector:
         """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
         units = Units.from_arrays(header["units"], part_of(arrays, "units."))
         weights, centres = taken(arrays, "weights"), taken(arrays, "centres")
-        if weights.shape != (len(header["modules"]), len(units.offset) + 1) or centres.shape[1:] != units.weight.shape[:1]:
+        if (
+            weights.shape != (len(header["modules"]), len(units.offset) + 1)
+            or centres.shape[1:] != units.weight.shape[:1]
+        ):
             raise ResultError("the arrays of the saved method do not fit together", path="weights")
         return cls(
             tuple(header["commands"]),
@@ -241,7 +246,9 @@ class Modules(Searched):
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         modules = tuple(modules_of(physics))
         if not modules:
-            raise ResultError("the vessel has no hull, thruster or rudder whose factor could be learned", path="modules")
+            raise ResultError(
+                "the vessel has no hull, thruster or rudder whose factor could be learned", path="modules"
+            )
         parts = shares(without(physics), steps.at, steps.free, steps.step)
         rows: list[dict[str, Any]] = []
         for number, point in enumerate(points_of(self)):
@@ -255,9 +262,7 @@ class Modules(Searched):
                 errors += [mean_square(path, task.windows.future[:, judged]) for path in paths]
             best = int(errors.argmin())
             value = float(errors[best]) / len(task.folds)
-            row = {"number": number, "params": {**point, "ridge": ridges[best]}, "value": value, "epochs": 0}
-            row |= {"state": "complete" if np.isfinite(value) else "diverged", "seconds": time.perf_counter() - start}
-            rows.append(row)
+            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
         complete = [row for row in rows if row["state"] == "complete"]
         if not complete:
             return Fitted(None, rows, time.perf_counter() - begin)

@@ -1,8 +1,9 @@
 """One step: networks of state, commands and wind that give the acceleration the physics misses, at every step.
 
-nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f trained on what single steps of the physics from
-true states miss (without physics: on the acceleration itself); heading and position are the trapezoid of the velocities.
-Skulstad et al. (2021) train a network by gradients; here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
+nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f trained on what single steps of the physics
+from true states miss (without physics: on the acceleration itself); heading and position are the trapezoid of the
+velocities. Skulstad et al. (2021) train a network by gradients; here f(z) = W tanh(V z + c) with V, c drawn and W in
+closed form.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from shipid.hybrid.units import (
     part_of,
     points_of,
     ridges_of,
+    row_of,
     solve,
     some_of,
     sound,
@@ -82,7 +84,7 @@ class OneStepCorrector:
 
         def acceleration(at: Instants, _: int, __: Array) -> Array:
             table = feature_table(at.columns, self.commands)
-            return np.mean([head.acceleration(table) for head in self.heads], axis=0)
+            return np.asarray(np.mean([head.acceleration(table) for head in self.heads], axis=0))
 
         return stepped_paths(physics, instants, acceleration)
 
@@ -172,9 +174,7 @@ class OneStep(Searched):
                 errors += self._errors(task, name, head, some_of(validation, self.samples, seed_of(task.seed, fold)))
             best = int(errors.argmin())
             value = float(errors[best]) / len(task.folds)
-            row = {"number": number, "params": {**point, "ridge": ridges[best]}, "value": value, "epochs": 0}
-            row |= {"state": "complete" if np.isfinite(value) else "diverged", "seconds": time.perf_counter() - start}
-            rows.append(row)
+            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
         kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
         if not kept:
             return Fitted(None, rows, time.perf_counter() - begin)

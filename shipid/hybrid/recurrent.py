@@ -1,10 +1,11 @@
 """Recurrent: a gated recurrent unit reads the past, and gives the compensation of the path.
 
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
-[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are known,
-the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path, early stopping on the validation windows; the mean of the networks of the folds
-is the corrector. With mirror, x is even and y odd under the exchange of port and starboard, by construction. The usual
-deep rival of physics (Cho et al. 2014 for the unit); PyTorch trains it, plain arrays predict.
+[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are
+known, the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path,
+early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even and y
+odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014); PyTorch
+trains it, plain arrays predict.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, part_of, points_of, sound, taken
+from shipid.hybrid.units import diverged, mean_square, part_of, points_of, row_of, sound, taken
 
 Array = NDArray[np.float64]
 LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
@@ -34,7 +35,7 @@ LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
 
 @dataclass(frozen=True)
 class Sequences:
-    """What a network reads, normalised: the past (P + 1, S, d), the instant among it, and inputs at the instant (S, e)."""
+    """What a network reads, normalised: the past with the instant (P + 1, S, d), and inputs at the instant (S, e)."""
 
     past: Array
     now: Array
@@ -136,7 +137,12 @@ class RecurrentCorrector:
             "inputs": self.inputs.header(),
             "past": self.past,
             "networks": [
-                {"past": list(r.past.names), "now": list(r.now.names), "steps": r.steps, "mirror": r.mirrors is not None}
+                {
+                    "past": list(r.past.names),
+                    "now": list(r.now.names),
+                    "steps": r.steps,
+                    "mirror": r.mirrors is not None,
+                }
                 for r in readers
             ],
             "hyperparameters": dict(self.hyperparameters),
@@ -227,7 +233,7 @@ class Recurrent(Searched):
     def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
         from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
 
-        begin, rows, trained = time.perf_counter(), [], []
+        begin, rows, trained = time.perf_counter(), list[dict[str, Any]](), []
         basis = smooth_basis(task.windows.horizon, self.terms)
         targets = task.targets[name]
         for number, point in enumerate(points_of(self)):
@@ -240,10 +246,7 @@ class Recurrent(Searched):
                 losses.append(mean_square(predicted, targets[:, validation]))
                 networks.append(network)
                 most = max(most, epochs)
-            value = float(np.mean(losses))
-            row = {"number": number, "params": point, "value": value, "epochs": most}
-            row |= {"state": "complete" if np.isfinite(value) else "diverged", "seconds": time.perf_counter() - start}
-            rows.append(row)
+            rows.append(row_of(number, point, float(np.mean(losses)), start, most))
             trained.append(tuple(networks))
         best = min(rows, key=lambda row: row["value"])
         if best["state"] != "complete":
@@ -327,13 +330,13 @@ def _train(
         return torch.as_tensor(values, dtype=torch.float32)
 
     generator = torch.Generator().manual_seed(seed)
-    first = data[0][0]
+    begun = data[0][0]
     shapes = {
-        "W_i": (3 * units, first.past.shape[2]),
+        "W_i": (3 * units, begun.past.shape[2]),
         "W_h": (3 * units, units),
         "b_i": (3 * units,),
         "b_h": (3 * units,),
-        "W_1": (units, units + first.now.shape[1]),
+        "W_1": (units, units + begun.now.shape[1]),
         "c_1": (units,),
         "W_2": (data[0][2].shape[1], units),
         "c_2": (data[0][2].shape[1],),
@@ -355,18 +358,20 @@ def _train(
         flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
         _, hidden = torch.gru(past, torch.zeros(1, now.shape[0], units), flat, True, 1, 0.0, False, False, False)
         full = torch.cat([hidden[0], now], dim=1)
-        found = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        found: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
         if len(seen) == 1:
             return found
         plain, image = found.chunk(2)
-        return (plain + sign * image) / 2
+        both: torch.Tensor = (plain + sign * image) / 2
+        return both
 
     optimiser = torch.optim.AdamW(layers.values(), lr=learning_rate, weight_decay=method.weight_decay)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, method.epochs)
     seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
     for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is told
-        for rows in torch.randperm(len(outputs), generator=generator).split(method.batch):
+        order = torch.randperm(len(outputs), generator=generator)
+        for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
             optimiser.zero_grad()
             loss = (forward([(past[:, rows], now[rows]) for past, now in seen]) - outputs[rows]).square().mean()
             loss.backward()  # type: ignore[no-untyped-call]

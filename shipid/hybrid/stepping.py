@@ -72,7 +72,7 @@ def stepped_paths(physics: Physics, instants: Instants, acceleration: Accelerati
             at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
             after = free(physics, at)
             after = after + step * acceleration(at, k, after)
-            after = np.where((np.abs(after) <= LIMIT).all(axis=1)[:, None], after, np.nan)
+            after = np.where((np.abs(after) <= LIMIT).all(axis=1, keepdims=True), after, np.nan)
             psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
             place = place + step / 2 * (_turned(nu, psi - first) + _turned(after, psi_after - first))
             nu, psi = after, psi_after

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, log
@@ -33,7 +34,7 @@ class Seen:
 
     @classmethod
     def of(cls, table: Mapping[str, Array], mirror: bool) -> Self:
-        """Choose inputs and take their statistics from training samples (S,) by name; with a mirror, and their images."""
+        """Choose inputs and take their statistics from training samples (S,) by name, with their images if mirrored."""
         features = choose_features(table)
         names = tuple(features)
         values = np.stack([table[name] for name in names], axis=1)
@@ -140,6 +141,16 @@ def diverged(points: Sequence[Mapping[str, float]]) -> Fitted:
     """The result where the physics is not finite: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
     return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(points)], 0.0)
+
+
+def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
+    """The row of a trial that began at `start` by `time.perf_counter`."""
+    state = "complete" if np.isfinite(value) else "diverged"
+    seconds = time.perf_counter() - start
+    return {
+        **{"number": number, "params": dict(params), "value": value},
+        **{"seconds": seconds, "epochs": epochs, "state": state},
+    }
 
 
 def used(task: Task) -> Index:

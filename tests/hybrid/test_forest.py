@@ -7,7 +7,6 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.hybrid.forest import Forest, Trees
-from shipid.hybrid.physics import Physics
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
 
@@ -21,7 +20,7 @@ def stairs(columns):
 
 def test_home_an_error_that_jumps():
     pytest.importorskip("sklearn")
-    here = missed(world(ship(), ship()), lambda world_, windows: stairs(windows.columns))
+    here = missed(world(ship(), ship()), lambda _, windows: stairs(windows.columns))
     assert here.removed(fitted(Forest(), here)) > 0.8
 
 

@@ -95,7 +95,10 @@ def test_a_foundation_does_not_notice_its_company(kind, here):
     for name, physics in others(here, kind).items():
         alone = quick(kind).fit(here.task({name: physics}))[name]
         np.testing.assert_allclose(
-            predicted(here, alone, physics), predicted(here, together[name], physics), rtol=0, atol=IN_STACKS.get(kind, CLOSE)
+            predicted(here, alone, physics),
+            predicted(here, together[name], physics),
+            rtol=0,
+            atol=IN_STACKS.get(kind, CLOSE),
         )
 
 
@@ -153,7 +156,9 @@ def test_windows_that_are_in_no_fold_are_not_seen(kind, here):
     task = here.task()
     training, validation = task.folds[0]
     task = replace(task, folds=[(training[5:], validation)])
-    spoilt = replace(here.train, future=here.train.future.copy(), states={k: v.copy() for k, v in here.train.states.items()})
+    spoilt = replace(
+        here.train, future=here.train.future.copy(), states={k: v.copy() for k, v in here.train.states.items()}
+    )
     outside = training[:5]
     spoilt.future[:, outside] = 1e3
     for values in spoilt.states.values():

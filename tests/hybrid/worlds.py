@@ -38,7 +38,9 @@ class World:
     known: bool = False
 
     def task(self, physics: Mapping[str, Physics] | None = None, **changes: object) -> Task:
-        cases = {name: case_of(one, self.train, self.known) for name, one in (physics or {"physics": self.physics}).items()}
+        cases = {
+            name: case_of(one, self.train, self.known) for name, one in (physics or {"physics": self.physics}).items()
+        }
         return replace(Task(cases, self.train, folds_of(self.train), self.commands, self.known), **changes)
 
     def removed(self, corrector: Corrector, physics: Physics | None = None) -> float:
