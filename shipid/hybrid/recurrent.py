@@ -3,9 +3,9 @@
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
 [dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are
 known, the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path,
-early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even and y
-odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014); PyTorch
-trains it, plain arrays predict.
+early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even
+and y odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014);
+PyTorch trains it, plain arrays predict.
 """
 
 from __future__ import annotations
