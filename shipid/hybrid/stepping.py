@@ -1,7 +1,8 @@
 """Velocities one step at a time: what a step of the physics misses, and paths on which something is added to each step.
 
-After a step the velocities are those of the physics plus step x a, with a the missing acceleration; heading and
-position are the trapezoid of the velocities. Without a vessel the physics leaves the velocities as they are.
+After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where the physics
+is integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a; by `euler`, which errs there by half a
+step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
 """
 
 from __future__ import annotations
@@ -50,11 +51,19 @@ class Stepper:
 
 def free(physics: Physics, at: Instants) -> Array:
     """Velocities u, v, r (S, 3) that the physics alone says after one step from `at`."""
+    return _one_step(physics, at)[0]
+
+
+def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
+    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
     if physics.vessel is None:
-        return np.stack([at.columns[name] for name in MOTIONS], axis=1)
+        return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
     engine = "native" if len(at) * physics.horizon > WORTH_COMPILING and compiler() is not None else "auto"
     found = replace(physics, horizon=1).states(at, engine=engine)
-    return np.stack([found[name][0] for name in MOTIONS], axis=1)
+    after = np.stack([found[name][0] for name in MOTIONS], axis=1)
+    if physics.integrator == "euler":
+        return after, None
+    return after, np.stack([found["x"][0], found["y"][0], found["psi"][0] - at.columns["psi"]], axis=1)
 
 
 def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
@@ -70,11 +79,17 @@ def stepped_paths(physics: Physics, instants: Instants, acceleration: Accelerati
     with np.errstate(all="ignore"):  # a diverged path is not finite, and no news to the caller
         for k in range(physics.horizon):
             at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
-            after = free(physics, at)
-            after = after + step * acceleration(at, k, after)
+            alone, way = _one_step(physics, at)
+            more = acceleration(at, k, alone)
+            after = alone + step * more
             after = np.where((np.abs(after) <= LIMIT).all(axis=1, keepdims=True), after, np.nan)
-            psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
-            place = place + step / 2 * (_turned(nu, psi - first) + _turned(after, psi_after - first))
+            if way is None:
+                psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
+                place = place + step / 2 * (_turned(nu, psi - first) + _turned(after, psi_after - first))
+            else:
+                way = way + step**2 / 2 * more + 0 * after  # not finite where the path has diverged
+                psi_after = psi + way[:, 2]
+                place = place + _turned(way, psi - first)
             nu, psi = after, psi_after
             found.append(place)
     return np.stack(found)
