@@ -18,18 +18,29 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.data.dataset import Dataset as Dataset
     from shipid.data.dataset import read_dataset as read_dataset
     from shipid.data.dataset import write_dataset as write_dataset
+    from shipid.data.windows import Instants as Instants
     from shipid.data.windows import Windows as Windows
     from shipid.data.windows import cut_windows as cut_windows
     from shipid.engine.rollout import Trajectories as Trajectories
     from shipid.engine.rollout import rollout as rollout
     from shipid.errors import ShipidError as ShipidError
+    from shipid.hybrid.alone import Alone as Alone
+    from shipid.hybrid.learned_force import LearnedForce as LearnedForce
+    from shipid.hybrid.method import Case as Case
+    from shipid.hybrid.method import Fitted as Fitted
+    from shipid.hybrid.method import Task as Task
+    from shipid.hybrid.path_drawn import PathDrawn as PathDrawn
+    from shipid.hybrid.path_trained import PathTrained as PathTrained
+    from shipid.hybrid.physics import Physics as Physics
     from shipid.identification.outcome import run_identification as run_identification
     from shipid.identification.settings import Identify as Identify
     from shipid.identification.solve import identify as identify
     from shipid.logs.guess.columns import guess as guess
     from shipid.logs.importing import import_log as import_log
     from shipid.logs.mapping import read_mapping as read_mapping
+    from shipid.metrics import position_error as position_error
     from shipid.predictor import Predictor as Predictor
+    from shipid.predictor import fit as fit
     from shipid.simulation.measured import measure_standard as measure_standard
     from shipid.simulation.perform import perform as perform
     from shipid.simulation.standard import standard as standard
@@ -54,14 +65,23 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
 
 
 _PUBLIC = {
+    "Alone": "shipid.hybrid.alone",
+    "Case": "shipid.hybrid.method",
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
+    "Fitted": "shipid.hybrid.method",
     "Identify": "shipid.identification.settings",
+    "Instants": "shipid.data.windows",
+    "LearnedForce": "shipid.hybrid.learned_force",
+    "PathDrawn": "shipid.hybrid.path_drawn",
+    "PathTrained": "shipid.hybrid.path_trained",
     "Perturbation": "shipid.vessel.perturb",
+    "Physics": "shipid.hybrid.physics",
     "Plan": "shipid.study.plan",
     "Predictor": "shipid.predictor",
     "Results": "shipid.study.results",
     "ShipidError": "shipid.errors",
+    "Task": "shipid.hybrid.method",
     "Trajectories": "shipid.engine.rollout",
     "Truth": "shipid.simulation.truth",
     "Variant": "shipid.vessel.perturb",
@@ -72,6 +92,7 @@ _PUBLIC = {
     "draw": "shipid.vessel.perturb",
     "events": "shipid.study.start",
     "figures": "shipid",
+    "fit": "shipid.predictor",
     "guess": "shipid.logs.guess.columns",
     "identify": "shipid.identification.solve",
     "import_log": "shipid.logs.importing",
@@ -79,6 +100,7 @@ _PUBLIC = {
     "measure_standard": "shipid.simulation.measured",
     "members": "shipid.vessel.perturb",
     "perform": "shipid.simulation.perform",
+    "position_error": "shipid.metrics",
     "read_dataset": "shipid.data.dataset",
     "read_mapping": "shipid.logs.mapping",
     "read_plan": "shipid.study.plan",

@@ -1,4 +1,4 @@
-"""Plain nested data: read TOML, find the bundled documents, get / replace / match by dotted path, digest."""
+"""Documents as nested data: read TOML, find bundled documents, get / replace / match by dotted path, digest."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def find(name: str, kind: str, relative_to: Path | None = None) -> Path:
         label = {"models": "vessel", "studies": "study", "studies/mappings": "mapping"}[kind]
         raise DocumentError(
             f"no {label} of this name comes with shipid: {choices(name, available)}; "
-            "a file of your own needs a slash or the ending .toml",
+            "a path to another file needs a slash or the ending .toml",
             path=name,
         )
     return available[name]
 
 
 def read(file: Path | str) -> Document:
-    """Read a TOML document; refuses duplicate keys, bad syntax and bad encoding with one line each."""
+    """Read a TOML document; DocumentError for duplicate keys, invalid syntax or a wrong encoding."""
     try:
         text = Path(file).read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
@@ -71,7 +71,7 @@ def digest(document: Any) -> str:
 
 
 def merge(under: Document, over: Document) -> Document:
-    """A new document: `over` laid on `under`, table by table; anything else in `over` replaces what is there."""
+    """A new document: tables of both are merged; any other value in `over` replaces that in `under`."""
     result = dict(under)
     for key, value in over.items():
         below = result.get(key)
@@ -114,41 +114,41 @@ def get(document: Any, path: str) -> Any:
 
 
 def replace(document: Any, changes: Mapping[str, Any]) -> Any:
-    """A new document with the values at the given dotted paths replaced or added; it shares what is not on them."""
+    """A new document with the values at the given dotted paths replaced or added; other parts are shared."""
     result = copy.copy(document)
-    own = {id(result)}
+    copied = {id(result)}
     for path, value in changes.items():
         *parents, last = parts(path)
         node = result
         for part in parents:
             key: Any = int(part) if isinstance(node, list) else part
             below = node[key] if isinstance(node, list) else node.setdefault(key, {})
-            if id(below) not in own:
+            if id(below) not in copied:
                 node[key] = below = copy.copy(below)
-                own.add(id(below))
+                copied.add(id(below))
             node = below
         node[int(last) if isinstance(node, list) else last] = value
     return result
 
 
 def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
-    """Paths that match a pattern in which `*` stands for any run of characters, dots included."""
+    """Paths that match a pattern; `*` matches any characters, also dots."""
     expression = re.compile(".*".join(re.escape(piece) for piece in pattern.split("*")))
     return [path for path in paths if expression.fullmatch(path)]
 
 
 def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
-    """Validate plain data by a pydantic model; the first complaint becomes one line with path, value and remedy.
+    """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
-    An unknown key is told before a missing one: it is most often the same key, mistyped.
+    An unknown key is reported before a missing one, because it is usually the missing key, mistyped.
     """
     from pydantic import ValidationError
 
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        first = next((entry for entry in found if entry["type"] == "extra_forbidden"), found[0])
+        problems = error.errors(include_url=False)
+        first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])
         path = ".".join(filter(None, (prefix, *_place(data, first["loc"]))))
         if first["type"] == "extra_forbidden":
             message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
@@ -191,7 +191,7 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
 
 
 def _alternatives(annotation: Any) -> list[Any]:
-    """Members of a union, seen through Annotated and None."""
+    """Member types of a union, also inside Annotated; None is one of them if optional."""
     if get_origin(annotation) is Annotated:
         return _alternatives(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):

@@ -1,4 +1,4 @@
-"""The error tree: everything a user can mend, in one line each."""
+"""Errors that a user can correct; each is one line with file, path, problem and remedy."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ LONGEST = 500  # characters of one part of a message
 
 
 class ShipidError(Exception):
-    """Something the user can mend: where it stands, what is wrong, what would be right.
+    """An error that the user can correct: where it is, what is wrong, what would be right.
 
     Parameters
     ----------
     message : what is wrong and what would be right, one sentence.
-    file : the document or log that holds it.
+    file : the document or log with the error.
     path : dotted path, column or row inside the file.
     """
 
@@ -29,16 +29,16 @@ class ShipidError(Exception):
         parts = [part for part in (self.file, self.path, self.message) if part]
         return ": ".join(_legible(" ".join(part.split())) for part in parts)
 
-    def __reduce__(self) -> tuple[object, ...]:  # workers send errors home
+    def __reduce__(self) -> tuple[object, ...]:  # errors of worker processes are pickled
         return (_rebuild, (type(self), self.message, self.file, self.path))
 
 
 class DocumentError(ShipidError):
-    """A TOML document (vessel, study, mapping, patch) that cannot be read as what it claims to be."""
+    """A TOML document (vessel, study, mapping, patch) that is invalid."""
 
 
 class DataError(ShipidError):
-    """A log or dataset that does not hold what its mapping or schema says."""
+    """A log or dataset that does not agree with its mapping or schema."""
 
 
 class ResultError(ShipidError):
@@ -50,13 +50,13 @@ def _rebuild(cls: type[ShipidError], message: str, file: str | None, path: str |
 
 
 def _legible(text: str) -> str:
-    """One printable line: what a file holds must neither steer a terminal nor flood it."""
+    """The text as printable characters, shortened: contents of a file must not control or flood a terminal."""
     shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 
 def choices(value: str, valid: Iterable[str], limit: int = 12) -> str:
-    """Say what would have been right: `did you mean 'x'?` or the list of valid names."""
+    """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names."""
     names = sorted(valid)
     close = get_close_matches(value, names, n=1)
     if close:

@@ -2,7 +2,7 @@
 
 Figures of a study take `Results` (as `shipid.run` and `shipid.read_results` return them), the content of a report, or
 simple frames: the table of cells alone, or a dict of frames by the names of `ReportContent`. A table of cells needs
-the columns model, N_D and H [m]; whatever else is absent is left open. Figures of an identification take its outcome,
+the columns model, N_D and H [m]; other columns may be absent. Figures of an identification take its outcome,
 those of a manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
 
 All of them raise ShipidError where there is nothing to draw or an option does not exist, and take `dark=True` for
@@ -186,7 +186,7 @@ def spiral(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Fig
 def content_of(source: Source) -> ReportContent:
     """Return what a report shows: from results, from frames by name, or from the table of cells alone.
 
-    Assembling it from results takes a moment: whoever draws many figures calls this once and draws from the content.
+    Assembling it from results takes a moment: to draw many figures, call this once and draw from the content.
     Raises ShipidError for frames that the report does not know, or a table of cells without model, N_D or H.
     """
     if isinstance(source, ReportContent):

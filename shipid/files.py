@@ -25,7 +25,7 @@ TABLES = (".parquet", ".csv")
 
 @contextmanager
 def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path with the target's name; on success it replaces the target, on an error it is removed.
+    """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
     The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, so that a
     power cut leaves the old file or the new one. Raises OSError where the place cannot be written.

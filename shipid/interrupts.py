@@ -12,7 +12,7 @@ _holding: list[list[int]] = []  # the outermost call that holds interrupts back,
 
 @contextmanager
 def uninterrupted() -> Iterator[list[int]]:
-    """Hold back Ctrl-C until the block ends: inside CasADi it would turn into a complaint about arguments.
+    """Hold back Ctrl-C until the block ends: inside CasADi it would become an error about arguments.
 
     Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
     one holds. Raises KeyboardInterrupt at the end of the block if Ctrl-C was pressed, also where the block failed.

@@ -1,6 +1,6 @@
-"""Arrays in, named numbers out: how far a predicted path is from the true one.
+"""Measures of the distance between predicted and true paths: arrays in, named numbers out.
 
-Errors have the shape (T, S): horizon step first, window last. A member that diverged is said so, never averaged away.
+Errors have the shape (T, S): horizon step first, window last. A divergence is reported in the status, never averaged.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class Summary(TypedDict):
 
 
 def position_error(predicted: Array, true: Array) -> Array:
-    """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15), in whatever frame both are."""
+    """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15); both in one frame."""
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
         raise ValueError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
-    # order C: a sum over errors must not depend on how the paths happen to lie in memory
+    # order C: a sum over errors must not depend on the memory layout of the paths
     return np.hypot(predicted[..., 0] - true[..., 0], predicted[..., 1] - true[..., 1], order="C")
 
 
@@ -59,20 +59,20 @@ FIRST = (1023 + OCTAVES[0]) * BINS_AN_OCTAVE  # number of the bin that begins at
 
 
 def tally(error: Array) -> NDArray[np.uint32]:
-    """Count errors of any shape [m] by size: the bins (BINS,) of a geometric scale; what lies beyond joins the ends."""
+    """Histogram (BINS,) of errors [m] of any shape on a geometric scale; values beyond it count in the end bins."""
     kept = np.where(error > LEAST, np.minimum(error, MOST), LEAST)
     bins = (np.ascontiguousarray(kept).view(np.int64) >> SHIFT) - FIRST
     return np.bincount(bins.ravel(), minlength=BINS).astype(np.uint32)
 
 
 def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
-    """Return the quantile [m] of errors that were counted (..., BINS), to the width of a bin: 0.2 % or better."""
+    """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally`; accurate to a bin, 0.2 %."""
     running = np.cumsum(counts, axis=-1, dtype=float)
     place = share * (running[..., -1:] - 1)
-    found = (running <= place).sum(axis=-1, keepdims=True)
-    here = np.take_along_axis(counts, found, axis=-1)
-    inside = (place - np.take_along_axis(running, found, axis=-1) + here + 0.5) / here
-    octave, step = np.divmod(found + np.clip(inside, 0, 1), BINS_AN_OCTAVE)
+    bin_index = (running <= place).sum(axis=-1, keepdims=True)
+    here = np.take_along_axis(counts, bin_index, axis=-1)
+    inside = (place - np.take_along_axis(running, bin_index, axis=-1) + here + 0.5) / here
+    octave, step = np.divmod(bin_index + np.clip(inside, 0, 1), BINS_AN_OCTAVE)
     quantile: Array = (2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))[..., 0]
     return quantile
 
@@ -121,7 +121,7 @@ def _ranks(values: Array) -> Array:
 def median_slope(x: Array, y: Array) -> float:
     """Return the median slope of y over x (n,) over all pairs of points (Theil 1950, Sen 1968).
 
-    One point far off bends it little. NaN where no two x differ.
+    It is robust against single outliers. NaN if all x are equal.
     """
     i, j = np.triu_indices(len(x), k=1)
     apart = x[i] != x[j]

@@ -55,6 +55,7 @@ NUMBERS = (
 COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
 GRAVITY = 9.81  # m/s^2
+DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -73,7 +74,7 @@ class Observer(BaseModel):
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
-    ] = (2e-4,)
+    ] = (1e-5, 2e-4)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
     ] = 10.0
@@ -241,12 +242,22 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
     given = [part if i in (0, 6) else ca.repmat(part, 1, num_filters) for i, part in enumerate(inputs)]
     after, estimate, innovation, spread = one.map(num_filters)(*given)
-    likelihood = after[-1, :]
+    sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
+    after = _finite(after)
+    likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)
     weights = ca.exp(likelihood - ca.mmax(likelihood)).T
     weights = weights / ca.sum1(weights)
-    results = [after, estimate @ weights, innovation @ weights, spread @ weights, weights]
+    best = likelihood == ca.mmax(likelihood)
+    likely = after @ (best / ca.sum2(best)).T
+    after = after * ca.repmat(sound, after.size1(), 1) + likely @ (1 - sound)  # a filter that diverged begins again
+    results = [after, *(_finite(part) @ weights for part in (estimate, innovation, spread)), weights]
     names = [one.name_in(i) for i in range(one.n_in())]
     return ca.Function("observer", inputs, results, names, ["after", "estimate", "innovation", "spread", "weights"])
+
+
+def _finite(matrix: ca.MX) -> ca.MX:
+    """The matrix within +-DIVERGED; what is not a number becomes a bound, since fmax and fmin leave NaN out."""
+    return ca.fmin(ca.fmax(matrix, -DIVERGED), DIVERGED)
 
 
 def _symmetric(matrix: SX) -> SX:
@@ -419,6 +430,52 @@ def start(columns: Mapping[str, Array]) -> dict[str, Array]:
     return {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
 
 
+@dataclass(frozen=True)
+class ObservedStart:
+    """What the physics starts from with an observer, for S instants and T steps.
+
+    columns : (S,) the filtered state through the water, in place of the measured one.
+    environment : wind relative to the moving water, name -> (S,); the current itself is zero.
+    tau_extra : (T, S, 3) slow force [N, N m] over the horizon.
+    drift : (2, S) velocity of the water towards north and east [m/s], to be added to the path.
+    """
+
+    columns: dict[str, Array]
+    environment: dict[str, Array]
+    tau_extra: Array
+    drift: Array
+
+
+def observed_start(
+    filters: Bank,
+    columns: Mapping[str, Array],
+    horizon: int,
+    step: float,
+    path: Literal["position", "velocity"] = "position",
+) -> ObservedStart:
+    """The filtered state, the wind and the slow force that a rollout in moving water takes.
+
+    Parameters
+    ----------
+    columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
+    path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
+    """
+    model, zero = filters.model, np.zeros(len(columns["u"]))
+    begun = start(columns)
+    if path == "velocity":
+        begun |= {name: columns.get(name, zero) for name in ("north", "east")}
+    north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
+    begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)
+    begun["v"] = begun["v"] + north * np.sin(psi) - east * np.cos(psi)
+    environment = {name: columns.get(name, zero) for name in model.environment}
+    if "V_w" in environment:
+        V_w, beta_w = environment["V_w"], environment["beta_w"]
+        ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
+        environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
+    environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
+    return ObservedStart(begun, environment, tau_extra(filters, columns, horizon, step), np.stack([north, east]))
+
+
 def observed_paths(
     filters: Bank,
     columns: Mapping[str, Array],
@@ -438,31 +495,17 @@ def observed_paths(
     ----------
     columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
     planned : known commands, name -> (T, S); default: held.
-    path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
+    path : as in `cut_windows`.
     """
-    model, zero = filters.model, np.zeros(len(columns["u"]))
-    begun = start(columns)
-    if path == "velocity":
-        begun |= {"north": zero, "east": zero}
-    north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
-    begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)
-    begun["v"] = begun["v"] + north * np.sin(psi) - east * np.cos(psi)
-    environment = {name: columns.get(name, zero) for name in model.environment}
-    if "V_w" in environment:
-        V_w, beta_w = environment["V_w"], environment["beta_w"]
-        ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
-        environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
-    environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
-    found = rollout(
-        filters.vessel, begun, {**columns, **(planned or {})}, environment, step=step, num_steps=horizon,
-        method=method, memory=memory, tau_extra=tau_extra(filters, columns, horizon, step), keep=("north", "east"),
+    begun = observed_start(filters, columns, horizon, step, path)
+    result = rollout(
+        filters.vessel, begun.columns, {**columns, **(planned or {})}, begun.environment, step=step, num_steps=horizon,
+        method=method, memory=memory, tau_extra=begun.tau_extra, keep=("north", "east"),
     )  # fmt: skip
-    ages = step * np.arange(1, horizon + 1)[:, None]
-    north0, east0 = (zero, zero) if path == "velocity" else (columns["north"], columns["east"])
-    x, y = to_frame(
-        found["north"][1:, 0] + ages * north, found["east"][1:, 0] + ages * east, north0, east0, columns["psi"]
-    )
-    return np.stack([x, y], axis=-1), found.diverged[0]
+    ages, zero = step * np.arange(1, horizon + 1)[:, None], np.zeros(len(columns["u"]))
+    north, east = result["north"][1:, 0] + ages * begun.drift[0], result["east"][1:, 0] + ages * begun.drift[1]
+    x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
+    return np.stack([x, y], axis=-1), result.diverged[0]
 
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:

@@ -5,23 +5,25 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
-from shipid.data.windows import Commands, Instants
-from shipid.errors import DataError, ResultError
+from shipid.data.windows import Commands, Instants, Windows, fold_masks, part_folds, split_runs
+from shipid.errors import DataError, ResultError, choices
 from shipid.files import read_arrays, write_arrays
-from shipid.hybrid.method import Corrector
-from shipid.hybrid.methods import METHODS
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task
+from shipid.hybrid.methods import METHODS, kind_of
+from shipid.hybrid.physics import Physics, check_columns
+from shipid.observer import Observer
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
 FORMAT = 4
+VALIDATION_SHARE = 0.2  # of the runs; Kanazawa et al. 2022, section 4
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Predictor:
     limits : column -> (least, greatest) seen in training: the region where the method has evidence.
     commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
         in force in each step, `Instants.planned`, name -> (T, S).
-    path : where positions of the past come from: logged positions, or the integral of u, v, psi.
+    causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
     """
 
     physics: Physics
@@ -43,7 +45,7 @@ class Predictor:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     commands: Commands = "held"
-    path: Literal["position", "velocity"] = "position"
+    causal: tuple[str, ...] = ()
 
     @property
     def vessel(self) -> Vessel | None:
@@ -101,7 +103,9 @@ class Predictor:
             "step": self.physics.step,
             "integrator": self.physics.integrator,
             "commands": self.commands,
-            "path": self.path,
+            "causal": list(self.causal),
+            "path": self.physics.path,
+            "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "provenance": dict(self.provenance),
             "method": self.method,
@@ -137,15 +141,100 @@ class Predictor:
                     int(header["horizon"]),
                     float(header["step"]),
                     header["integrator"],
+                    None if header["observer"] is None else Observer(**header["observer"]),
+                    header["path"],
                 ),
                 method=header["method"],
                 corrector=METHODS[header["method"]].corrector.from_arrays(header["corrector"], arrays),
                 limits={name: (low, high) for name, (low, high) in header["limits"].items()},
                 provenance=dict(header["provenance"]),
                 commands=header["commands"],
-                path=header["path"],
+                causal=tuple(header["causal"]),
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
         except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             raise ResultError("damaged: run the study again", file=file) from None
+
+
+def fit(
+    method: Method,
+    physics: Physics,
+    windows: Windows,
+    *,
+    validation_runs: Iterable[str] | None = None,
+    commands: Commands = "held",
+    seed: int = 0,
+) -> Predictor:
+    """Fit a method on windows and return a predictor that is ready to predict and to save.
+
+    Windows say nothing of the actuators, so each is taken as having reached its order at the instant of prediction.
+
+    Parameters
+    ----------
+    method : the method with its settings, such as `PathDrawn()`.
+    physics : the vessel with its numbers, or none, with horizon and step of the windows.
+    windows : windows that train and validate; keep test runs out of them.
+    validation_runs : names of the runs that validate; the other runs train. None splits by the method's `validation`:
+        every run validates in turn (`runs`), or a fifth of the runs, drawn by `seed`, validates (`share`). A single run
+        is split in time.
+    commands : `held` at their value at the instant, or `known` over the horizon.
+    seed : of all that is random.
+
+    Raises
+    ------
+    DataError : physics and windows differ in horizon or step; the windows hold too short a past, lack a command of the
+        vessel or are too few to be split; the physics has an observer; the physics or the training diverges.
+    """
+    if (physics.horizon, physics.step) != (windows.horizon, windows.step):
+        message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
+        raise DataError(f"{message}, the windows have {windows.horizon} steps of {windows.step:g} s: make them equal")
+    if method.past > windows.num_past * windows.step + 1e-9:
+        steps = math.ceil(method.past / windows.step - 1e-9)
+        raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
+    if physics.vessel is None and not method.meets_none:
+        raise DataError(f"the method {kind_of(method)!r} needs a vessel: the physics has none")
+    if physics.observer is not None:
+        raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")
+    if physics.vessel is not None:
+        check_columns(physics.vessel, windows.columns, "the windows")
+    name = "physics" if physics.vessel is not None else "none"
+    paths = physics.paths(windows.instants(known=commands == "known"))
+    diverged = ~np.isfinite(paths).all(axis=(0, 2))
+    if diverged.any():
+        raise DataError(f"the physics diverges on {diverged.mean():.1%} of the windows: take a smaller step, or rk4")
+    task = Task(
+        cases={name: Case(physics, paths)},
+        windows=windows,
+        folds=_folds(method, windows, validation_runs, seed) if method.compensates else (),
+        commands=tuple(windows.planned),
+        known=commands == "known",
+        seed=seed,
+    )
+    corrector = method.fit(task)[name].corrector
+    if corrector is None:
+        raise DataError("no training converged: check the windows for outliers, or widen the ranges of the method")
+    columns = ["u", "v", "r", *windows.planned, *({"V_w"} & windows.columns.keys())]
+    limits = {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in columns}
+    provenance = {"runs": list(windows.spans), "seed": seed}
+    return Predictor(physics, kind_of(method), corrector, limits, provenance, commands)
+
+
+def _folds(
+    method: Method, windows: Windows, validation_runs: Iterable[str] | None, seed: int
+) -> list[tuple[Index, Index]]:
+    """(Training, validation) indices of windows, split by run: one pair per fold, without a moment in both."""
+    runs = list(windows.spans)
+    if validation_runs is not None:
+        held_out = [tuple(validation_runs)]
+        unknown = next((run for run in held_out[0] if run not in runs), None)
+        if unknown is not None:
+            raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
+    elif len(runs) == 1:
+        return part_folds(windows)
+    elif method.validation == "runs":
+        held_out = [(run,) for run in runs]
+    else:
+        held_out = [split_runs(runs, VALIDATION_SHARE, seed)[1]]
+    masks = [fold_masks(windows, names) for names in held_out]
+    return [(np.flatnonzero(training), np.flatnonzero(validation)) for training, validation in masks]

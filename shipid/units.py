@@ -1,4 +1,4 @@
-"""Factors from a unit that people read to SI: multiply by one to enter SI, divide by it to leave."""
+"""Factors from common units to SI: value in SI = value * factor."""
 
 import math
 

@@ -82,7 +82,7 @@ def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: py
 
 @pytest.mark.parametrize("kind", ["models", "studies"])
 def test_find_corrects_names(kind: str) -> None:
-    with pytest.raises(DocumentError, match="a file of your own needs a slash"):
+    with pytest.raises(DocumentError, match="a path to another file needs a slash"):
         documents.find("nothing-like-it", kind)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,17 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
+from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.predictor import FORMAT, Predictor, assumed, check_columns
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.physics import assumed, check_columns
+from shipid.predictor import FORMAT, Predictor
 from shipid.study.apply import predict_log
 from shipid.study.store import DATASET, cell_file, read_test
 from shipid.vessel.load import load_vessel
 
-CELL, PURE = "wrong-1-N0006-s0", "none-N0006-s0"
+CELL, PURE = "wrong-1+drawn-N0006-s0", "none+drawn-N0006-s0"
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +34,12 @@ def predictor(tiny_run: Path) -> Predictor:
 def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
     first = Predictor.load(cell_file(tiny_run, cell))
     again = Predictor.load(first.save(tmp_path / "deep" / "again.npz"))
-    for name in ("horizon", "step", "method", "limits", "provenance"):
+    for name in ("physics", "method", "commands", "past", "limits", "provenance"):
         assert getattr(again, name) == getattr(first, name)
     assert (again.vessel is None) == (cell == PURE)
     assert again.vessel == first.vessel
-    columns = read_test(tiny_run)[0].columns
-    np.testing.assert_array_equal(again.predict(columns), first.predict(columns))
+    instants = read_test(tiny_run)[0].instants()
+    np.testing.assert_array_equal(again.predict(instants), first.predict(instants))
     assert [file.name for file in (tmp_path / "deep").iterdir()] == ["again.npz"]
 
 
@@ -46,13 +51,15 @@ def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:
 
 
 def test_physics_alone_and_compensation_alone(tiny_run: Path, predictor: Predictor) -> None:
-    columns = read_test(tiny_run)[0].columns
-    assert predictor.compensator is not None
-    alone = Predictor(predictor.vessel, None, predictor.horizon, predictor.step, predictor.method)
-    pure = Predictor(None, predictor.compensator, predictor.horizon, predictor.step)
-    np.testing.assert_array_equal(alone.predict(columns), predictor.physics(columns))
-    np.testing.assert_array_equal(pure.predict(columns), predictor.compensator.predict(columns))
-    np.testing.assert_allclose(alone.predict(columns) + pure.predict(columns), predictor.predict(columns))
+    instants = read_test(tiny_run)[0].instants()
+    compensator, physics = predictor.corrector, predictor.physics
+    assert isinstance(compensator, Compensator)
+    alone = Predictor(physics, "alone", Unchanged({}))
+    pure = Predictor(replace(physics, vessel=None), "path-drawn", compensator)
+    np.testing.assert_array_equal(alone.predict(instants), predictor.alone(instants))
+    table = compensator.inputs.table(physics, instants)
+    np.testing.assert_array_equal(pure.predict(instants), compensator.compensation(table))
+    np.testing.assert_allclose(alone.predict(instants) + pure.predict(instants), predictor.predict(instants))
 
 
 def test_a_prediction_does_not_depend_on_where_north_is(tiny_run: Path, predictor: Predictor) -> None:
@@ -60,7 +67,7 @@ def test_a_prediction_does_not_depend_on_where_north_is(tiny_run: Path, predicto
     columns = read_test(tiny_run)[0].columns
     turned = {**columns, "psi": columns["psi"] + 1.1, "beta_w": columns["beta_w"] + 1.1}
     turned |= {"north": columns["north"] - 700.0, "east": columns["east"] + 30.0}
-    np.testing.assert_allclose(predictor.predict(turned), predictor.predict(columns), atol=1e-8)
+    np.testing.assert_allclose(predictor.predict(Instants(turned)), predictor.predict(Instants(columns)), atol=1e-8)
 
 
 def test_outside_flags_each_column(predictor: Predictor) -> None:
@@ -135,7 +142,7 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"header": None}, "not a predictor"),
         ({"horizon": None}, "damaged"),
         ({"limits": {"u": [1.0]}}, "damaged"),
-        ({"compensator": 3}, "damaged"),
+        ({"corrector": 3}, "damaged"),
         ({"0.basis": None}, "missing in the saved compensator"),
         ({"0.mean": np.zeros(3)}, "do not fit together"),
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "dof: missing"),
@@ -233,8 +240,8 @@ def test_outside_is_told_of_the_instant_that_it_is_of(tmp_path: Path, tiny_run: 
 
 def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:
     log, out = tiny_run / DATASET, tmp_path / "paths.csv"
-    with pytest.raises(ResultError, match="did you mean 'wrong-1-N0006-s0'"):
-        predict_log(tiny_run, "wrong-1-N06-s0", log, None, out)
+    with pytest.raises(ResultError, match=r"did you mean 'wrong-1\+drawn-N0006-s0'"):
+        predict_log(tiny_run, "wrong-1+drawn-N06-s0", log, None, out)
     with pytest.raises(ResultError, match="holds no finished cells"):
         predict_log(tmp_path, CELL, log, None, out)
     with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
@@ -242,7 +249,7 @@ def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path
     with pytest.raises(DataError, match="cannot be read"):
         predict_log(tiny_run, CELL, tmp_path / "gone.parquet", None, out)
     dataset = read_dataset(log)
-    for missing, said in (("port.n", "takes this command"), ("V_w", "measure wind")):
+    for missing, said in (("port.n", "needs this command"), ("V_w", "measure wind")):
         columns = ["V_w", "beta_w"] if missing == "V_w" else [missing]
         fewer = Dataset(dataset.frame.drop(columns=columns), {**dataset.metadata, "units": {}})
         file = write_dataset(fewer, tmp_path / "fewer.parquet")

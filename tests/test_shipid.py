@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import shipid
@@ -79,22 +80,40 @@ def blocks(page: str) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_ten_lines_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_main_job_of_the_documentation_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As printed, with two foundations instead of four and small networks: data lower the error of every foundation."""
+    monkeypatch.chdir(tmp_path)
+    main_job = blocks("python.md")[0]
+    assert main_job.count("\n") <= 26
+    assert "PathDrawn()" in main_job
+    assert '"members": 4' in main_job
+    space: dict[str, Any] = {}
+    exec(
+        main_job.replace("PathDrawn()", "PathDrawn(trials=2, units=32)").replace('"members": 4', '"members": 2'), space
+    )
+    cells = pd.DataFrame(space["rows"])
+    assert [*zip(cells["model"], cells["N_D"], strict=True)] == [(f"wrong-{i}", n) for i in (1, 2) for n in (4, 8)]
+    assert (cells["H"] < 0.5 * cells["A"]).all()
+    assert space["predictor"].method == "path-drawn"
+    assert set(space["predictor"].limits) == {"u", "v", "r", *space["runs"].commands, "V_w"}
+    assert "wrong-2" in Path("map.html").read_text(encoding="utf-8")
+
+
+def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As printed; only the study is the smallest there is."""
     monkeypatch.chdir(tmp_path)
-    ten, main_job, frames = blocks("python.md")
-    assert ten.count("\n") <= 14
-    space: dict[str, Any] = {"__name__": "__main__"}
-    exec(ten, space)
-    assert space["apart"][0] == 0.0
-    assert len(space["apart"]) == 5
-    assert all(0.1 < distance < 100 for distance in space["apart"][1:])
-    assert '"quick"' in main_job
-    exec(main_job.replace('"quick"', repr(str(TINY))).replace("[10]", "[4]"), space)
+    study = blocks("python.md")[1]
+    assert '"quick"' in study
+    space: dict[str, Any] = {"__name__": "__main__", "shipid": shipid}
+    exec(study.replace('"quick"', repr(str(TINY))).replace("[10]", "[4]"), space)
     assert set(space["results"].cells["N_D"]) == {4}
     assert Path("results/mine/report.html").is_file()
     assert Path("gain.html").is_file()
-    exec(frames, space)
+
+
+def test_frames_of_the_documentation_are_drawn() -> None:
+    space: dict[str, Any] = {}
+    exec(blocks("python.md")[2], space)
     assert space["figure"].layout.yaxis.type == "log"
 
 
@@ -102,7 +121,9 @@ def test_the_ten_lines_of_the_documentation_run(tmp_path: Path, monkeypatch: pyt
 def test_a_users_script_passes_strict_type_checks(tmp_path: Path) -> None:
     """The documented lines as a script: strict, with shipid's modules read as an installed package's are."""
     script = tmp_path / "mine.py"
-    script.write_text("".join(blocks("python.md")) + "reveal_type(results.cells)\nreveal_type(wrong[0])\n")
+    script.write_text(
+        "".join(blocks("python.md")) + "reveal_type(results.cells)\nreveal_type(wrong[0])\nreveal_type(predictor)\n"
+    )
     (tmp_path / "mypy.ini").write_text(
         "[mypy]\nstrict = true\nfollow_imports = silent\npython_version = 3.12\n"
         "[mypy-plotly.*,casadi.*,torch.*,dask.*,distributed.*,pooch.*,optuna.*,scipy.*,pyarrow.*]\n"
@@ -115,3 +136,4 @@ def test_a_users_script_passes_strict_type_checks(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stdout
     assert 'Revealed type is "pandas' in result.stdout
     assert "shipid.vessel.load.Vessel" in result.stdout
+    assert "shipid.predictor.Predictor" in result.stdout

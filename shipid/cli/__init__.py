@@ -1,4 +1,4 @@
-"""The command line: arguments to calls, events to lines. Heavy imports wait until a command needs them."""
+"""The command line: it turns arguments into calls, and events into lines. Heavy imports wait for their command."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ app.add_typer(study.app, name="study")
 
 
 def main() -> None:
-    """Entry point: what the user can mend is one line, never a traceback."""
+    """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
         app()
     except ShipidError as error:

@@ -26,7 +26,7 @@ def data_import(
     mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: beside you")
+        Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: in this folder")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
     guess: Annotated[Path | None, typer.Option(help="draft a mapping of this log instead of importing it")] = None,
@@ -62,12 +62,14 @@ def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import draft_mapping
 
-    found = guess(log, names)
-    file = write_new(draft_mapping(found), out)
-    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in found.columns)
+    guessed = guess(log, names)
+    file = write_new(draft_mapping(guessed), out)
+    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in guessed.columns)
     show(table(["column", "from", "unit", "sure", "why"], rows))
-    if found.findings:
-        show(table(["found", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in found.findings)))
+    if guessed.findings:
+        show(
+            table(["finding", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in guessed.findings))
+        )
     typer.echo(f"draft -> {file}: read it before you import with it")
 
 
@@ -75,7 +77,7 @@ def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
 def data_segment(
     mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
-    out: Annotated[Path | None, typer.Option(help="TOML file to write; default: beside you")] = None,
+    out: Annotated[Path | None, typer.Option(help="TOML file to write; default: in this folder")] = None,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
     from shipid.files import write_new
@@ -85,10 +87,10 @@ def data_segment(
 
     declared = read_mapping(mapping)
     unit = declared.clock.unit
-    found = segment_log(declared, log or fetch(mapping))
-    file = write_new(segments_text(found, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
-    show(table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in found)))
-    typer.echo(f"{len(found)} segments -> {file}")
+    segments = segment_log(declared, log or fetch(mapping))
+    file = write_new(segments_text(segments, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    show(table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in segments)))
+    typer.echo(f"{len(segments)} segments -> {file}")
 
 
 @app.command("check")
@@ -137,14 +139,14 @@ def data_measures(
     from shipid.data.dataset import read_dataset
     from shipid.logs.measuring import measure_dataset
 
-    found = measure_dataset(read_dataset(dataset), manoeuvre, length)
-    if len(found.measures):
-        show(measure_table(found.measures.to_dict("records"), ["run", "kind"]))
-    if len(found.criteria):
-        show(criterion_table(found.criteria.to_dict("records"), ["run"]))
-    if found.left:
-        show(table(["run", "not measured, because"], found.left.items()))
-    measured = found.measures["run"].nunique() if len(found.measures) else 0
-    typer.echo(f"{measured} runs measured, {len(found.left)} not")
+    result = measure_dataset(read_dataset(dataset), manoeuvre, length)
+    if len(result.measures):
+        show(measure_table(result.measures.to_dict("records"), ["run", "kind"]))
+    if len(result.criteria):
+        show(criterion_table(result.criteria.to_dict("records"), ["run"]))
+    if result.left:
+        show(table(["run", "not measured, because"], result.left.items()))
+    measured = result.measures["run"].nunique() if len(result.measures) else 0
+    typer.echo(f"{measured} runs measured, {len(result.left)} not")
     if csv is not None:
-        write_measures(found.measures, csv)
+        write_measures(result.measures, csv)

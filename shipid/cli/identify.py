@@ -21,9 +21,10 @@ def identify(
     vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
     dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
     parameters: Annotated[
-        list[str] | None, typer.Option(help='what is unknown: dotted paths, "hull.derivatives.*", "...[order >= 3]"')
+        list[str] | None,
+        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...[order >= 3]"'),
     ] = None,
-    fixed: Annotated[list[str] | None, typer.Option(help="what of it is not, after all")] = None,
+    fixed: Annotated[list[str] | None, typer.Option(help="paths to leave out of --parameters")] = None,
     together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
     prior: Annotated[
         list[str] | None, typer.Option(help="paths=0.3: standard deviation of a factor around the base")
@@ -44,7 +45,7 @@ def identify(
     profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
     design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
     out: Annotated[
-        Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml beside you")
+        Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml in this folder")
     ] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
 ) -> None:
@@ -72,27 +73,27 @@ def identify(
     ship, log = load_vessel(vessel), read_dataset(dataset)
     try:
         with iterations() as progress:
-            found = run_identification(
+            outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
                 progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
         sys.exit(130)
-    _show_identified(found)
-    write_patch(found, file)
-    count = len(found.solution.values)
+    _show_identified(outcome)
+    write_patch(outcome, file)
+    count = len(outcome.solution.values)
     typer.echo(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}")
     if html is not None:
         from shipid.identification.contents import identification_content
         from shipid.report.identification import write_identification
 
-        content = identification_content(found, dataset, command_line())
+        content = identification_content(outcome, dataset, command_line())
         typer.echo(f"page -> {write_identification(content, html)}")
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:
-    """Names, or names with widths; the ordinary width where only others have one."""
+    """Return the names; or name -> width if any has one, with the default width for the others."""
     if not any("=" in name for name in given):
         return given
     from shipid.identification.settings import WIDE
@@ -101,11 +102,13 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
-def _show_identified(found: Identified) -> None:
-    """Estimates, what is not seen, free runs, manoeuvres, what to run next, warnings."""
-    solution = found.solution
-    fitted = f"{len(found.runs)} of {len(found.runs) + len(found.held_out)} runs, {len(solution.residuals)} residuals"
-    typer.echo(f"{found.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
+def _show_identified(outcome: Identified) -> None:
+    """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
+    solution = outcome.solution
+    fitted = (
+        f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
+    )
+    typer.echo(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
     rows: list[list[str]] = [
         [
             row["path"] + (f" (with {row['with']})" if row["with"] else ""),
@@ -118,44 +121,44 @@ def _show_identified(found: Identified) -> None:
             ),
             "yes" if row["identified"] else "no",
         ]
-        for row in found.estimates.to_dict("records")
+        for row in outcome.estimates.to_dict("records")
     ]
     columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
     show(table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
     typer.echo(
-        f"Factors are on the base; standard errors and intervals are theirs, by {words[found.statistics.chosen]}."
+        f"Factors are on the base; standard errors and intervals are theirs, by {words[outcome.statistics.chosen]}."
     )
-    for sentence in found.unseen:
+    for sentence in outcome.unseen:
         typer.echo(f"  {sentence}")
-    typer.echo(f"Free runs {f'of {found.ahead:g} s' if found.ahead else 'as long as the runs'}, root mean square:")
-    show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(found)))
+    typer.echo(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
+    show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(outcome)))
     compared = [
         [row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"]), row["unit"], row["note"]]
-        for row in found.manoeuvres.to_dict("records")
+        for row in outcome.manoeuvres.to_dict("records")
     ]
     show(table(["calm water", "measure", "before", "after", "unit", "note"], compared))
-    for curve in found.profiles:
+    for curve in outcome.profiles:
         typer.echo(f"profile: {curve.sentence}")
-    if found.programme is not None:
+    if outcome.programme is not None:
         typer.echo("To run next, by information per hour:")
         ranked = [
             [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
              f"{1 - row['after'] / row['before']:.0%}"]
-            for row in found.programme.head(10).to_dict("records")
+            for row in outcome.programme.head(10).to_dict("records")
         ]  # fmt: skip
         show(table(["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"], ranked))
-    for warning in found.warnings:
+    for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)
 
 
-def _free_rows(found: Identified) -> Iterator[list[str]]:
+def _free_rows(outcome: Identified) -> Iterator[list[str]]:
     from math import degrees
 
     from shipid.identification.free_run import ALL
 
-    for row in found.errors.to_dict("records"):
+    for row in outcome.errors.to_dict("records"):
         if row["run"] == ALL:
             numbers = (row["u"], row["v"], degrees(row["r"]), row["position"])
-            named = {"fit": f"{len(found.runs)} fitted", "test": f"{len(found.held_out)} held out"}[row["set"]]
+            named = {"fit": f"{len(outcome.runs)} fitted", "test": f"{len(outcome.held_out)} held out"}[row["set"]]
             yield [named, row["model"], *(f"{value:.3g}" if value == value else "diverges" for value in numbers)]

@@ -19,7 +19,7 @@ Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 
 def parsed(changes: list[str] | None) -> dict[str, Any]:
-    """`path=value` pairs; a value is TOML, or text as it stands."""
+    """Return path -> value of `path=value` texts; a value is read as TOML, or taken as text."""
     import tomllib
 
     result: dict[str, Any] = {}
@@ -51,7 +51,7 @@ def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
 
 
 def stem(name: str | Path) -> str:
-    """Name of a document or dataset without folder and ending; a dot in the name of a vessel is no ending."""
+    """Return the name of a document or dataset without folder and ending; a dot in a vessel's name is no ending."""
     return Path(name).name.removesuffix(".toml").removesuffix(".parquet")
 
 

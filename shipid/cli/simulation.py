@@ -14,7 +14,9 @@ from shipid.errors import DocumentError, ShipidError
 
 def simulate(
     study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
-    out: Annotated[Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet beside you")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet in this folder")
+    ] = None,
     changes: Changes = None,
 ) -> None:
     """Simulate the truth of a study into a dataset, and show its envelope beside the published one."""
@@ -30,11 +32,11 @@ def simulate(
         raise DocumentError("has no [truth]: its runs are recorded", file=plan.file)
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    found = envelope_table(envelope(plan, pool, test, dataset.commands), plan.study.published)
-    units = dict(zip(found["quantity"], found["unit"], strict=True))
+    ranges = envelope_table(envelope(plan, pool, test, dataset.commands), plan.study.published)
+    units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
         [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]
-        for name, part in found.groupby("set", sort=False)
+        for name, part in ranges.groupby("set", sort=False)
     ]
     file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
     typer.echo(f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> {file}")
@@ -57,7 +59,7 @@ def manoeuvre(
         ),
     ] = None,
     speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
-    side: Annotated[str, typer.Option(help="starboard or port: where she turns first")] = "starboard",
+    side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
     step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,

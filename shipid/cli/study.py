@@ -32,7 +32,7 @@ def study_new(
         Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="TOML file to write; default: <data or vessel>-study.toml beside you")
+        Path | None, typer.Option(help="TOML file to write; default: <data or vessel>-study.toml in this folder")
     ] = None,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
@@ -75,7 +75,7 @@ def study_variants(
     rows = []
     for model in models:
         if model.identify is not None:
-            rows.append((model.name, "-", "-", "identified from the runs of each cell, and so its A"))
+            rows.append((model.name, "-", "-", "identified from the runs of each cell, so A differs by cell"))
             continue
         factors = model.variant.factors if model.variant else {}
         changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in factors.items())
@@ -122,9 +122,11 @@ def study_screen(
     rows = [[*map(str, row[:3]), *(f"{value:.2f}" for value in row[3:])] for row in spread.itertuples(index=False)]
     typer.echo("accuracy A [m] that so many of the members reach:")
     show(table(["family", "members", "diverged", *shares], rows))
-    found = screen.drivers(frame)
+    correlations = screen.drivers(frame)
     typer.echo("what drives A: rank correlation with a factor, and with its distance from 1:")
-    pairs = [(str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in found.itertuples()]
+    pairs = [
+        (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
+    ]
     show(table(["family", "parameter", "factor", "distance"], pairs))
     typer.echo(f"{len(frame)} members -> {file}")
 
@@ -140,7 +142,7 @@ def study_rotate(
     changes: Changes = None,
     device: Device = "cpu",
 ) -> None:
-    """Let every run test in its turn, all others train: how much the answer owes to the choice of the test run."""
+    """Test on every run in turn and train on all others: how much the answer depends on the choice of the test run."""
     from shipid.files import check_table, write_table
     from shipid.hybrid.training import check_device
     from shipid.study import rotate
@@ -158,7 +160,7 @@ def study_rotate(
 
     frame = pd.concat(list(counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
     write_table(file, frame)
-    typer.echo(f"H and A [m], each of {len(wanted)} runs tested in its turn, the others trained:")
+    typer.echo(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:")
     columns, rows = ["A", "H", "least", "greatest", "H_90"], []
     for row in rotate.spread(frame).to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
@@ -166,8 +168,8 @@ def study_rotate(
         rows.append([name, *(digits(row[column]) for column in columns), better])
     show(table(["foundation", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
     typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
-    found = rotate.contrasts(frame, plan).to_dict("records")
-    if found:
+    differences = rotate.contrasts(frame, plan).to_dict("records")
+    if differences:
         typer.echo("paired differences over the turns [m], with a 95 % interval:")
         pairs = [
             (
@@ -176,7 +178,7 @@ def study_rotate(
                 "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(row[n] for n in ("mean", "low", "high"))),
                 f"{row['above']} of {row['turns']}",
             )
-            for row in found
+            for row in differences
         ]
         show(table(["finding", "difference", "mean", "above 0"], pairs))
     typer.echo(f"{len(frame)} cells -> {file}")
@@ -227,11 +229,11 @@ def study_compare(
     from shipid.study.compare import compare_errors, compare_findings, read_worlds
 
     worlds = read_worlds(folders)
-    found = compare_findings(worlds)
-    if len(found):
+    findings = compare_findings(worlds)
+    if len(findings):
         words = ["finding", f"in {len(worlds)} worlds", "number", "mean [least, greatest]"]
-        values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in found.itertuples()]
-        show(table(words, zip(found["id"], found["verdicts"], found["number"], values, strict=True)))
+        values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
+        show(table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True)))
     errors = compare_errors(worlds)
     errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")

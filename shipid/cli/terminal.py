@@ -50,7 +50,7 @@ def digits(value: float) -> str:
 
 
 def measure_table(rows: Iterable[Any], first: list[str]) -> Table:
-    """Table of measures; `first` are columns that come before."""
+    """Return a table of measures; `first` are the names of its leading columns."""
     rows = list(rows)
     missing = any(row["note"] for row in rows)
     body = [
@@ -68,7 +68,7 @@ def measure_table(rows: Iterable[Any], first: list[str]) -> Table:
 
 
 def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
-    """Table of criteria; `first` are columns that come before."""
+    """Return a table of criteria; `first` are the names of its leading columns."""
     body = [
         [
             *(row[key] for key in first),
@@ -92,7 +92,7 @@ def write_measures(frame: DataFrame, file: Path) -> None:
 
 
 def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterator[Any]:
-    """Pass blocks of rows on, with a bar of how many rows of all are there; on a terminal only."""
+    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -111,7 +111,7 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterato
 
 @contextmanager
 def iterations() -> Iterator[Any]:
-    """What `identify` calls after each iteration: a line that is written over, on a terminal only."""
+    """Give a function that `identify` calls after each iteration, to rewrite one line; None if not on a terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -123,7 +123,7 @@ def iterations() -> Iterator[Any]:
 
 
 def draw(events: Iterable[Event]) -> None:
-    """Live progress on a terminal; plain lines, one per finished cell, anywhere else."""
+    """Show the events of a run: live progress on a terminal, else one plain line per finished cell."""
     from rich.console import Console
 
     from shipid.study.start import event_line
@@ -174,7 +174,7 @@ def draw(events: Iterable[Event]) -> None:
 
 
 def log_to_stderr() -> None:
-    """Show what shipid logs on standard error."""
+    """Write the log messages of shipid to standard error."""
     import logging
 
     handler = logging.StreamHandler()

@@ -11,7 +11,7 @@ import typer
 from shipid.cli.terminal import show, table
 from shipid.errors import ShipidError
 
-app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or your own.")
+app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
 
 
 @app.command("list")
@@ -42,10 +42,10 @@ def vessel_show(
     from shipid.vessel.load import load_vessel
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
-    found = load_vessel(vessel)
-    document = found.document
+    ship = load_vessel(vessel)
+    document = ship.document
     typer.echo(
-        "\n".join(filter(None, [found.name, document.get("description"), f"file {found.file}, digest {found.digest}"]))
+        "\n".join(filter(None, [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]))
     )
     particulars = document.get("particulars", {})
     typer.echo(
@@ -62,7 +62,7 @@ def vessel_show(
         if "table" in block:
             omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
             typer.echo(f"{path}: {min(omega):g} to {max(omega):g} rad/s, {len(set(beta))} headings from 0 to 180 deg")
-    show(table(["parameter", "value", "unit"], _parameter_rows(found.parameters, found.units)))
+    show(table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)))
 
 
 @app.command("new")
@@ -71,7 +71,7 @@ def vessel_new(
     beam: Annotated[float, typer.Option(help="m")],
     draught: Annotated[float, typer.Option(help="m")],
     block: Annotated[float, typer.Option(help="block coefficient")],
-    out: Annotated[Path, typer.Option(help="TOML file to write; one that is there stays as it is")],
+    out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
     speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
     propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth (two units)")] = "propeller-rudder",
     ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
@@ -83,22 +83,22 @@ def vessel_new(
     if out.suffix != ".toml":
         raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
     if out.exists():
-        raise ShipidError("is there already: choose another name", file=out)
+        raise ShipidError("exists already: choose another name", file=out)
     from shipid.vessel.template import Particulars, first_guess
 
     given = Particulars(length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area)
-    found = first_guess(given, name or f"First guess, {length:g} m", str(out))
-    out.write_text(found.text, encoding="utf-8")
-    typer.echo(f"{len(found.vessel.parameters)} parameters by formula, none of them measured -> {out}")
-    typer.echo(f"{60 * found.n:.4g} rpm hold {given.service:.3g} m/s")
-    if found.growth < 0:
+    guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
+    out.write_text(guessed.text, encoding="utf-8")
+    typer.echo(f"{len(guessed.vessel.parameters)} parameters by formula, none of them measured -> {out}")
+    typer.echo(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s")
+    if guessed.growth < 0:
         typer.echo("course-stable by these formulae")
     else:
-        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / found.growth:.3g} s")
+        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / guessed.growth:.3g} s")
 
 
 def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:
-    """Dotted path, value, unit; the entries of one table column share a row, addressed `path.0`, `path.1`, ..."""
+    """Yield rows of dotted path, value, unit; the entries of one table column, `path.0`, `path.1`, ..., share a row."""
     import re
     from itertools import groupby
 

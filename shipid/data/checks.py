@@ -1,4 +1,4 @@
-"""What a log says about itself: one row per run and check, each with a value, a limit and a sentence."""
+"""Checks of a dataset: one row per run and check, each with a value, a limit and a sentence."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ STRETCH = 30.0
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
     """Check every run of a dataset against the clock, plausible ranges and the laws of plane motion.
 
-    Returns a table with columns `check`, `run`, `value`, `unit`, `limit`, `ok`, `sentence`. A check says what is
+    Returns a table with columns `check`, `run`, `value`, `unit`, `limit`, `ok`, `sentence`. A check reports what is
     suspicious; it changes nothing. Limits are engineering judgement, wide enough for a log in good order.
     """
     by_run: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         by_run.setdefault(run, []).append(rows)
     shared = dataset.metadata.get("clock", "shared") != "run"
-    found = []
+    table = []
     for run, stretches in by_run.items():
         others = dataset.frame.loc[dataset.frame["run"] != run, "t"] if shared else pd.Series(dtype=float)
         results = [*_clock(stretches), *_ranges(stretches), *_heading(stretches), *_path(stretches)]
-        found += [{"run": run, **row} for row in [*results, *_repetition(stretches, others)]]
-    return pd.DataFrame(found)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
+        table += [{"run": run, **row} for row in [*results, *_repetition(stretches, others)]]
+    return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
 def _row(check: str, value: float, unit: str, limit: float, sentence: str, ok: bool | None = None) -> dict[str, Any]:

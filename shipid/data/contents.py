@@ -1,4 +1,4 @@
-"""What the page of a checked log shows, assembled from the dataset."""
+"""Content of the page of a checked log, assembled from the dataset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shipid.report.checks import CheckContent
 
 
 def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent:
-    """Assemble the page of a log: `name` is short, `checks` what `check_dataset` returned for it."""
+    """Return the content of the page of a log: `name` is a short name, `checks` the table from `check_dataset`."""
     source = log.metadata.get("source", "")
     words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
     return CheckContent(

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
 """State -> column of its standard deviation, where it was estimated instead of measured."""
 BREAK = "break"
-"""Name of the flag on a row that nothing connects to the row before it."""
+"""Name of the flag on the first row after a break: nothing connects it to the row before."""
 
 _KEY = b"shipid"
 
@@ -40,7 +40,7 @@ class Dataset:
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w` and the
         rest of `optional()`. SI units, radians; time increases within a run; no NaN.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
-        has a clock of its own (simulation) and `"shared"` where all lie on one recording (the default).
+        has a separate clock (simulation) and `"shared"` where all runs are parts of one recording (the default).
     """
 
     frame: pd.DataFrame
@@ -61,13 +61,13 @@ class Dataset:
 
     @property
     def digest(self) -> str:
-        """SHA-256 (first 16 hex digits) of the names and values of the table, whatever its file is called."""
-        found = hashlib.sha256()
+        """SHA-256 (first 16 hex digits) of the names and values of the table; the file name does not matter."""
+        sha = hashlib.sha256()
         for name, column in self.frame.items():
             text = name == "run"
-            found.update(f"{name}\0".encode())
-            found.update("\0".join(column).encode() if text else np.ascontiguousarray(column.to_numpy()).tobytes())
-        return found.hexdigest()[:16]
+            sha.update(f"{name}\0".encode())
+            sha.update("\0".join(column).encode() if text else np.ascontiguousarray(column.to_numpy()).tobytes())
+        return sha.hexdigest()[:16]
 
 
 def required() -> dict[str, str]:
@@ -106,13 +106,13 @@ def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
 
 
 def stretches(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Where the rows of every `piece` stand in the table."""
+    """Yield (run, indices of rows in the table) of every stretch that `pieces` yields."""
     broken = (dataset.frame["flags"].to_numpy() & flag_bit(dataset.metadata, BREAK)) != 0
     for name, places in dataset.frame.groupby("run", sort=False).indices.items():
-        own = np.asarray(places)
-        starts = np.flatnonzero(broken[own[1:]]) + 1
-        for first, last in zip([0, *starts], [*starts, len(own)], strict=True):
-            yield str(name), own[first:last]
+        rows = np.asarray(places)
+        starts = np.flatnonzero(broken[rows[1:]]) + 1
+        for first, last in zip([0, *starts], [*starts, len(rows)], strict=True):
+            yield str(name), rows[first:last]
 
 
 def clock_slack(t: Array) -> float:
@@ -165,7 +165,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
             raise DataError(f"missing column; there are: {', '.join(names)}", path=name)
     for name in names:
         if names.count(name) > 1:
-            raise DataError("this column stands twice", path=name)
+            raise DataError("this column appears twice", path=name)
         _check_column(name, frame[name])
     for name, other in (("V_w", "beta_w"), ("beta_w", "V_w")):
         if name in names and other not in names:

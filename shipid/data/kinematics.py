@@ -55,7 +55,7 @@ def smooth(t: Array, measured: dict[str, Array], noise: Noise) -> Smoothed:
     Parameters
     ----------
     t : instants (N,) [s], rising, N >= 2.
-    measured : north, east, psi (unwrapped) and whichever of u, v, r is logged: name -> (N,), SI units.
+    measured : north, east, psi (unwrapped) and those of u, v, r that are logged: name -> (N,), SI units.
     noise : how far samples err and how fast velocities change.
     """
     names = [name for name in STATES if name in measured]
@@ -104,7 +104,7 @@ def _start(t: Array, measured: dict[str, Array], noise: Noise) -> tuple[Array, A
     speed = max(1.0, float(np.hypot(first["u"], first["v"])))
     wide = {"u": speed, "v": speed, "r": max(0.02, abs(float(slope["psi"])))}
     deviations = np.array([noise.sample[name] if name in measured else wide[name] for name in STATES])
-    # twice as wide: the first sample is used once more by the first update
+    # twice as wide: the first update uses the first sample again
     return np.array([first[name] for name in STATES]), np.diag((2.0 * deviations) ** 2)
 
 

@@ -33,12 +33,14 @@ class Instants:
     planned : command in force from step i-1 to i of the horizon, i = 1..T, name -> (T, S); None where commands are held
         at their value at the instant.
     hidden : states of actuators at the instant, name -> (S,); None takes each actuator as having reached its order.
+    estimates : what an observer knows at the instant, `observer.u`, ... -> (S,); empty without an observer.
     """
 
     columns: Mapping[str, NDArray[Any]]
     past: Mapping[str, Array] = field(default_factory=dict)
     planned: Mapping[str, Array] | None = None
     hidden: Mapping[str, Array] | None = None
+    estimates: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.columns["u"])
@@ -49,7 +51,13 @@ class Instants:
         def last(values: Mapping[str, Array] | None) -> dict[str, Array] | None:
             return None if values is None else {name: array[..., chosen] for name, array in values.items()}
 
-        return Instants(last(self.columns) or {}, last(self.past) or {}, last(self.planned), last(self.hidden))
+        return Instants(
+            last(self.columns) or {},
+            last(self.past) or {},
+            last(self.planned),
+            last(self.hidden),
+            last(self.estimates) or {},
+        )
 
 
 @dataclass(frozen=True)
@@ -98,9 +106,15 @@ class Windows:
         """Last instant of every future [s], (S,)."""
         return self.t + self.horizon * self.step
 
-    def instants(self, *, known: bool = False, hidden: Mapping[str, Array] | None = None) -> Instants:
+    def instants(
+        self,
+        *,
+        known: bool = False,
+        hidden: Mapping[str, Array] | None = None,
+        estimates: Mapping[str, Array] | None = None,
+    ) -> Instants:
         """What a predictor knows: no future, but for the commands where they are `known` over the horizon."""
-        return Instants(self.columns, self.past, self.planned if known else None, hidden)
+        return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {})
 
     @property
     def spans(self) -> dict[str, tuple[float, float]]:

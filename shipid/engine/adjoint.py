@@ -1,7 +1,7 @@
-"""Exact gradients as C on SIMD vectors: a rollout forward, whose states are kept, then a sweep backward over them.
+"""Exact gradients as C on SIMD vectors: a forward rollout that keeps its states, then a reverse (adjoint) sweep.
 
-The integrator runs once on names, which gives the calls and sums of one step; the sweep goes through them in reverse.
-CasADi differentiates the rates and the memories in reverse mode, once for each structure.
+The integrator runs once on names, which records the operations of one step; the sweep processes them in reverse.
+CasADi differentiates rates and memories in reverse mode, once for each structure.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ class Adjoint:
 
 
 def checked_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
-    """What a loss gives for a path; ShipidError if its shapes are wrong."""
+    """Values (S,) and slopes (T + 1, S, C) of a loss for a path; ShipidError for wrong shapes."""
     values, slopes = (np.asarray(part, dtype=float) for part in loss(path))
     if values.shape != path.shape[1:2] or slopes.shape != path.shape:
         wanted = f"{path.shape[1:2]} and {path.shape}"
-        raise ShipidError(f"a loss gives values and slopes of shapes {wanted}, found {values.shape} and {slopes.shape}")
+        raise ShipidError(f"a loss gives values and slopes of shapes {wanted}, not {values.shape} and {slopes.shape}")
     return values, slopes
 
 
@@ -78,7 +78,7 @@ class _Line:
 
 
 def _recorded(step: float, method: Method) -> tuple[list[_Line], str, str]:
-    """The lines of one step from `x` and `m`, and the names of what comes out."""
+    """The lines of one step from `x` and `m`, and the names of the state and memory after it."""
     lines: list[_Line] = []
 
     def note(kind: str, *operands: str, number: float = 0.0) -> str:
@@ -95,7 +95,7 @@ def _recorded(step: float, method: Method) -> tuple[list[_Line], str, str]:
 
 
 def _needed(lines: Sequence[_Line]) -> set[str]:
-    """What the sweep reads of the way forward: operands of rates and memories, and what leads to them."""
+    """Names of the forward values that the sweep needs: operands of rates and memories, and their operands."""
     needed = {name for line in lines if line.kind != "add" for name in line.operands}
     for line in reversed(lines):
         if line.out in needed:
@@ -104,7 +104,7 @@ def _needed(lines: Sequence[_Line]) -> set[str]:
 
 
 class _Source(Parts):
-    """Writes the C of the sweep of one model."""
+    """C source of the reverse sweep of one model."""
 
     def __init__(self, model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> None:
         self.model, self.wanted = model, wanted
@@ -138,7 +138,7 @@ class _Source(Parts):
         self.all = [print_function(one, STAGES, C) for one in functions]
 
     def functions(self) -> str:
-        """Stages, rates, memories, and both in reverse, which add to what is there."""
+        """C functions: stages, rates, memories, and the reverse modes of both, which accumulate derivatives."""
         rates, advance, rates_back, advance_back = self.all
         nx, nm, count = len(self.model.state) + len(self.model.hidden), len(self.model.memory), len(self.wanted)
 
@@ -169,7 +169,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
 """
 
     def one_step(self) -> str:
-        """What the sweep reads of the step, computed again; then the step in reverse."""
+        """C statements of one step: the needed forward values, computed again, then the reverse of the step."""
         lines, after, memory_after = self.tape
         sizes = {"rates": len(self.model.state) + len(self.model.hidden), "advance": len(self.model.memory)}
         sizes["add"] = sizes["rates"]
@@ -211,7 +211,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         )
 
     def text(self, wanted: Target) -> str:
-        """The whole source."""
+        """The complete C source for the target processor."""
         model = self.model
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
         nc, ne, parameters, count = len(model.commands), len(model.environment), len(model.parameters), len(self.wanted)
@@ -255,14 +255,14 @@ for (long g = first; g < last; ++g) {{
 
 @lru_cache(maxsize=32)
 def _library(model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> Any:
-    """The `run` of a sweep, compiled or from the cache."""
+    """The compiled function `run` of a sweep, from the cache if possible."""
     return compiled_for(lambda: _Source(model, wanted, step, method).text(target()))
 
 
 def gradient_native(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
     """A loss on the job's channels and its derivatives, samples on SIMD lanes and threads.
 
-    wanted : places of the parameters in question. The batch holds one variant and no drawn components.
+    wanted : indices of the parameters to differentiate by. The batch has one variant and no drawn components.
     """
     nx, nm, num_samples, wide = len(batch.state), len(batch.memory), batch.state.shape[1], width(batch)
     records, worst = packed_records(model, batch, replace(job, every=1, rows=tuple(range(nx + nm))))

@@ -1,4 +1,4 @@
-"""The CasADi engine: one sample's steps as a scan, samples on threads. Best for long simulations of few samples."""
+"""The CasADi engine: the steps of one sample as a scan, samples on threads. For long runs of few samples."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ BLOCK = 256  # steps of one call of the function of `memory_along`: made once, w
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
     """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
     for term in model.sums:
-        own = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
-        columns = [ca.repmat(one, 1, own.shape[1]) for one in inputs]
-        tau = tau + ca.sum2(term.function.map(own.shape[1])(*columns, own))
+        entries = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
+        columns = [ca.repmat(one, 1, entries.shape[1]) for one in inputs]
+        tau = tau + ca.sum2(term.function.map(entries.shape[1])(*columns, entries))
     return model.rates(*inputs, tau)
 
 
@@ -32,8 +32,8 @@ def casadi_scan(
 ) -> ca.Function:
     """One sample: ([state, memory, greatest speed], commands, environment, tau, fixed) -> records of the first.
 
-    fixed is what does not change from step to step: the parameters, then the components that are drawn for the sample,
-    so many of each drawn sum as `counts` says.
+    fixed : inputs that are constant in time: the parameters, then the drawn components of the sample. counts : number
+    of components of each drawn sum.
     """
     num_states = len(model.state) + len(model.hidden)
     state, memory = ca.MX.sym("state", num_states), ca.MX.sym("memory", len(model.memory))
@@ -95,11 +95,11 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
     records, worst = [], []
     for values in batch.parameters:
         with uninterrupted():
-            found = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
-        path = found.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
+            result = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
+        path = result.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, list(job.rows)])
-        worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # what is not finite stays so
+        worst.append(path[-1, :, -1] + 0 * path.sum(axis=(0, 2)))  # keeps values that are not finite
     return np.stack(records, axis=1), np.stack(worst)
 
 
@@ -116,7 +116,7 @@ def _memory_scan(model: Dynamics) -> ca.Function:
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
     """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
 
-    The first order is taken as reached; each order is held until the next row. They are modelled, not measured.
+    The states begin at the first order; each order is held until the next row. They are simulated, not measured.
     """
     model = dynamics(vessel)
     if not model.memory:

@@ -1,6 +1,6 @@
-"""The engines, by name. To add one: write its file, name it here.
+"""The engines by name, with their abilities. To add one: write its file, and name it here.
 
-An engine runs a job on a batch. What else it can do is said here too: measure distances on its way, differentiate.
+An engine runs a job on a batch. Some engines can also compute distances during the rollout, or derivatives.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operat
 
 @dataclass(frozen=True)
 class Load:
-    """How much there is to do.
+    """Size of a rollout, by which `auto` selects an engine.
 
-    work : evaluations of the right-hand side, drawn components counted in.
+    work : evaluations of the right-hand side, with an allowance for drawn components.
     width : samples x variants.
     device : a PyTorch device.
     """
@@ -42,11 +42,11 @@ def _never(_: Load) -> bool:
 
 @dataclass(frozen=True)
 class Engine:
-    """A way to run rollouts.
+    """An implementation of rollouts.
 
     run : (model, batch, job) -> records (R, V, S, C) and the greatest speed (V, S) [m/s, rad/s].
-    preferred : whether `auto` takes this engine for a load, if no engine named before it is preferred.
-    available : whether this machine has what the engine needs.
+    preferred : whether `auto` selects this engine for a load, if it selects no engine before it.
+    available : whether this machine meets the requirements of the engine.
     measure : (model, batch, job, goal (T, 2, S)) -> sum of distances (V, S), tally (V, BINS) and greatest speed (V, S);
         the distances are those of the two channels of the job to the goal after every step. None if it cannot.
     gradient : (model, batch of one variant, job, places of the wanted parameters, loss) -> Adjoint. None if it cannot.
@@ -100,20 +100,20 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 
 
 def named(name: str, device: str) -> Engine | None:
-    """The engine of a name, None for `auto`; ShipidError if there is none, or it does not run on the device."""
+    """The engine with a name; None for `auto`. ShipidError for an unknown name or an unsupported device."""
     if name == AUTO:
         return None
     if name not in ENGINES:
         raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
     engine = ENGINES[name]
     if device != "cpu" and not engine.any_device:
-        others = " or ".join(repr(other) for other, found in ENGINES.items() if found.any_device)
+        others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)
         raise ShipidError(f"engine {name!r} runs on the CPU: use {others} on {device!r}")
     return engine
 
 
 def chosen(batch: Batch, job: Job) -> Engine:
-    """The engine that `auto` takes for a rollout: by size, and by what there is."""
+    """The engine that `auto` selects for a rollout, by its size and the available engines."""
     weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
     width = batch.state.shape[1] * len(batch.parameters)
     load = Load(job.num_steps * width * (4 if job.method == "rk4" else 1) * weight, width, job.device)
@@ -121,11 +121,11 @@ def chosen(batch: Batch, job: Job) -> Engine:
 
 
 def differentiable(name: str, device: str) -> Engine:
-    """The engine of a name that has gradients; for `auto` the first that does; ShipidError if it has none."""
+    """The engine with a name, for gradients; for `auto` the first that has gradients. ShipidError if it has none."""
     engine = named(name, device)
-    able = {key: found for key, found in ENGINES.items() if found.gradient is not None}
+    able = {key: entry for key, entry in ENGINES.items() if entry.gradient is not None}
     if engine is None:
-        fit = (found for found in able.values() if found.available() and (device == "cpu" or found.any_device))
+        fit = (entry for entry in able.values() if entry.available() and (device == "cpu" or entry.any_device))
         return next(fit)
     if engine.gradient is None:
         raise ShipidError(f"engine {name!r} has no gradient: use {' or '.join(map(repr, able))}")

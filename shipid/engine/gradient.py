@@ -19,7 +19,7 @@ PATH = ("north", "east")
 
 @dataclass(frozen=True)
 class Gradient:
-    """A loss of each sample and its derivatives; of a sample that diverged they mean nothing.
+    """A loss of each sample and its derivatives; they are invalid for samples that diverged.
 
     loss : (S,) in the unit of the loss.
     parameters : (S, K) d(loss)/d(parameter), by `names`; their sum over samples is the gradient of the summed loss.
@@ -59,7 +59,7 @@ def rollout_gradient(
     """Value and exact gradient of a loss on a rollout of many samples by one variant.
 
     Reverse mode: the cost does not grow with the number of parameters. It is the derivative of the discrete motion, so
-    that it agrees with finite differences of `rollout` at any step; a kink has the slope of one of its sides.
+    it agrees with finite differences of `rollout` for any step; at a kink it is the derivative of one side.
 
     Parameters
     ----------
@@ -67,16 +67,16 @@ def rollout_gradient(
     loss : path (num_steps + 1, S, C) of the channels `keep` -> (loss (S,), slope d(loss)/d(path), shaped as the path);
         such as `squared_distance(goal)`.
     names : dotted paths of the parameters to differentiate by; ShipidError for one that the vessel does not have.
-    keep : states and memories that the loss looks at.
-    parameters : (P,) in the order of `vessel.parameters`; default: the vessel's own.
-    engine : `native`, `torch`, or `auto`: native where there is a C compiler.
+    keep : states and memories that are the input of the loss.
+    parameters : (P,) in the order of `vessel.parameters`; default: those of the vessel.
+    engine : `native`, `torch`, or `auto`: native if there is a C compiler.
 
-    Memories at the start are taken as they are: the first orders do not depend on parameters. Terms whose components
-    are drawn (waves) stay in calm water only where they are off: ShipidError otherwise.
+    The initial memories are constants: they do not depend on parameters. ShipidError for a vessel with terms whose
+    components are drawn (waves), unless they are switched off.
     """
     way = differentiable(engine, device)
     if num_steps < 1:
-        raise ShipidError(f"num_steps must be 1 or more, found {num_steps}")
+        raise ShipidError(f"num_steps must be 1 or more, not {num_steps}")
     values = None if parameters is None else np.asarray(parameters, dtype=float).reshape(1, -1)
     weather = environment or {}
     model, batch = prepared(vessel, start, commands, weather, {}, num_steps, values, memory, tau_extra, None)
@@ -89,15 +89,15 @@ def rollout_gradient(
     job = Job(step, num_steps, method, 1, places(keep, channels(model), vessel), device)
     with np.errstate(all="ignore"):
         assert way.gradient is not None
-        found = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
+        adjoint = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
     return Gradient(
-        loss=found.loss,
-        parameters=found.parameters.T,
+        loss=adjoint.loss,
+        parameters=adjoint.parameters.T,
         names=tuple(names),
-        tau_extra=found.tau_extra.transpose(0, 2, 1),
-        start=dict(zip((*model.state, *model.hidden), found.state, strict=True)),
-        path=found.path,
-        diverged=(~(found.worst <= SPEED_LIMIT) | ~finite(batch))[0],
+        tau_extra=adjoint.tau_extra.transpose(0, 2, 1),
+        start=dict(zip((*model.state, *model.hidden), adjoint.state, strict=True)),
+        path=adjoint.path,
+        diverged=(~(adjoint.worst <= SPEED_LIMIT) | ~finite(batch))[0],
     )
 
 

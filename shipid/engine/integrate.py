@@ -1,4 +1,4 @@
-"""The integrator, written once for every engine, and the batch that all engines take."""
+"""The integrator, written once for all engines, and the batch and job that are their inputs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Job:
-    """What an engine shall do with a batch.
+    """Settings of a rollout.
 
     step : seconds of one step. num_steps : steps of the rollout. every : steps from record to record.
     rows : channels to record, as places in state and memory, one after the other. device : a PyTorch device.
@@ -48,10 +48,10 @@ class Job:
 
 
 def cores() -> int:
-    """Cores that this process may use: those it has, no more than `OMP_NUM_THREADS` says."""
-    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Number of cores that this process may use, at most `OMP_NUM_THREADS`."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     limit = os.environ.get("OMP_NUM_THREADS", "")
-    return min(found, int(limit)) if limit.isdecimal() and int(limit) > 0 else found
+    return min(count, int(limit)) if limit.isdecimal() and int(limit) > 0 else count
 
 
 def integrate(
@@ -65,7 +65,8 @@ def integrate(
 ) -> tuple[Any, Any]:
     """One step of explicit Euler or classical RK4; `add(x, a, k)` is x + a k in the arithmetic at hand.
 
-    Memories advance exactly: the stages of RK4 see them at their own time, so it keeps its order with held commands.
+    Memories advance exactly. Each stage of RK4 uses them at the time of the stage, so RK4 keeps its order of accuracy
+    for constant commands.
     """
     if method == "euler":
         return add(state, step, rates(state, memory)), advance(memory, step)

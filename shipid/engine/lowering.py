@@ -1,4 +1,4 @@
-"""A CasADi SX function as PyTorch: one tensor operation an instruction, broadcast over (variant, sample)."""
+"""Lowers a CasADi SX function to PyTorch: each instruction becomes a tensor operation over (variant, sample)."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ class Lowered:
         """Output channels for all inputs in the function's order: every stage, then main."""
         saved: list[Any] = []
         for number, stage in enumerate((*self.early, self.main)):
-            own = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
-            saved.append(stage(*own, *saved))
+            arguments = [given for given, place in zip(inputs, self.stage_of, strict=True) if place == number]
+            saved.append(stage(*arguments, *saved))
         return list(saved[-1])
 
 
@@ -133,7 +133,7 @@ def _channels(saved: torch.Tensor) -> Any:
 
 
 def _stack(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
-    """What a stage saves (num_saved, ...), as numbers; the shape is that of its inputs broadcast together."""
+    """Saved values of a stage as one tensor (num_saved, ...), in the broadcast shape of the inputs."""
     shape = np.broadcast_shapes(*(channels.shape[1:] for channels in inputs))
     like = inputs[0]
     if not values:

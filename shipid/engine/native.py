@@ -1,7 +1,7 @@
-"""The native engine: a vessel's step as C on SIMD vectors, several samples a vector, groups of them on threads.
+"""The native engine: the step of a vessel as C; each SIMD lane integrates one sample, groups of lanes run on threads.
 
-The source is printed from the symbolic step and compiled once for each structure, step and method; the library stays
-in the user's cache (XDG_CACHE_HOME), by the digest of source, compiler and processor.
+The source is printed from the symbolic step and compiled once for each structure, step and method. The library is kept
+in the user's cache (XDG_CACHE_HOME) under the digest of source, compiler and processor.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ static inline V measured(V north, V east, long samples, unsigned *tally) {{
 
 @dataclass(frozen=True)
 class Target:
-    """What the processor and the C library offer: lanes of a vector, flags, and the prefix of vector functions."""
+    """Target of the C compiler: lanes of a vector, compiler flags, prefix of glibc's vector functions (or empty)."""
 
     lanes: int
     flags: tuple[str, ...]
@@ -98,20 +98,20 @@ class Target:
 
 @cache
 def compiler() -> str | None:
-    """The C compiler, if there is one that makes a library."""
+    """Path of a C compiler that can build a shared library; None if there is none."""
     trial = "#include <math.h>\ndouble probe(double x) { return sin(x); }"
     for name in ("gcc", "cc", "clang"):
-        found = shutil.which(name)
-        if found is not None:
+        command = shutil.which(name)
+        if command is not None:
             with tempfile.TemporaryDirectory() as folder:
-                if _compile(found, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
-                    return found
+                if _compile(command, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
+                    return command
     return None
 
 
 @cache
 def _processor() -> frozenset[str]:
-    """Features of the processor, where the system tells them."""
+    """Feature flags of the processor; empty if the system does not report them."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -121,32 +121,35 @@ def _processor() -> frozenset[str]:
 
 @cache
 def target() -> Target:
-    """Widest vectors of this processor; vector functions of glibc where they link, else one lane at a time."""
-    found, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
+    """Widest vectors of this processor, with the vector functions of glibc if they can be linked."""
+    command, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
     if x86 and "avx512f" in _processor():
         best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
     elif x86 and {"avx2", "fma"} <= _processor():
         best = Target(4, ("-march=native",), "_ZGVdN4")
     else:
         best = Target(2, (), "")
-    if found is None or not best.prefix:
+    if command is None or not best.prefix:
         return best
     probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
     with tempfile.TemporaryDirectory() as folder:
         linked = _compile(
-            found, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
+            command, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
         )
     return best if linked is None else Target(best.lanes, best.flags, "")
 
 
-def _compile(found: str, source: str, library: Path, wanted: Target) -> str | None:
-    """Compile C into a shared library, whole or not at all; what the compiler says if it fails."""
+def _compile(command: str, source: str, library: Path, wanted: Target) -> str | None:
+    """Compile C source into a shared library; the message of the compiler if it fails, else None.
+
+    command : path of the compiler. The library is written atomically.
+    """
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
         text.write_text(source, encoding="utf-8")
         mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-        command = [found, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
-        result = subprocess.run(command, capture_output=True, text=True)
+        arguments = [command, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
+        result = subprocess.run(arguments, capture_output=True, text=True)
         if result.returncode:
             return result.stderr.strip() or "it gave no reason"
         os.replace(fresh, library)
@@ -154,9 +157,9 @@ def _compile(found: str, source: str, library: Path, wanted: Target) -> str | No
 
 
 @cache
-def _version(found: str) -> str:
-    """What a compiler calls itself."""
-    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout
+def _version(command: str) -> str:
+    """Version text of a compiler."""
+    return subprocess.run([command, "--version"], capture_output=True, text=True).stdout
 
 
 def _vector_functions(wanted: Target) -> str:
@@ -175,41 +178,41 @@ def _vector_functions(wanted: Target) -> str:
 
 
 class Parts:
-    """Functions that are printed in stages and share where the early stages save: one place after another."""
+    """Base of a C source: functions printed in stages, whose saved values share one array for each stage."""
 
     all: Sequence[Printed]
 
     def offset(self, stage: int, printed: Printed) -> int:
-        """Where a function's saved values of a stage begin."""
+        """Index of the first saved value of a function in the array of a stage."""
         before = self.all[: next(i for i, other in enumerate(self.all) if other is printed)]
         return sum(len(other.saved[stage]) for other in before)
 
     def total(self, stage: int) -> int:
-        """How many values a stage saves, at least one."""
+        """Number of values that a stage saves, at least 1 (C has no empty arrays)."""
         return max(1, sum(len(printed.saved[stage]) for printed in self.all))
 
     def stage(self, number: int, printed: Printed) -> str:
-        """One early stage of one function."""
+        """C statements of stage `number` of one function."""
         saves = [f"saved[{self.offset(number, printed) + i}] = {text};" for i, text in enumerate(printed.saved[number])]
         return self.block(printed, range(number), [*printed.lines[number], *saves])
 
     def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
-        """Lines that read what the named stages saved."""
+        """A C block with `lines`, preceded by pointers to the values that the given stages saved."""
         heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
 
 
 class _Source(Parts):
-    """Writes the C of one model: parameters once, held inputs once while held, rates and advance at every stage."""
+    """C source of one model: terms of parameters are computed once, terms of inputs once while they are constant."""
 
     def __init__(self, model: Dynamics, step: float, method: Method) -> None:
         self.model, self.step, self.method = model, step, method
-        self.own = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+        self.equations = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
-        self.all = [*self.own, *self.sums]
+        self.all = [*self.equations, *self.sums]
 
     def sum(self, i: int) -> str:
-        """The loop over components of one sum."""
+        """C loop over the components of sum `i`."""
         printed, term = self.sums[i], self.model.sums[i]
         before = [*printed.lines[2], f"V s2[] = {{ {', '.join((*printed.saved[2], 'K(0)'))} }};"]
         entries = sum(term.widths.values())
@@ -227,8 +230,8 @@ class _Source(Parts):
         return self.block(printed, (0, 1), [*before, loop])
 
     def functions(self) -> str:
-        """Stages, rates and advance."""
-        rates, advance = self.own
+        """C functions: stages, rates and advance."""
+        rates, advance = self.equations
         n = self.model.num_dof
         ends = [f"out[{i}] = {text};" for i, text in enumerate(rates.outputs)]
         lags = [f"out[{i}] = {text};" for i, text in enumerate(advance.outputs)]
@@ -248,7 +251,7 @@ const V dt[1] = {{ K(step) }};
 """
 
     def one_step(self) -> str:
-        """The integrator, by running it on names: what it would compute is written down instead."""
+        """One integrator step as C statements: `integrate` runs on buffer names, and each operation emits a line."""
         lines: list[str] = []
         num_states = len(self.model.state) + len(self.model.hidden)
 
@@ -258,7 +261,7 @@ const V dt[1] = {{ K(step) }};
 
         def rates(state: str, memory: str) -> str:
             out = name(num_states)
-            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, own, counts, {out});")
+            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, components, counts, {out});")
             return out
 
         def advance(memory: str, dt: float) -> str:
@@ -277,13 +280,15 @@ const V dt[1] = {{ K(step) }};
         return "\n".join([*lines, copy, lags])
 
     def text(self, wanted: Target) -> str:
-        """The whole source."""
+        """The complete C source for the target processor."""
         model = self.model
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
         nc, ne, parameters = len(model.commands), len(model.environment), len(model.parameters)
         widths = [sum(term.widths.values()) for term in model.drawn]
         block = 1 if widths else BLOCK
-        drawn = " ".join(f"own[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths))
+        drawn = " ".join(
+            f"components[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths)
+        )
         return f"""{head(wanted)}
 {self.functions()}
 {_MEASURE}
@@ -313,7 +318,7 @@ for (long front = first; front < last; front += {block}) {{
   }}
   for (long k = 0; k < steps; ++k) EACH_GROUP(end) {{
     V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
-    const U *own[{max(1, len(widths))}];
+    const U *components[{max(1, len(widths))}];
     {drawn}
     if (k == 0 || k < lengths[2])
       for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, k * {n} + i);
@@ -345,26 +350,26 @@ for (long front = first; front < last; front += {block}) {{
 
 @cache
 def _folder(wanted: str) -> Path:
-    """The user's cache, if libraries can be kept there, else a folder for this process."""
+    """Folder of compiled libraries: the user's cache if it is writable, else a temporary folder of this process."""
     folder = Path(wanted) / "shipid"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        own = tempfile.TemporaryDirectory(prefix="shipid-")
-        atexit.register(own.cleanup)
-        return Path(own.name)
+        temporary = tempfile.TemporaryDirectory(prefix="shipid-")
+        atexit.register(temporary.cleanup)
+        return Path(temporary.name)
 
 
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method) -> Any:
-    """The `run` of a model, compiled or from the cache."""
+    """The compiled function `run` of a model, from the cache if possible."""
     return compiled_for(lambda: _Source(model, step, method).text(target()))
 
 
 def compiled_for(source: Callable[[], str]) -> Any:
-    """The `run` of C source that is written on demand; ShipidError if there is no compiler or it fails."""
+    """The compiled function `run` of C source; ShipidError if there is no compiler or it fails."""
     if compiler() is None:
         raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
     try:
@@ -374,16 +379,16 @@ def compiled_for(source: Callable[[], str]) -> Any:
 
 
 def compiled(source: str) -> Any:
-    """The `run` of C source, compiled or from the cache; ShipidError if the compiler fails. There must be one."""
-    found = compiler()
-    assert found is not None
-    words = "\n".join([source, *OPTIONS, found, _version(found), platform.machine(), *sorted(_processor())])
+    """The compiled function `run` of C source, from the cache if possible; ShipidError if the compiler fails."""
+    command = compiler()
+    assert command is not None
+    words = "\n".join([source, *OPTIONS, command, _version(command), platform.machine(), *sorted(_processor())])
     folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
     library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
     try:
         return _loaded(library)
     except OSError:  # not there, or not whole
-        failure = _compile(found, source, library, target())
+        failure = _compile(command, source, library, target())
     if failure is not None:
         raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]})")
     return _loaded(library)
@@ -396,12 +401,12 @@ def _loaded(library: Path) -> Any:
 
 
 def head(wanted: Target) -> str:
-    """What every source begins with: the vector type of the target and its functions."""
+    """Common beginning of all C sources: the vector type of the target and its functions."""
     return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
 
 
 def padded(array: Array, wide: int) -> Array:
-    """(..., S) -> (..., wide), the last sample repeated."""
+    """Pad samples to whole vectors: (..., S) -> (..., wide), the last sample repeated."""
     fill = wide - array.shape[-1]
     filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
     return np.ascontiguousarray(filled, dtype=float)
@@ -445,19 +450,19 @@ def measure_native(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tupl
 
 
 def width(batch: Batch) -> int:
-    """Samples, filled up to whole vectors."""
+    """Number of samples, rounded up to whole vectors."""
     lanes = target().lanes
     return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
 def num_parts(batch: Batch) -> int:
-    """Into how many parts the samples go, so that all threads are busy to the end."""
+    """Number of parts of the samples for the threads: enough for an even load."""
     num_variants, groups = len(batch.parameters), width(batch) // target().lanes
     return min(-(-4 * cores() // num_variants), groups)
 
 
 def _run(model: Dynamics, batch: Batch, job: Job, worst: Array, **wanted: Array) -> None:
-    """Fill the arrays that are wanted; parts of the samples on threads, variants one after another."""
+    """Run a job and fill `worst` and the arrays in `wanted`; parts of the samples run on threads."""
     run, lanes, wide, parts = _library(model, job.step, job.method), target().lanes, width(batch), num_parts(batch)
     series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
     lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
@@ -487,17 +492,17 @@ def _run(model: Dynamics, batch: Batch, job: Job, worst: Array, **wanted: Array)
 
 
 def longs(*numbers: int) -> list[Any]:
-    """Whole numbers as C takes them."""
+    """Integers as C `long` arguments."""
     return [ctypes.c_long(number) for number in numbers]
 
 
 def address(array: Array | None, *place: int) -> Any:
-    """Where an array's entry at a place begins, as C takes it."""
+    """C pointer to the entry of an array at an index; a null pointer for None."""
     return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
 
 
 def spread(work: Callable[..., None], tasks: Iterable[tuple[int, ...]]) -> None:
-    """Do the work on each task, on as many threads as there are cores; an interrupt begins no new task."""
+    """Call `work` with each task, on as many threads as cores; after an interrupt no new task begins."""
     waiting = iter(tasks)
 
     def drain() -> None:

@@ -1,7 +1,7 @@
-"""Rollouts: one step rule, many ways to run it.
+"""Rollouts: simulations of many samples by many variants of a vessel, on any engine.
 
-The integrator is written once, over `rates` and `advance`. Where there is a C compiler it runs as C on SIMD vectors;
-else CasADi runs it sample by sample, PyTorch over whole batches. All give the same numbers, to rounding.
+The integrator is written once, for `rates` and `advance`. With a C compiler it runs as C on SIMD vectors; otherwise
+CasADi runs it sample by sample, or PyTorch in batches. The results of all engines are equal up to rounding.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from shipid.physics.helm import Helmsman
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
-SPEED_LIMIT = 100.0  # m/s: no ship, so the member has diverged
+SPEED_LIMIT = 100.0  # m/s: beyond any ship; a faster sample has diverged
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
 
 
 @dataclass(frozen=True)
 class Trajectories:
-    """What a rollout returns.
+    """Result of a rollout.
 
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
     diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
@@ -69,12 +69,12 @@ def rollout(
     start : state name -> (S,), SI; names that the vessel does not have are ignored, missing ones raise DataError.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
-    parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. Default: the vessel's own.
+    parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. Default: those of the vessel.
     memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
         from `shipid.simulation.sea`; default: none, calm water.
-    helmsman : gives the orders in place of the commands, which are then what he is told; see `simulation.manoeuvre`.
+    helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
     engine : `native` (C on SIMD vectors and threads), `casadi` (its virtual machine, sample by sample), `torch`
         (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
@@ -82,7 +82,7 @@ def rollout(
     """
     asked = named(engine, device)
     if num_steps < 1 or every < 1 or num_steps % every:
-        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, found {num_steps} and {every}")
+        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, not {num_steps} and {every}")
     given = start, commands, environment or {}, components or {}
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     names = channels(model)
@@ -95,7 +95,7 @@ def rollout(
 
 @dataclass(frozen=True)
 class Distances:
-    """How far variants end up from true paths; what was predicted is not kept.
+    """Distances of variants to true paths, without the predicted paths.
 
     total : (V, S) sum [m] over the steps of the distance to the true path.
     tally : (V, BINS) how often each distance occurs, see `shipid.metrics.tally`.
@@ -123,8 +123,8 @@ def distances(
 ) -> Distances:
     """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
 
-    As `rollout`, but the native engine measures while it runs, so that nothing grows with the horizon; the others keep
-    the paths of a few variants at a time.
+    For the other arguments see `rollout`. The native engine computes the distances during the rollout, so its memory
+    does not grow with the horizon. Other engines keep the paths of a few variants at a time.
     """
     num_steps = len(goal)
     asked = named(engine, device)
@@ -138,15 +138,17 @@ def distances(
         total, counts, worst = way.measure(model, batch, job, goal.transpose(0, 2, 1))
         return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~finite(batch))
     few = max(1, PATHS_KEPT // goal.size)
-    found = []
+    measured = []
     for first in range(0, len(batch.parameters), few):
         part = replace(batch, parameters=batch.parameters[first : first + few])
         with np.errstate(all="ignore"):
             records, worst = way.run(model, part, job)
             apart = [position_error(records[1:, v], goal) for v in range(records.shape[1])]
         diverged = ~(worst <= SPEED_LIMIT) | ~finite(part)
-        found.append((np.array([own.sum(axis=0) for own in apart]), np.array(list(map(tally, apart))), diverged))
-    return Distances(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        measured.append(
+            (np.array([errors.sum(axis=0) for errors in apart]), np.array(list(map(tally, apart))), diverged)
+        )
+    return Distances(*(np.concatenate(parts) for parts in zip(*measured, strict=True)))
 
 
 def prepared(
@@ -161,7 +163,7 @@ def prepared(
     tau_extra: Array | None,
     helmsman: Helmsman | None,
 ) -> tuple[Dynamics, Batch]:
-    """Equations and inputs as every engine takes them; whatever is missing or of another shape is told."""
+    """Equations, and inputs as a `Batch`; DataError or ShipidError for a missing input or a wrong shape."""
     model = dynamics(vessel, helmsman)
     if not start:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
@@ -170,7 +172,7 @@ def prepared(
         raise ShipidError("a rollout needs at least one sample")
     values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
     if values.shape[1] != len(model.parameters):
-        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), found {values.shape}")
+        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), not {values.shape}")
     begun = {**dict.fromkeys(model.hidden, np.zeros(num_samples)), **start}
     batch = Batch(
         state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel)[0],
@@ -185,12 +187,12 @@ def prepared(
 
 
 def channels(model: Dynamics) -> tuple[str, ...]:
-    """Names of what a rollout can record: states, hidden states of terms, what actuators have reached."""
+    """Names of all channels that a rollout can record: states, states of terms, actuator states (`actual.port.n`)."""
     return (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
 
 
 def places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:
-    """Places of the channels to keep; ShipidError for one that the vessel does not have."""
+    """Indices of the channels to keep in `names`; ShipidError for an unknown channel."""
     unknown = next((name for name in kept if name not in names), None)
     if unknown is not None:
         raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
@@ -227,7 +229,7 @@ def _channels(
 
 
 def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, num_steps: int, vessel: Vessel) -> Array:
-    """Hidden memories (nm, S) at the start: as given, else what a helmsman begins with and orders already reached."""
+    """Memories (nm, S) at the start: as given, or the initial values of the helmsman and the first orders."""
     num_samples = batch.state.shape[1]
     begun = model.helmsman.memory if model.helmsman else {}
     helm = {f"{HELM}.{name}": np.full(num_samples, float(value)) for name, value in begun.items()}
@@ -245,16 +247,16 @@ def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, n
 
 
 def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
-    """Drawn components, channel first, for each sum that has them; still water where none are given."""
+    """Components (num_entries, S, num_components) of each sum with drawn components; zeros if none are given."""
     result = []
     for term in model.drawn:
         entries = sum(term.widths.values())
-        found = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
-        if found.ndim != 3 or found.shape[::2] != (num_samples, entries):
+        values = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
+        if values.ndim != 3 or values.shape[::2] != (num_samples, entries):
             raise ShipidError(
-                f"components of {term.path} must be ({num_samples}, count, {entries}), found {found.shape}"
+                f"components of {term.path} must be ({num_samples}, count, {entries}), not {values.shape}"
             )
-        result.append(np.ascontiguousarray(found.transpose(2, 0, 1)))
+        result.append(np.ascontiguousarray(values.transpose(2, 0, 1)))
     return tuple(result)
 
 

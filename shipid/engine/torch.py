@@ -21,7 +21,7 @@ EAGER_BLOCK = 16384  # samples x variants of one block
 COMPILED_BLOCK = 8192  # samples of one block, one variant
 DEVICE_BLOCK = 262144  # samples of one block on a GPU
 GRAIN = 256  # compiled blocks are a multiple of it: similar batches share a kernel
-COMPONENT_GRAIN = 8  # the same where each sample has components of its own
+COMPONENT_GRAIN = 8  # grain of compiled blocks if each sample has drawn components
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Program:
 
 @lru_cache(maxsize=32)
 def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], varying: bool) -> Program:
-    """Lower the functions of a vessel's structure and put the integrator around them."""
+    """Lower the functions of a vessel structure to PyTorch, and build the integrator step from them."""
     functions = [lower(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
     num_drawn, speeds = len(model.drawn), slice(model.num_dof, 2 * model.num_dof)
     fixed = [None if term.arrays is None else torch.tensor(term.arrays.T) for term in model.sums]
@@ -99,7 +99,9 @@ def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...]
             method,
         )
         both = torch.cat([after, memory_after])
-        speed = torch.maximum(greatest, after[speeds].abs().amax(0)) + 0 * both.sum(0)  # not finite stays so
+        speed = torch.maximum(greatest, after[speeds].abs().amax(0)) + 0 * both.sum(
+            0
+        )  # keeps values that are not finite
         return after, memory_after, speed, torch.stack([both[row] for row in rows])
 
     return Program(parameters_stage, held_stage, rates, advance, one_step)
@@ -110,10 +112,10 @@ kernels: dict[Key, Callable[..., Any]] = {}
 
 
 def _compiled(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> Callable[..., Any]:
-    """A function as one kernel for the shapes at hand, from a cache; as much slower to make as it is faster to run.
+    """A function compiled to one kernel for the shapes of the inputs, from a cache.
 
-    It is traced and handed to TorchInductor directly: a compilation takes less than half the time of `torch.compile`,
-    and a call has no guards to check. Shapes are the key, so they need none.
+    It is traced and compiled by TorchInductor directly: this takes less than half the time of `torch.compile`, and a
+    call checks no guards. None are needed, because shapes are part of the cache key.
     """
     key = (function, tuple(tuple(tensor.shape) for tensor in inputs), inputs[0].device)
     if key not in kernels:
@@ -141,14 +143,14 @@ def _runner(program: Program, method: Method, inputs: Sequence[torch.Tensor], nu
 
 
 def _stacked(channels: Sequence[Any], like: torch.Tensor) -> torch.Tensor:
-    """Channels as one tensor of the shape of `like`; plain numbers and what is the same for all are spread."""
+    """Channels as one tensor of the shape of `like`; numbers and smaller tensors are broadcast."""
     if not channels:
         return like
     return torch.stack([torch.as_tensor(channel, dtype=like.dtype).expand(like.shape[1:]) for channel in channels])
 
 
 def _sum(value: Any, count: int) -> Any:
-    """Sum over components (last axis); what is the same for all of them counts as often as there are components."""
+    """Sum over `count` components (last axis); a value without that axis is multiplied by `count`."""
     if not isinstance(value, torch.Tensor):
         return count * value
     return value.expand(*value.shape[:-1], count).sum(-1)
@@ -193,15 +195,15 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
                 target = records[:, :, group, block]
                 target[0] = both[rows]
                 greatest = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
-                own = [part[:, :, block].contiguous() for part in drawn]
+                drawn_here = [part[:, :, block].contiguous() for part in drawn]
                 known = saved if varying else program.held_stage(commands[0], environment[0], saved)
                 advance = _whole(program)
                 for k in range(num_steps):
                     if varying:
                         known = [_at(commands, k), _at(environment, k), *saved]
-                    inputs = [x, m, greatest, _at(tau, k), *own, *known]
+                    inputs = [x, m, greatest, _at(tau, k), *drawn_here, *known]
                     if compiled and k == 0:
-                        advance = _runner(program, job.method, inputs, len(own))
+                        advance = _runner(program, job.method, inputs, len(drawn_here))
                     x, m, greatest, record = advance(*inputs)
                     if (k + 1) % every == 0:
                         target[(k + 1) // every] = record
@@ -211,7 +213,7 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
 
 
 def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
-    """A loss on the job's channels and its derivatives, by PyTorch's reverse mode; as `gradient_native`."""
+    """A loss on the job's channels and its derivatives, by PyTorch's reverse mode; see `gradient_native`."""
     program = _program(model, job.method, job.step, job.rows, True)
     place, num_samples = torch.device(job.device), batch.state.shape[1]
 
@@ -231,24 +233,24 @@ def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, .
         x, m, worst, record = _whole(program)(x, m, worst.detach(), force[k], *known)
         records.append(record)
     path = torch.stack(records)[:, :, 0].transpose(1, 2)  # (T + 1, S, C)
-    found = path.detach().cpu().numpy()
-    losses, slopes = checked_loss(loss, found)
+    numbers = path.detach().cpu().numpy()
+    losses, slopes = checked_loss(loss, numbers)
     inputs = [start, values, force]
     gradients = torch.autograd.grad(path, inputs, torch.tensor(slopes, device=place), allow_unused=True)
     state, parameters, tau = (
         (torch.zeros_like(one) if gradient is None else gradient).squeeze(-2).cpu().numpy()
         for one, gradient in zip(inputs, gradients, strict=True)
     )
-    return Adjoint(losses, found, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
+    return Adjoint(losses, numbers, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
 
 
 def _at(series: torch.Tensor, k: int) -> torch.Tensor:
-    """Entry k of a series in time, or the one that is held."""
+    """Entry k of a time series; the last entry if the series is shorter (constant input)."""
     return series[min(k, len(series) - 1)]
 
 
 def _width(num_samples: int, num_variants: int, num_components: int, compiled: bool, device: str) -> int:
-    """Samples of a block: equal blocks that leave little to pad and whose intermediate results stay in the cache."""
+    """Number of samples in a block: equal blocks with little padding whose intermediate results fit in the cache."""
     most = DEVICE_BLOCK if device != "cpu" else COMPILED_BLOCK if compiled else max(256, EAGER_BLOCK // num_variants)
     grain = GRAIN if compiled else 1
     if num_components > 1:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
+from pydantic import BaseModel, ConfigDict, PositiveFloat, field_validator
 
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
@@ -67,19 +67,28 @@ class Memory(BaseModel):
     ----------
     history : u, v, r and the commands so long ago, less their present values.
     turned : change of heading over so long.
+    observer : the estimates of the observer of the physics: slow forces as accelerations, current, and the filtered
+        velocities less the measured ones. Nothing where the physics has no observer.
     error : what the physics, started so long ago with the commands then given, gets wrong by now: along and across the
-        present heading, and in u, v, r. It holds wind, current, and what the model lacks. 0: not taken.
+        present heading, and in u, v, r. It holds wind, current, and what the model lacks. One number or several.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     history: tuple[PositiveFloat, ...] = ()
     turned: tuple[PositiveFloat, ...] = ()
-    error: NonNegativeFloat = 0.0
+    error: tuple[PositiveFloat, ...] = ()
+    observer: bool = False
+
+    @field_validator("history", "turned", "error", mode="before")
+    @classmethod
+    def _several(cls, value: Any) -> Any:
+        """Take one number as a list of one; 0 as none."""
+        return ((value,) if value else ()) if isinstance(value, int | float) else value
 
     @property
     def past(self) -> float:
         """Length of the past that is needed [s]."""
-        return max((*self.history, *self.turned, self.error), default=0.0)
+        return max((*self.history, *self.turned, *self.error), default=0.0)
 
 
 NOTHING = Memory()
@@ -109,10 +118,13 @@ class Inputs:
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
-        seconds = self.memory.error
-        if not seconds or physics.vessel is None:
+        if physics.vessel is None:
             return {}
-        return {f"error-{seconds:g}.{name}": values for name, values in past_error(physics, instants, seconds).items()}
+        table = estimates(instants) if self.memory.observer and physics.observer is not None else {}
+        for seconds in self.memory.error:
+            errors = past_error(replace(physics, observer=None), instants, seconds)
+            table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
+        return table
 
     def _history(self, instants: Instants, step: float) -> dict[str, Array]:
         found: dict[str, Array] = {}
@@ -147,15 +159,32 @@ class Inputs:
 
 
 def group_of(name: str) -> str:
-    """Kind of an input by its name: `motion`, `wind`, `command` (a plan too), `history`, `error` or `physics`."""
+    """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.
+
+    A plan is a command; `physics` is a trajectory over the horizon.
+    """
     if name in MOTIONS:
         return "motion"
     if name.endswith("_rw"):
         return "wind"
-    kind = re.match(r"(?:.*\.)?(past|turned|error|physics)-", name)
+    kind = re.match(r"(?:.*\.)?(past|turned|error|observer|physics)-", name)
     if kind is None:
         return "command"
-    return kind[1] if kind[1] in ("error", "physics") else "history"
+    return kind[1] if kind[1] in ("error", "observer", "physics") else "history"
+
+
+def estimates(instants: Instants) -> dict[str, Array]:
+    """Estimates of the observer as inputs (S,), in body axes.
+
+    `observer-force.u`, `.v`, `.r` [m/s^2, rad/s^2]; `observer-current.u`, `.v` [m/s]; `observer-wave.u`, `.v`, `.r`
+    [m/s, rad/s]: the measured velocity less the filtered one.
+    """
+    known, columns = instants.estimates, instants.columns
+    table = {f"observer-force.{motion}": known[f"observer.{name}"] for motion, name in zip(MOTIONS, "XYN", strict=True)}
+    c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
+    north, east = known["observer.current_north"], known["observer.current_east"]
+    table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
+    return table | {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in MOTIONS}
 
 
 def steps_of(seconds: float, step: float) -> int:

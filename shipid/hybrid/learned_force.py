@@ -202,7 +202,7 @@ def mass(physics: Physics, at: Instants) -> Array:
     rows = [axes.index(axis) for axis in (0, 1, 5)]
     forces = np.zeros((1, 3, len(axes)))
     forces[0, range(3), rows] = PROBE
-    single = replace(physics, horizon=1, integrator="euler")
+    single = replace(physics, horizon=1, integrator="euler", observer=None)
     pushed = single.states(at.select([0, 0, 0]), tau_extra=forces)
     calm = single.states(at)
     moved = np.stack([pushed[name][0] - calm[name][0] for name in ("u", "v", "r")])  # (3, forces)

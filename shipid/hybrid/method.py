@@ -73,6 +73,7 @@ class Task:
     known : whether the commands over the horizon are known to a prediction.
     seed : of all that is random.
     hidden : foundation -> states of its actuators at the instants (S,), where it has any.
+    estimates : foundation -> what its observer knows at the instants (S,), where it has one.
     on_trial : called with (trials done, trials in all) after each trial.
     device : a PyTorch device.
     """
@@ -84,6 +85,7 @@ class Task:
     known: bool = False
     seed: int = 0
     hidden: Mapping[str, Mapping[str, Array] | None] = field(default_factory=dict)
+    estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     on_trial: Callable[[int, int], None] | None = None
     device: str = "cpu"
 
@@ -93,7 +95,8 @@ class Task:
 
     def instants(self, name: str) -> Instants:
         """What a prediction of a foundation knows at each window."""
-        return self.windows.instants(known=self.known, hidden=self.hidden.get(name))
+        hidden, estimates = self.hidden.get(name), self.estimates.get(name)
+        return self.windows.instants(known=self.known, hidden=hidden, estimates=estimates)
 
     @property
     def targets(self) -> dict[str, Array]:

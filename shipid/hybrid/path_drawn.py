@@ -20,7 +20,9 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched, spread
 
 RIDGES = 9  # of a range
-MEMORIES = ((), ("error",), ("history", "error"))  # that validation chooses from
+KINDS = ("history", "error", "observer")  # of memory
+CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from
+OBSERVED = (("observer",), KINDS)  # and with estimates of an observer
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
@@ -41,9 +43,9 @@ class PathDrawn(Searched):
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
     averaged : the compensation is the mean of the networks of so many best trials.
-    memory : what the inputs hold of the past; `history_scale` and `error_scale` are the scales of these inputs.
-    choose : whether validation chooses between no memory, the error of the physics, and that with history: each is
-        tried in a third of the trials (without physics: no memory or history, a half each).
+    memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
+    choose : whether validation chooses between no memory, the error of the physics, and that with history; with
+        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -52,6 +54,7 @@ class PathDrawn(Searched):
         "wind_scale",
         "history_scale",
         "error_scale",
+        "observer_scale",
         "offset",
         "ridge",
     )
@@ -70,6 +73,7 @@ class PathDrawn(Searched):
     memory: Memory = Memory()
     history_scale: Scale = (2.0, 32.0)
     error_scale: Scale = (2.0, 32.0)
+    observer_scale: Scale = (2.0, 32.0)
     choose: bool = False
 
     @property
@@ -85,12 +89,18 @@ class PathDrawn(Searched):
         """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""
         idle = set() if self.memory.history or self.memory.turned else {"history_scale"}
         idle |= set() if self.memory.error else {"error_scale"}
+        idle |= set() if self.memory.observer else {"observer_scale"}
         return {name: pair for name, pair in super().ranges().items() if name not in idle}
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
         """Return the kinds of memory that a trial does without."""
-        taken = MEMORIES[int(point["memory"])] if "memory" in point else ("history", "error")
-        return frozenset({"history", "error"} - set(taken))
+        taken = self.memories[int(point["memory"])] if "memory" in point else KINDS
+        return frozenset(set(KINDS) - set(taken))
+
+    @property
+    def memories(self) -> tuple[tuple[str, ...], ...]:
+        """Kinds of memory that validation chooses from."""
+        return (*CHOICES, *OBSERVED) if self.memory.observer else CHOICES
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
@@ -109,7 +119,7 @@ class PathDrawn(Searched):
         for number, shares in enumerate(spread(len(ranges) + 1, self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
-                point["memory"] = float(number % len(MEMORIES))
+                point["memory"] = float(number % len(self.memories))
             for share, (name, (low, high)) in zip(shares[1:], ranges.items(), strict=True):
                 point[name] = exp(log(low) + share * (log(high) - log(low)))
             found.append(point)

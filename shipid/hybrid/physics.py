@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from shipid.data.windows import Instants, from_frame, to_frame
 from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import Distances, distances, rollout
-from shipid.errors import DataError
+from shipid.engine.rollout import Distances, Trajectories, distances, rollout
+from shipid.errors import DataError, ShipidError
+from shipid.observer import Observer, bank, observed_start
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
+Inputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
+"""Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +29,17 @@ class Physics:
 
     vessel : equations with their numbers; None is no physics, whose paths are zero.
     integrator : `euler` or `rk4`. Wind is held at its value at the instant, commands are held or planned.
+    observer : with one, the physics starts from the filtered state in moving water, under the slow force as it fades;
+        instants must then hold its `estimates`.
+    path : where true positions come from, see `cut_windows`.
     """
 
     vessel: Vessel | None
     horizon: int
     step: float
     integrator: Integrator = "euler"
+    observer: Observer | None = None
+    path: Literal["position", "velocity"] = "position"
 
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""
@@ -51,32 +59,34 @@ class Physics:
 
         What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see `assumed`.
         """
-        found = self._rollout(instants, ("north", "east"), parameters, device)
-        north, east = found["north"], found["east"]
+        result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
+        columns, zero = instants.columns, np.zeros(len(instants))
         with np.errstate(invalid="ignore"):  # a diverged path is flagged, and no news to the caller
-            x, y = to_frame(north[1:], east[1:], north[0], east[0], instants.columns["psi"])
-        return np.stack([x, y], axis=-1), found.diverged
+            x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
+        return np.stack([x, y], axis=-1), result.diverged
 
     def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = "auto") -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
 
-        tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none.
+        tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
+        those through the water.
         engine : as in `rollout`.
         """
-        assert self.vessel is not None
-        found = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
+        result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
+        columns, zero = instants.columns, np.zeros(len(instants))
+        origin = columns.get("north", zero), columns.get("east", zero), columns["psi"]
         with np.errstate(invalid="ignore"):
-            origin = found["north"][0, 0], found["east"][0, 0], instants.columns["psi"]
-            x, y = to_frame(found["north"][1:, 0], found["east"][1:, 0], *origin)
-        return {"x": x, "y": y, **{name: found[name][1:, 0] for name in MOTION}}
+            x, y = to_frame(north[:, 0], east[:, 0], *origin)
+        return {"x": x, "y": y, **{name: result[name][1:, 0] for name in MOTION}}
 
     def reached(self, instants: Instants) -> dict[str, Array]:
         """What the actuators have reached after 0..T steps, name -> (T + 1, S); none where orders act at once."""
         names = () if self.vessel is None else tuple(dynamics(self.vessel).memory)
         if not names:
             return {}
-        found = self._rollout(instants, tuple(f"actual.{name}" for name in names), None, "cpu")
-        return {name: found[f"actual.{name}"][:, 0] for name in names}
+        kept = ("north", "east", *(f"actual.{name}" for name in names))
+        result, _ = self._rollout(instants, kept, None, "cpu")
+        return {name: result[f"actual.{name}"][:, 0] for name in names}
 
     def gradient(
         self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None
@@ -87,26 +97,33 @@ class Physics:
         Windows on which the rollout diverges are left out; the error is infinite where all do.
         """
         assert self.vessel is not None
+        start, commands, environment, slow, drift = self._inputs(instants)
         found = rollout_gradient(
             self.vessel,
-            *self._inputs(instants),
-            squared_distance(self._north_east(instants, future)),
+            start,
+            commands,
+            environment,
+            squared_distance(self._north_east(instants, future, drift)),
             step=self.step,
             num_steps=self.horizon,
             method=self.integrator,
             names=names,
             parameters=parameters,
             memory=instants.hidden,
+            tau_extra=slow,
         )
         sound = ~found.diverged
         if not sound.any():
             return float("inf"), np.zeros(len(names))
         return float(found.loss[sound].mean()), np.asarray(found.parameters[sound].mean(axis=0))
 
-    def _north_east(self, instants: Instants, future: Array) -> Array:
-        """Paths (T, S, 2) [m] in the frame (11) as north and east."""
+    def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
+        """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""
         origin = (instants.columns.get(name, np.zeros(len(instants))) for name in ("north", "east", "psi"))
-        return np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1)
+        goal = np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1)
+        if drift is not None:
+            goal = goal - self.step * np.arange(1, len(future) + 1)[:, None, None] * drift.T
+        return goal
 
     def distances(
         self,
@@ -119,10 +136,15 @@ class Physics:
     ) -> Distances:
         """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11), without keeping paths."""
         assert self.vessel is not None
+        if self.observer is not None:
+            raise ShipidError("screening takes no observer: screen the family that it extends", path="observer")
+        start, commands, environment, _, _ = self._inputs(instants)
         return distances(
             self.vessel,
-            *self._inputs(instants),
-            self._north_east(instants, future),
+            start,
+            commands,
+            environment,
+            self._north_east(instants, future, None),
             step=self.step,
             method=self.integrator,
             parameters=parameters,
@@ -139,31 +161,48 @@ class Physics:
         device: str,
         tau_extra: Array | None = None,
         engine: str = "auto",
-    ) -> Any:
+    ) -> tuple[Trajectories, tuple[Array, Array]]:
+        """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
         assert self.vessel is not None
-        return rollout(
+        start, commands, environment, slow, drift = self._inputs(instants)
+        result = rollout(
             self.vessel,
-            *self._inputs(instants),
+            start,
+            commands,
+            environment,
             step=self.step,
             num_steps=self.horizon,
             method=self.integrator,
             parameters=parameters,
             memory=instants.hidden,
-            tau_extra=tau_extra,
+            tau_extra=slow if tau_extra is None else tau_extra if slow is None else slow + tau_extra,
             keep=keep,
             engine=engine,
             device=device,
         )
+        north, east = result["north"][1:], result["east"][1:]
+        if drift is not None:
+            ages = self.step * np.arange(1, self.horizon + 1)[:, None, None]
+            north, east = north + ages * drift[0], east + ages * drift[1]
+        return result, (north, east)
 
-    def _inputs(self, instants: Instants) -> tuple[dict[str, Array], Mapping[str, Array], dict[str, Array]]:
-        """Start, commands and environment of a rollout; states and weather without a column are zero."""
+    def _inputs(self, instants: Instants) -> Inputs:
+        """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
         assert self.vessel is not None
         model = dynamics(self.vessel)
         zero = np.zeros(len(instants))
-        columns = {"down": instants.columns.get("z", zero), **instants.columns}
-        start = {name: columns.get(name, zero) for name in model.state}
+        columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}
+        commands = {**columns, **(instants.planned or {})}
         environment = {name: columns.get(name, zero) for name in model.environment}
-        return start, {**columns, **(instants.planned or {})}, environment
+        slow = drift = None
+        if self.observer is not None:
+            if not instants.estimates:
+                raise DataError("the physics has an observer: instants must hold its estimates", path="observer")
+            observed = {**columns, **instants.estimates}
+            begun = observed_start(bank(self.vessel, self.observer), observed, self.horizon, self.step, self.path)
+            columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
+        start = {name: columns.get(name, zero) for name in model.state}
+        return start, commands, environment, slow, drift
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
@@ -178,7 +217,7 @@ def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> No
     if missing:
         commands = sorted(name for name in columns if "." in name)
         raise DataError(
-            f"{vessel.name} takes this command; the data have {', '.join(commands) or 'no commands'}",
+            f"{vessel.name} needs this command; the data have {', '.join(commands) or 'no commands'}",
             file=file,
             path=missing[0],
         )

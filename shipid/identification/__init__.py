@@ -1,1 +1,1 @@
-"""From runs to better physics: parameters fitted to measured motion, and what the data say about them."""
+"""System identification: vessel parameters fitted to recorded runs, their uncertainty and identifiability."""

@@ -1,4 +1,4 @@
-"""Which parameters a set of sensitivities can tell apart, and which only together.
+"""Collinearity of sensitivities: which parameters the data distinguish, and which only in combination.
 
 Columns are scaled to unit length, as both sources ask, so that nothing depends on units. Then
 
@@ -6,9 +6,9 @@ Columns are scaled to unit length, as both sources ask, so that nothing depends 
     eta_k   = largest / k-th singular value of S              condition index (Belsley, Kuh, Welsch 1980, ch. 3)
     pi_kj   = (V_jk / s_k)^2 / sum_k (V_jk / s_k)^2           share of the variance of parameter j that comes from k
 
-gamma above 10 to 15: a change of one parameter is made good to within 1 / gamma by the others. eta above 30 with two
-shares above 0.5: a dependency that harms. Neither knows the noise: parameters may be collinear and still be found, from
-data that are many or good enough; so these explain an interval that is too wide, they do not judge alone.
+gamma above 10 to 15: the other parameters can compensate a change of one parameter to within 1 / gamma. eta above 30
+with two shares above 0.5: a harmful dependency. Neither index depends on the noise: collinear parameters may still be
+identified from enough good data. So the indices explain a wide interval; they are not a criterion by themselves.
 
 Sources: Brun, Reichert, Kuensch, Water Resources Research 37 (2001) 1015; Belsley, Kuh, Welsch, Regression Diagnostics
 (1980), ch. 3.
@@ -32,10 +32,11 @@ UNSEEN = 1e-10  # of the largest eigenvalue, with columns of unit length: below 
 
 @dataclass(frozen=True)
 class Combination:
-    """Parameters that only their combination is known of.
+    """A set of parameters of which the data determine only a combination.
 
-    paths : its members, and names : as short as is clear. weights : change of each factor along the unseen direction,
-    the largest 1. gamma : collinearity index of the members; infinite for one that has no effect at all.
+    paths : dotted paths of the parameters. names : the shortest unambiguous names.
+    weights : relative change of each factor along the direction that leaves the residuals unchanged; the largest is 1.
+    gamma : collinearity index of the set; infinite for a parameter without any effect.
     """
 
     paths: tuple[str, ...]
@@ -44,15 +45,15 @@ class Combination:
     gamma: float
 
     def sentence(self) -> str:
-        """What is not seen, in words."""
+        """One sentence that names the parameters and the unidentified direction."""
         if len(self.names) == 1:
-            return f"{self.names[0]} has no effect on what these data hold"
+            return f"{self.names[0]} has no effect on these data"
         moves = [f"{10 * w:+.2g} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
-        return f"only {listed(self.names)} together; {' with '.join(moves)} is not seen by these data"
+        return f"only {listed(self.names)} together; {' with '.join(moves)} has no effect on these data"
 
 
 def short(paths: Sequence[str]) -> tuple[str, ...]:
-    """Names for people: the last part of a path where it is the only one so called."""
+    """Short names: the last part of each dotted path where that is unique, else the whole path."""
     last = [path.rsplit(".", 1)[-1] for path in paths]
     return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
@@ -69,8 +70,9 @@ class Collinearity:
     sensitivity : root mean square of each column, (n,): delta^msqr of Brun et al.
     gamma : collinearity index of all parameters that have an effect.
     indices : condition indices, rising, (n,). shares : variance shares, (n, n), rows as the indices; columns sum to 1.
-    directions : changes of the factors, one a row as the indices, columns of unit length in the residuals.
-    combinations : the smallest sets that cannot be told apart.
+    directions : (n, n), one direction of the factors in each row, in the order of `indices`; each factor is scaled by
+        the length of its column.
+    combinations : the smallest sets of parameters that the data do not distinguish.
     """
 
     paths: tuple[str, ...]
@@ -83,7 +85,7 @@ class Collinearity:
 
 
 def collinearity(jacobian: Array, paths: Sequence[str]) -> Collinearity:
-    """Diagnose the sensitivities d residual / d factor (m, n) of parameters by name."""
+    """Collinearity diagnostics of the sensitivities d residual / d factor (m, n); `paths` names the n columns."""
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     moved = lengths > 0
     scaled = _unit(jacobian)
@@ -104,7 +106,7 @@ def collinearity(jacobian: Array, paths: Sequence[str]) -> Collinearity:
 
 
 def index_of(jacobian: Array) -> float:
-    """Collinearity index gamma_K of all columns; 1 for columns at right angles, infinite for a dependency."""
+    """Collinearity index gamma_K of all columns: 1 for orthogonal columns, infinite for dependent ones."""
     if jacobian.shape[1] == 0:
         return 1.0
     smallest = float(np.linalg.eigvalsh(_gram(jacobian))[0])
@@ -112,32 +114,33 @@ def index_of(jacobian: Array) -> float:
 
 
 def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLINEAR) -> tuple[Combination, ...]:
-    """Smallest sets whose collinearity index is above `most`, each parameter in one at most; worst first.
+    """Smallest sets with a collinearity index above `most`; worst first.
 
-    From all parameters, those are taken out one by one without which the rest is most collinear; what cannot shrink
-    further is a set. Its member of the greatest weight is then set aside and the search goes on.
+    Backward elimination: parameters are removed one by one, each time the one whose removal leaves the most collinear
+    rest, until every further removal brings the index below `most`. What is left is one set. Its parameter with the
+    greatest weight is then excluded, and the search is repeated.
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     silent = np.flatnonzero(lengths <= np.sqrt(UNSEEN) * lengths.max(initial=0.0)).tolist()
     names = short(paths)
-    found = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
+    result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
     gram = _gram(jacobian)
     left = [j for j in range(len(paths)) if j not in silent]
     while len(left) > 1 and _gamma(gram, left) > most:
-        own = _shrunk(gram, left, most)
-        weights = _weakest(gram, own) / lengths[own]
+        chosen = _shrunk(gram, left, most)
+        weights = _weakest(gram, chosen) / lengths[chosen]
         weights = weights / weights[np.argmax(np.abs(weights))]
-        members = tuple(paths[j] for j in own), tuple(names[j] for j in own)
-        found.append(Combination(*members, tuple(map(float, weights)), _gamma(gram, own)))
-        left.remove(own[int(np.argmax(np.abs(_weakest(gram, own))))])
-    return tuple(found)
+        labels = tuple(paths[j] for j in chosen), tuple(names[j] for j in chosen)
+        result.append(Combination(*labels, tuple(map(float, weights)), _gamma(gram, chosen)))
+        left.remove(chosen[int(np.argmax(np.abs(_weakest(gram, chosen))))])
+    return tuple(result)
 
 
 def _shrunk(gram: Array, members: list[int], most: float) -> list[int]:
-    """The smallest set with an index above `most` that taking out one member after another leads to."""
+    """Remove members one by one while the collinearity index stays above `most`; the members that are left."""
     while len(members) > 2:
-        without = [[own for own in members if own != gone] for gone in members]
-        gammas = [_gamma(gram, own) for own in without]
+        without = [[smaller for smaller in members if smaller != gone] for gone in members]
+        gammas = [_gamma(gram, smaller) for smaller in without]
         best = int(np.argmax(gammas))
         if gammas[best] <= most:
             break
@@ -151,12 +154,12 @@ def _gamma(gram: Array, members: list[int]) -> float:
 
 
 def _weakest(gram: Array, members: list[int]) -> Array:
-    """Direction of unit columns that the residuals see least."""
+    """Unit vector of the smallest eigenvalue of the scaled Gram matrix: the direction with the least effect."""
     return np.asarray(np.linalg.eigh(gram[np.ix_(members, members)])[1][:, 0])
 
 
 def _unit(jacobian: Array) -> Array:
-    """Columns of unit length; those of no effect stay 0."""
+    """The columns scaled to unit length; zero columns stay 0."""
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     return np.asarray(jacobian / np.where(lengths > 0, lengths, 1.0))
 
@@ -167,6 +170,6 @@ def _gram(jacobian: Array) -> Array:
 
 
 def _eigen(matrix: Array) -> tuple[Array, Array]:
-    """Eigenvalues falling, and eigenvectors as columns in their order."""
+    """Eigenvalues in falling order, and the eigenvectors as columns in that order."""
     values, vectors = np.linalg.eigh(matrix)
     return values[::-1], vectors[:, ::-1]

@@ -1,4 +1,4 @@
-"""The variational step as C on SIMD vectors: several intervals a vector, groups of vectors on threads."""
+"""The variational equations compiled as C: each SIMD lane integrates one prediction, groups of lanes run on threads."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ THREADS_FROM = 1e5  # vectors stepped: below it starting a thread costs more tha
 
 
 class _Source:
-    """Writes the C of one variation: what depends on numbers alone once, on commands and weather once a step."""
+    """C source of one variation: terms of parameters alone are computed once, terms of the inputs once per step."""
 
     def __init__(self, model: Variation) -> None:
         self.model = model
         self.parts = [print_function(f, STAGES, C) for f in (model.rates, model.advance, model.outputs)]
 
     def total(self, stage: int) -> int:
-        """How many values a stage saves, at least one."""
+        """Number of values that stage `stage` saves, at least 1 (C has no empty arrays)."""
         return max(1, sum(len(printed.saved[stage]) for printed in self.parts))
 
     def stage(self, number: int) -> str:
-        """One early stage of all parts."""
+        """Statements of stage `number` (0: once per prediction, 1: once per step) for all three functions."""
         return " ".join(
             self.block(
                 printed,
@@ -50,7 +50,7 @@ class _Source:
         )
 
     def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
-        """Lines that read what the named stages saved."""
+        """A C block with `lines`, preceded by pointers to the values that the given stages saved."""
         heads = [f"const V *s{stage} = saved{stage} + {self._offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
 
@@ -59,13 +59,13 @@ class _Source:
         return sum(len(other.saved[stage]) for other in before)
 
     def main(self, number: int) -> str:
-        """What one part does at every stage of the integrator."""
+        """Body of function `number` (rates, advance, outputs): the part evaluated at every integrator stage."""
         printed = self.parts[number]
         ends = [f"out[{i}] = {text};" for i, text in enumerate(printed.outputs)]
         return self.block(printed, (0, 1), [*printed.lines[2], *ends])
 
     def one_step(self) -> str:
-        """The integrator, by running it on names: what it would compute is written down instead."""
+        """One integrator step as C statements: `integrate` runs on buffer names, and each operation emits a line."""
         lines: list[str] = []
         num_z, num_m = self.model.rates.size1_in(0), self.model.rates.size1_in(1)
 
@@ -97,7 +97,7 @@ class _Source:
         return "\n".join(lines)
 
     def text(self, wanted: Target) -> str:
-        """The whole source."""
+        """The complete C source for the target processor."""
         model = self.model
         num_z, num_m = model.rates.size1_in(0), model.rates.size1_in(1)
         fixed, known = model.rates.size1_in(2), model.rates.size1_in(3)
@@ -141,14 +141,18 @@ def _library(layout: Layout) -> Any:
 
 
 def pack(array: Array) -> Array:
-    """(K, ..., entries) -> (groups, ..., entries, lanes), the last interval repeated."""
+    """Group predictions by SIMD lanes: (K, ..., entries) -> (groups, ..., entries, lanes); the last one is repeated."""
     lanes, count = target().lanes, len(array)
     filled = np.concatenate([array, np.repeat(array[-1:], -count % lanes, axis=0)])
     return np.ascontiguousarray(np.moveaxis(filled.reshape(-1, lanes, *array.shape[1:]), 1, -1), dtype=float)
 
 
 def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
-    """As `sensitivities.run_machine`, but known and seen are packed, and so are the outputs: (groups, lanes, N, .)."""
+    """Outputs (groups, lanes, N, .) of K predictions, by the compiled library.
+
+    x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
+    known, seen : inputs and measured signals of each step, grouped by `pack`: (groups, N, ., lanes).
+    """
     run, model = _library(layout), variation(layout)
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]

@@ -1,4 +1,4 @@
-"""What the page of an identification shows, assembled from its outcome."""
+"""Content of the report page of an identification, assembled from its outcome."""
 
 from __future__ import annotations
 
@@ -11,38 +11,41 @@ from shipid.report.identification import IdentificationContent
 from shipid.version import __version__
 
 
-def identification_content(found: Identified, dataset: str | Path, command: str = "") -> IdentificationContent:
-    """Assemble the page: `dataset` is the file of the runs, `command` the line that reproduces the outcome."""
+def identification_content(outcome: Identified, dataset: str | Path, command: str = "") -> IdentificationContent:
+    """Assemble the page content.
+
+    outcome : a finished identification. dataset : file of the runs. command : command line that reproduces the outcome.
+    """
     curves = [
         pd.DataFrame({"factor": curve.values, "rise": curve.rises}).assign(
             path=curve.path, limit=curve.limit, sentence=curve.sentence
         )
-        for curve in found.profiles
+        for curve in outcome.profiles
     ]
     return IdentificationContent(
-        title=f"{found.vessel.name}, identified",
-        name=found.vessel.key,
-        estimates=found.estimates,
-        correlations=found.statistics.correlations,
-        unseen=found.unseen,
-        warnings=found.warnings,
-        errors=found.errors,
-        series=found.free["test" if found.held_out else "fit"].series,
-        held_out=found.held_out,
-        ahead=found.ahead,
-        manoeuvres=found.manoeuvres,
-        colours=found.colours,
+        title=f"{outcome.vessel.name}, identified",
+        name=outcome.vessel.key,
+        estimates=outcome.estimates,
+        correlations=outcome.statistics.correlations,
+        unseen=outcome.unseen,
+        warnings=outcome.warnings,
+        errors=outcome.errors,
+        series=outcome.free["test" if outcome.held_out else "fit"].series,
+        held_out=outcome.held_out,
+        ahead=outcome.ahead,
+        manoeuvres=outcome.manoeuvres,
+        colours=outcome.colours,
         profiles=pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(),
-        programme=pd.DataFrame() if found.programme is None else found.programme,
+        programme=pd.DataFrame() if outcome.programme is None else outcome.programme,
         provenance={
-            "Vessel": f"{found.vessel.name}, digest {found.vessel.digest}",
-            "Dataset": f"{dataset}, digest {found.digest}",
-            "Fitted": ", ".join(found.runs),
-            "Held out": ", ".join(found.held_out) or "none",
-            "Fit": f"{found.solution.sentence}; objective {found.solution.objective:.6g}, at first "
-            f"{found.solution.objective_start:.6g}",
+            "Vessel": f"{outcome.vessel.name}, digest {outcome.vessel.digest}",
+            "Dataset": f"{dataset}, digest {outcome.digest}",
+            "Fitted": ", ".join(outcome.runs),
+            "Held out": ", ".join(outcome.held_out) or "none",
+            "Fit": f"{outcome.solution.sentence}; objective {outcome.solution.objective:.6g}, at first "
+            f"{outcome.solution.objective_start:.6g}",
             "shipid": __version__,
         },
         command=command,
-        study_document=found.patch(Path()),
+        study_document=outcome.patch(Path()),
     )

@@ -1,15 +1,15 @@
-"""Which manoeuvre to run next: the one that tells most about the factors that matter (Bayesian D-optimality).
+"""Experiment design: the manoeuvre with the greatest expected information gain (Bayesian D-optimality).
 
-Each candidate is simulated with the present values and cut into predictions of one horizon, as the fit will do. All are
-replayed with their orders, as logged, by one family rollout that holds every perturbed copy of the parameters; central
-differences are the sensitivities J of the measured signals, and the unknown start of every prediction is projected out.
-The candidate adds J^T J to the information M that there is, and brings
+Each candidate is simulated with the present parameters and cut into predictions of one horizon, as in the fit. All
+predictions are replayed with the recorded orders by one rollout with every perturbed parameter set. Central differences
+give the sensitivities J of the measured signals. The unknown initial state of every prediction is projected out.
+The candidate adds J^T J to the present information M. Its gain is
 
-    gain = 1/2 log2 det(M + J^T J)_f / det(M)_f     bits,  ( )_f the Schur complement of the factors that matter,
+    gain = 1/2 log2 det(M + J^T J)_f / det(M)_f     bits,  ( )_f the Schur complement of the factors in focus,
 
-the expected information of a linear model with normal errors. It is local, right where the present values nearly are,
-and as good as the model: far from what it was fitted to (astern, in a stop) it promises what it cannot know. Bits per
-hour favour short runs, because the first bits cost least.
+the expected information of a linear model with normal errors. The design is local: it holds near the present
+parameters and where the model is valid, so its gain is unreliable for motions unlike the fitted ones (astern, a stop).
+Ranking by bits per hour favours short runs, because the gain grows ever more slowly with the length of a run.
 
 Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Verdinelli, Statistical Science 10 (1995)
 273; Goodwin, Payne, Dynamic System Identification (1977), ch. 6.
@@ -49,12 +49,12 @@ ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
     "pull-out": ((20.0,),),
     "stop": ((),),
 }
-"""Standard manoeuvres and angles [deg] that are tried; spirals take hours and are left to who asks for them."""
+"""Standard manoeuvres and angles [deg] that are candidates; spirals are left out, because they take hours."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the actuators may be asked for: helm [deg], shaft [rpm], and their rates [deg/s, rpm/s]; None: no limit."""
+    """Limits of the orders: helm angle [deg], shaft speed [rpm], their rates [deg/s, rpm/s]; None: no limit."""
 
     angle_deg: float = 35.0
     n_rpm: float = float("inf")
@@ -71,40 +71,41 @@ class Candidate:
 
     @property
     def hours(self) -> float:
-        """Time that it takes, the approach not counted."""
+        """Duration [h], without the approach."""
         return self.manoeuvre.length / 3600
 
 
 @dataclass(frozen=True)
 class Informed:
-    """What a candidate would add: information (n, n) of the factors, declared standard deviations taken as true."""
+    """A candidate with its Fisher information (n, n) of the factors, for the declared standard deviations."""
 
     candidate: Candidate
     information: Array
 
 
 def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
-    """The library at each approach speed [m/s] (default: Froude numbers 0.1 and 0.2), without what breaks a limit.
+    """Candidate manoeuvres at each approach speed [m/s] that respect the limits.
 
-    Zigzags, turns, a pull-out and a stop; a multisine of helm and shaft; and a speed run, the shaft alone by levels.
+    At each speed: zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in which
+    only the shaft speed changes, in steps. Default speeds: Froude numbers 0.1 and 0.2.
     """
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    own = limits or Limits()
+    bounds = limits or Limits()
     asked = [share * FROUDE * float(np.sqrt(GRAVITY * length)) for share in (0.5, 1.0)]
-    found = []
+    result = []
     for speed in speeds or asked:
         for kind, angles in ANGLES.items():
             for angle in angles:
                 one = standard(vessel, kind, angle, speed=speed)
-                found.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
-        found += _excitations(vessel, speed, length, own)
-    return [candidate for candidate in found if allowed(candidate.manoeuvre, own)]
+                result.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
+        result += _excitations(vessel, speed, length, bounds)
+    return [candidate for candidate in result if allowed(candidate.manoeuvre, bounds)]
 
 
 def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
-    """A speed run and a multisine about one speed, as strong as the limits let them."""
+    """A speed run and a multisine at one approach speed [m/s], with the largest amplitudes within the limits."""
     n_rpm, passing = shaft_speed(Controls.of(vessel), speed) / RPM, length / speed
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
     if swing <= 0:
@@ -119,7 +120,10 @@ def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) ->
 
 
 def allowed(manoeuvre: Approached, limits: Limits) -> bool:
-    """Whether no order is beyond the limits; rates bind excitations alone, the actuators have their own."""
+    """Whether all orders of a manoeuvre are within the limits of helm and shaft.
+
+    The rate limits apply to excitations only: in other manoeuvres the actuator model limits the rates.
+    """
     shaft = manoeuvre.greatest_shaft <= limits.n_rpm * (1 + 1e-9)
     return shaft and manoeuvre.greatest_helm <= limits.angle_deg * (1 + 1e-9)
 
@@ -136,11 +140,12 @@ def informed(
     step: float | None = None,
     environment: Mapping[str, float] | None = None,
 ) -> list[Informed]:
-    """Simulate candidates and say what each adds to the information of the factors.
+    """Simulate candidates and compute the Fisher information of the factors that each adds.
 
     Parameters
     ----------
-    vessel : with the present values. groups, scale : as `inverse_dynamics` takes them.
+    vessel : with the present parameters.
+    groups : parameter paths that share each of the n factors. scale : their values at factor 1; default: the vessel's.
     weights : measured signal (u, v, r, psi, position) -> standard deviation [m/s, rad/s, rad, m].
     horizon : of a prediction [s], 0 for whole runs. interval : between measured rows [s].
     step : of the integration (RK4) [s]; default: the interval over as much as makes it about 0.2 s by Froude's scale.
@@ -160,14 +165,14 @@ def informed(
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     log = perform(vessel, named, step=fine, environment=environment or {})
     cut = _cut(vessel, log, environment or {}, round(horizon / interval) * every, every)
-    signals = {name: width for own, width in weights.items() for name in SIGNALS[own]}
+    signals = {name: width for signal, width in weights.items() for name in SIGNALS[signal]}
     by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
     each = _projected(by_factor, by_start)
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
 
 
 def _every(vessel: Vessel, interval: float) -> int:
-    """Steps between measured rows: 40 or more while the ship takes for her length at Froude number 0.2."""
+    """Integrator steps in one interval [s] between rows: 40 or more per ship length at Froude number 0.2."""
     length = length_of(vessel) or 30.0
     passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))
     return max(int(np.ceil(40 * interval / passing)), 1)
@@ -175,9 +180,9 @@ def _every(vessel: Vessel, interval: float) -> int:
 
 @dataclass(frozen=True)
 class _Cut:
-    """Predictions side by side: name -> (S,) starts and memories, (T, S) commands and environment.
+    """S predictions: name -> (S,) initial states and actuator states, name -> (T, S) commands and environment.
 
-    runs : (S,) candidate of each. seen : (R, S) whether a record is within its run.
+    runs : (S,) index of the candidate. seen : (R, S) whether a record lies within its run.
     """
 
     start: dict[str, Array]
@@ -189,7 +194,7 @@ class _Cut:
 
 
 def _cut(vessel: Vessel, log: pd.DataFrame, environment: Mapping[str, float], steps: int, every: int) -> _Cut:
-    """Cut logs into predictions of so many steps, 0 for whole runs; the last, shorter one of each is kept."""
+    """Cut logs into predictions of `steps` steps (0: whole runs); the last, shorter one of each run is kept."""
     model, names = dynamics(vessel), log["run"].to_numpy()
     bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
     whole = max(count - 1 for _, count in bounds)
@@ -225,7 +230,10 @@ def _sensitivities(
     step: float,
     every: int,
 ) -> tuple[Array, Array]:
-    """Central differences of the whitened signals: (S, R * signals, n) to factors, (S, R * signals, q) to starts."""
+    """Central differences of the signals over their standard deviations.
+
+    Returns the sensitivities to the factors (S, R * signals, n) and to the initial states (S, R * signals, q).
+    """
     names, base = list(vessel.parameters), np.array(list(vessel.parameters.values()))
     moves = np.zeros((len(groups), len(base)))
     for j, group in enumerate(groups):
@@ -261,7 +269,7 @@ def _sensitivities(
     by_factor = rows((family[:, : len(groups)] - family[:, len(groups) :]) / (2 * PERTURBED))
     free = [name for name in START if name in ("u", "v", "r") or name in signals]
     starts = [{**cut.start, name: cut.start[name] + sign * START[name]} for sign in (1, -1) for name in free]
-    begun = {name: np.concatenate([own[name] for own in starts]) for name in cut.start}
+    begun = {name: np.concatenate([start[name] for start in starts]) for name in cut.start}
     moved = records(begun, len(starts), base[None])[:, 0]
     apart = moved.reshape(len(moved), 2, len(free), len(cut.runs), len(signals))
     sizes = np.array([START[name] for name in free])[:, None, None]
@@ -269,14 +277,14 @@ def _sensitivities(
 
 
 def _projected(by_factor: Array, by_start: Array) -> Array:
-    """Information (S, n, n) of each prediction about the factors, its start unknown."""
+    """Fisher information (S, n, n) of the factors from each prediction, its initial state projected out."""
     crossed = by_start.swapaxes(1, 2) @ by_factor
     known = by_start.swapaxes(1, 2) @ by_start
     return np.asarray(by_factor.swapaxes(1, 2) @ by_factor - crossed.swapaxes(1, 2) @ np.linalg.pinv(known) @ crossed)
 
 
 def rank(
-    found: Sequence[Informed],
+    contributions: Sequence[Informed],
     paths: Sequence[str],
     present: Array | None = None,
     focus: Sequence[str] | None = None,
@@ -286,12 +294,13 @@ def rank(
 
     Parameters
     ----------
-    present : (n, n) information that there is; default: each factor known to +-100 %.
-    focus : factors that matter, all by default. by : `per_hour` or `gain`.
+    paths : names of the n factors.
+    present : (n, n) information before the manoeuvre; default: a standard deviation of 1 for each factor.
+    focus : factors whose information counts; default: all. by : `per_hour` or `gain`.
 
-    `narrows` is the factor that matters whose standard error the manoeuvre divides most, from `before` to `after`.
+    `narrows` is the factor in focus whose standard error falls by the largest ratio, from `before` to `after`.
     """
-    table = _table(found, paths, present, focus)
+    table = _table(contributions, paths, present, focus)
     return table.sort_values(_criterion(by), ascending=False, ignore_index=True)
 
 
@@ -302,16 +311,16 @@ def _criterion(by: str) -> str:
 
 
 def _table(
-    found: Sequence[Informed], paths: Sequence[str], present: Array | None, focus: Sequence[str] | None
+    contributions: Sequence[Informed], paths: Sequence[str], present: Array | None, focus: Sequence[str] | None
 ) -> pd.DataFrame:
-    """Gain, rate and standard errors before and after of each candidate, a row each, in the order given."""
-    own = _focused(paths, focus)
-    there = _present(present, len(paths))
-    before, rows = _errors(there), []
-    for one in found:
-        total = there + one.information
-        gain, after = _bits(total, own) - _bits(there, own), _errors(total)
-        most = own[int(np.argmax(before[own] / after[own]))]
+    """One row for each candidate in the given order: gain, gain per hour, standard errors before and after."""
+    focused = _focused(paths, focus)
+    present_information = _present(present, len(paths))
+    before, rows = _errors(present_information), []
+    for one in contributions:
+        total = present_information + one.information
+        gain, after = _bits(total, focused) - _bits(present_information, focused), _errors(total)
+        most = focused[int(np.argmax(before[focused] / after[focused]))]
         rate = gain / one.candidate.hours
         rows.append((one.candidate.title, one.candidate.hours, gain, rate, paths[most], before[most], after[most]))
     return pd.DataFrame(rows, columns=["manoeuvre", "hours", "gain", "per_hour", "narrows", "before", "after"])
@@ -325,13 +334,13 @@ def _focused(paths: Sequence[str], focus: Sequence[str] | None) -> list[int]:
 
 
 def _present(present: Array | None, count: int) -> Array:
-    """Information there is, never less than that a factor is known to +-100 %."""
+    """Present information (n, n) plus a prior of standard deviation `UNKNOWN` on every factor."""
     return np.eye(count) / UNKNOWN**2 + (0.0 if present is None else present)
 
 
-def _bits(information: Array, own: list[int]) -> float:
-    """1/2 log2 det of the Schur complement of the factors that matter."""
-    rest = [j for j in range(len(information)) if j not in own]
+def _bits(information: Array, focused: list[int]) -> float:
+    """1/2 log2 det [bits] of the Schur complement of the factors in focus."""
+    rest = [j for j in range(len(information)) if j not in focused]
     whole = np.linalg.slogdet(information)[1]
     others = np.linalg.slogdet(information[np.ix_(rest, rest)])[1] if rest else 0.0
     return float((whole - others) / (2 * np.log(2)))

@@ -1,8 +1,8 @@
-"""Nonlinear least squares: the factors that predict the runs best, by SciPy's trust region (`least_squares`, trf).
+"""Nonlinear least squares for the factors, by SciPy's trust region (`least_squares`, trf).
 
-What each run has unknown of itself, xi (nuisances and initial states, with a prior of width 1), is eliminated at every
-evaluation: variable projection. For given factors xi is found by Gauss-Newton steps, run by run, and the Jacobian is
-projected on what xi cannot explain. So the trust region sees the n factors alone, however many runs there are:
+The unknowns of each run, xi (nuisances and initial states, with a prior of width 1), are eliminated at every
+evaluation: variable projection. For given factors, Gauss-Newton steps determine xi of each run, and the Jacobian is
+projected onto the complement of the derivatives to xi. So the trust region has only the n factors as variables:
 
     minimise over f    sum over runs of min over xi of (|r(f, xi)|^2 + |xi|^2)    + |(f - centre) / prior|^2
 
@@ -31,7 +31,7 @@ TOLERANCE = 1e-10  # relative change of objective and factors at which the searc
 MOST_EVALUATIONS = 200
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
-NEAR = 1e-3  # of a factor: so near a bound and pushed towards it, it is put at the bound
+NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class Point:
 
 @dataclass(frozen=True)
 class Result:
-    """The end of a search.
+    """Result of one search.
 
-    factors : (n,). at : the prediction there. objective : sum of squares, priors included; inf where it diverges.
+    factors : (n,). at : the prediction with these factors. objective : sum of squares with priors; inf if it diverges.
     iterations : of the trust region. status : `ok`, `not converged`, `diverged` or `stopped`.
     """
 
@@ -58,7 +58,10 @@ class Result:
 
 
 def loss(r: Array, threshold: float) -> tuple[Array, Array]:
-    """What each residual adds to the objective, and its weight: r^2 and 1, linear beyond the threshold (Huber)."""
+    """Huber loss of whitened residuals r: contribution of each to the objective, and its weight.
+
+    r^2 with weight 1 up to the threshold; linear beyond it, with weight threshold / |r|.
+    """
     size = np.abs(r)
     inside = size <= threshold
     with np.errstate(all="ignore"):
@@ -66,7 +69,7 @@ def loss(r: Array, threshold: float) -> tuple[Array, Array]:
 
 
 def origin(problem: Problem) -> Point:
-    """Unknowns of the runs where nothing is wrong, but not where a slope vanishes."""
+    """Initial unknowns of the runs: no fault, except a small value where the derivative would vanish at 0."""
     first = np.array([BEGIN.get(name, 0.0) for name in problem.names])
     starts = (len(problem.segments), len(problem.model.node)) if problem.start_width is not None else (0, 0)
     return Point(np.tile(first, (len(problem.runs), 1)), np.zeros(starts))
@@ -82,16 +85,18 @@ def search(
     tolerance: float = TOLERANCE,
     most: int = MOST_EVALUATIONS,
 ) -> Result:
-    """Minimise from a start.
+    """Minimise the objective from given factors.
 
     Parameters
     ----------
-    factors, point : where to begin. progress : called with the iteration and the objective; what is true stops there.
-    before : iterations counted already. tolerance : relative change at which to end. most : evaluations.
+    factors, point : initial factors (n,) and unknowns of the runs.
+    progress : called with the iteration number and the objective after each iteration; a true return value stops.
+    before : number of iterations of earlier searches. tolerance : relative change at which to end.
+    most : largest number of evaluations.
 
     Raises
     ------
-    KeyboardInterrupt : Ctrl-C, after the iteration. Whatever `progress` raises.
+    KeyboardInterrupt : Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
     """
     free = problem.unknown.low < problem.unknown.high
     with uninterrupted() as held, np.errstate(all="ignore"):
@@ -109,7 +114,7 @@ def search(
 
 @dataclass(frozen=True)
 class _Value:
-    """One evaluation: residuals (m,) and Jacobian (m, n) as SciPy is to see them."""
+    """One evaluation: residuals f (m,) and Jacobian J (m, n) in the form that is given to SciPy."""
 
     factors: Array
     at: Prediction
@@ -124,20 +129,20 @@ class _Value:
 
 @dataclass
 class _Watch:
-    """Who looks on: `progress`, Ctrl-C as `uninterrupted` holds it back, and the iterations so far."""
+    """Reports iterations to `progress`. held : Ctrl-C deferred by `uninterrupted`. iterations : count so far."""
 
     progress: Progress | None
     held: list[int]
     iterations: int
 
     def stops(self, objective: float) -> bool:
-        """Report an iteration; whether to end here."""
+        """Report an iteration; True if `progress` or Ctrl-C asks to stop."""
         asked = self.progress is not None and bool(self.progress(self.iterations, objective))
         return asked or bool(self.held)
 
 
 class _Search:
-    """Evaluations of one search, and how far it has come."""
+    """State of one search: the last, the best and the first evaluation, and which factors are free."""
 
     def __init__(self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], watch: _Watch) -> None:
         self.problem, self.free, self.watch = problem, free, watch
@@ -145,7 +150,7 @@ class _Search:
         self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
 
     def stops(self) -> bool:
-        """Whether somebody asked to end here."""
+        """Whether `progress` or Ctrl-C has asked to stop."""
         return self._stopped
 
     def _at(self, x: Array) -> _Value:
@@ -164,13 +169,13 @@ class _Search:
             raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
-        """Search over the factors that are free; the word for how it ended."""
+        """Run the trust region over the free factors; the status: `ok`, `not converged` or `stopped`."""
         if self.stops():
             return "stopped"
         if not self.free.any():
             return "ok"
         low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
-        found = least_squares(
+        result = least_squares(
             lambda x: self._at(x).f,
             np.clip(self.best.factors[self.free], low, high),
             jac=lambda x: self._at(x).J[:, self.free],
@@ -184,17 +189,17 @@ class _Search:
         )
         if self.stops():
             return "stopped"
-        return "not converged" if found.status == 0 else "ok"
+        return "not converged" if result.status == 0 else "ok"
 
     def pushed(self) -> NDArray[np.bool_]:
-        """Free factors near a bound (n,), towards which the objective falls."""
+        """Mask (n,) of free factors near a bound with the objective falling towards that bound."""
         unknown, best = self.problem.unknown, self.best
         slope = best.J.T @ best.f
         low, high = best.factors - unknown.low < NEAR, unknown.high - best.factors < NEAR
         return self.free & ((low & (slope > 0)) | (high & (slope < 0)))
 
     def settle(self, at_bound: NDArray[np.bool_], tolerance: float, most: int) -> str:
-        """Put factors at their bounds, which the trust region only approaches, and search over the others."""
+        """Set factors exactly to their bounds and search over the others: the trust region only approaches a bound."""
         unknown, before = self.problem.unknown, self.best
         nearer = np.where(before.factors - unknown.low < unknown.high - before.factors, unknown.low, unknown.high)
         there = evaluate(
@@ -208,7 +213,7 @@ class _Search:
 
 
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
-    """Residuals and Jacobian at given factors, with the unknowns of the runs where they are best."""
+    """Residuals and Jacobian at given factors (n,), with the unknowns of the runs at their optimum."""
     at, parts = _eliminated(problem, factors, point), list[Array]()
     threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
     n = problem.num_factors
@@ -234,7 +239,7 @@ def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
 
 
 def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
-    """Residuals whose squares are the loss, their slopes in the factors, and what multiplies other slopes (m,)."""
+    """Residuals (m,) whose squares are the loss, their Jacobian (m, n), and the weight (m,) of any other derivative."""
     if not np.isfinite(threshold):
         return at.r, at.by_factor, np.ones(len(at.r))
     f = np.sign(at.r) * np.sqrt(loss(at.r, threshold)[0])
@@ -243,7 +248,7 @@ def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
 
 
 def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
-    """The prediction with the unknowns of the runs where they are best, by Gauss-Newton steps, halved at need."""
+    """The prediction with the unknowns of each run at their optimum, by Gauss-Newton steps with step halving."""
     at = predict(problem, factors, point.nuisances, point.away)
     if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
         return at
@@ -273,7 +278,7 @@ def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
 
 
 def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
-    """Objective of each run (R,) without the priors of the factors."""
+    """Objective (R,) of each run, without the priors of the factors."""
     total = np.bincount(at.run, loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
     if at.away.size:
         total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
@@ -281,7 +286,7 @@ def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
 
 
 def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
-    """Gauss-Newton step of the unknowns of each run, and by how much it lowers the linear objective (R,)."""
+    """Gauss-Newton step of the unknowns of each run, and the predicted decrease (R,) of its objective."""
     f, _, root = _robust(at, threshold)
     steps, fall = list[Array](), np.zeros(len(problem.runs))
     for run in range(len(problem.runs)):
@@ -295,7 +300,7 @@ def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Arr
 
 
 def _moved(problem: Problem, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
-    """Nuisances and initial states after a share (R,) of each run's step, latencies within what is carried."""
+    """Nuisances and initial states after `share` (R,) of each run's step; latencies are limited to the lags kept."""
     nuisances, away, q = at.nuisances.copy(), at.away.copy(), len(problem.names)
     for run, step in enumerate(steps):
         nuisances[run] += share[run] * step[:q]

@@ -1,4 +1,4 @@
-"""Free runs: from one measured state on, by the commands alone, as an identified vessel will be used."""
+"""Free runs: simulations of recorded runs from one measured state, with the recorded commands and environment."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import build
-from shipid.identification.segments import LEAST_STEPS, Segment
+from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.sensitivities import COLUMNS
 from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import dynamics
@@ -28,12 +28,12 @@ MEASURED, ALL = "measured", "all"
 
 @dataclass(frozen=True, eq=False)
 class FreeRuns:
-    """Free runs of some vessels.
+    """Time series and errors of the free runs of several vessels.
 
     series : `run`, `piece`, `t` [s], `model` (the log is `measured`), `north`, `east` [m], `psi` [rad],
         `u`, `v` [m/s], `r` [rad/s]; NaN where a prediction diverges.
-    errors : `run` (`all` at first), `model`, root mean squares `u`, `v` [m/s], `r` [rad/s], `position` [m], and
-        `samples` that were measured, the start of each piece not among them.
+    errors : `run` (first `all`), `model`, root mean square errors `u`, `v` [m/s], `r` [rad/s], `position` [m], and
+        `samples`, the number of measured rows, without the initial row of each piece.
     """
 
     series: pd.DataFrame
@@ -43,23 +43,25 @@ class FreeRuns:
 def free_runs(
     vessels: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str], settings: Identify, length: float = 0.0
 ) -> FreeRuns:
-    """Run vessels of one structure freely along recorded runs, in pieces of `length` [s]; 0: as long as unbroken.
+    """Simulate vessels of one structure along recorded runs, in pieces of `length` [s]; 0: whole unbroken stretches.
 
-    Step, method and `runs.<run>.<path>` are those of the settings; unknowns of a run stand where nothing is wrong, as
-    they would for a run never seen. Raises what `shipid.identification.residuals.build` raises.
+    The settings give step, method and overrides `runs.<run>.<path>`. Nuisances are at their fault-free values, as for
+    a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
     """
     if length and not LEAST_STEPS * settings.step <= length < np.inf:
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
-    own = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
+    overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
-    problem = build(first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": own}))
+    problem = build(
+        first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": overrides})
+    )
     given = np.array(list(first.parameters.values()))
     predicted: dict[tuple[int, int], Array] = {}
     for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
         places = [i for i, one in enumerate(problem.segments) if np.array_equal(problem.base[one.run], values)]
         rows = [np.where(values != given, values, list(vessel.parameters.values())) for vessel in vessels.values()]
-        found = _predicted(first, [problem.segments[i] for i in places], np.array(rows), settings)
-        predicted |= {(model, places[piece]): states for (model, piece), states in found.items()}
+        states_of = _predicted(first, [problem.segments[i] for i in places], np.array(rows), settings)
+        predicted |= {(model, places[piece]): states for (model, piece), states in states_of.items()}
     frames = []
     for number, run in enumerate(problem.runs):
         places = [i for i, one in enumerate(problem.segments) if one.run == number]
@@ -77,13 +79,13 @@ def _belongs(key: str, runs: Sequence[str]) -> bool:
 
 
 def _predicted(
-    vessel: Vessel, segments: Sequence[Segment], values: Array, settings: Identify
+    vessel: Vessel, segments: Sequence[ShootingSegment], values: Array, settings: Identify
 ) -> dict[tuple[int, int], Array]:
-    """(model, piece) -> (N + 1, channels), the log as model 0; values (V, P) of the others."""
+    """(model, piece) -> states (N + 1, channels); model 0 is the log, model i > 0 has the parameters values[i - 1]."""
     model = dynamics(vessel)
     longest = max(segment.num_steps for segment in segments)
 
-    def column(segment: Segment, name: str) -> Array:
+    def column(segment: ShootingSegment, name: str) -> Array:
         return segment.columns.get(COLUMNS.get(name, name), np.zeros(segment.num_steps + 1))
 
     def held(name: str) -> Array:  # (longest, S): the last one where a piece is shorter
@@ -103,15 +105,15 @@ def _predicted(
         keep=CHANNELS,
     )
     states = np.where(path.diverged[None, :, :, None], np.nan, path.states)
-    found = {}
+    result = {}
     for piece, segment in enumerate(segments):
-        found[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
+        result[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
         for number in range(len(values)):
-            found[number + 1, piece] = states[: segment.num_steps + 1, number, piece]
-    return found
+            result[number + 1, piece] = states[: segment.num_steps + 1, number, piece]
+    return result
 
 
-def _series(run: str, piece: int, segment: Segment, model: str, states: Array) -> pd.DataFrame:
+def _series(run: str, piece: int, segment: ShootingSegment, model: str, states: Array) -> pd.DataFrame:
     head = {"run": run, "piece": piece, "t": segment.t, "model": model}
     seen = segment.measured & (np.arange(len(segment.t)) > 0)
     return pd.DataFrame({**head, **dict(zip(CHANNELS, states.T, strict=True)), "measured": seen})
@@ -121,15 +123,17 @@ def _errors(series: pd.DataFrame) -> pd.DataFrame:
     log = series[series["model"] == MEASURED]
     rows = []
     for model in [name for name in series["model"].unique() if name != MEASURED]:
-        own = series[series["model"] == model]
-        away = own[list(CHANNELS)].to_numpy() - log[list(CHANNELS)].to_numpy()
+        rows_of_model = series[series["model"] == model]
+        away = rows_of_model[list(CHANNELS)].to_numpy() - log[list(CHANNELS)].to_numpy()
         squares = {
             "u": away[:, 3] ** 2, "v": away[:, 4] ** 2, "r": away[:, 5] ** 2,
             "position": away[:, 0] ** 2 + away[:, 1] ** 2,
         }  # fmt: skip
-        seen = own["measured"].to_numpy()
-        for run in (ALL, *own["run"].unique()):
-            mine = seen & (np.ones(len(own), dtype=bool) if run == ALL else (own["run"] == run).to_numpy())
-            found = {name: float(np.sqrt(square[mine].mean())) for name, square in squares.items()}
-            rows.append({"run": run, "model": model, **found, "samples": int(mine.sum())})
+        seen = rows_of_model["measured"].to_numpy()
+        for run in (ALL, *rows_of_model["run"].unique()):
+            selected = seen & (
+                np.ones(len(rows_of_model), dtype=bool) if run == ALL else (rows_of_model["run"] == run).to_numpy()
+            )
+            rms = {name: float(np.sqrt(square[selected].mean())) for name, square in squares.items()}
+            rows.append({"run": run, "model": model, **rms, "samples": int(selected.sum())})
     return pd.DataFrame(rows)

@@ -1,15 +1,15 @@
-"""A first estimate without simulating: the forces that the measured motion needs, fitted by least squares.
+"""Inverse dynamics: a first estimate without simulation, by least squares on the forces of the measured motion.
 
-The equations M nu_dot = F are multiplied by a bump phi(t) that moves along the run, and integrated by parts:
+The equations M nu_dot = F are multiplied by a test function phi(t) that moves along the run, and integrated by parts:
 
     0 = integral of (phi F + phi' M nu) dt
 
-so that nothing measured is differentiated: the weak form. Forces are linear in derivatives and in added mass, since
-M multiplies out, and one linear least-squares problem remains. What enters otherwise (a diameter, a drag coefficient
-inside a root) is found by asking the equations, is linearised about the present value, and the fit repeated.
+This weak form needs no derivative of a measured signal. It is linear in the hydrodynamic derivatives and in the added
+mass, so a linear least-squares problem remains. Parameters that enter nonlinearly (a diameter, a drag coefficient under
+a root) are detected numerically; the equations are then linearised about the present values, and the fit is repeated.
 
-Measured velocities stand on the right-hand side too, so noise biases this estimate (errors in variables): smooth first
-(`noise`), and take the result as a start, not as an answer.
+Measured velocities are regressors too, so noise biases this estimate (errors in variables). Smooth the runs first
+(`noise`), and use the result as an initial value only.
 
 Source of the weak form: Messenger, Bortz, Journal of Computational Physics 443 (2021) 110525, whose bumps are used.
 """
@@ -48,14 +48,14 @@ PROBE, CURVED = 0.05, 1e-6  # change of factors at which columns are compared, a
 
 @dataclass(frozen=True)
 class Inverse:
-    """What inverse dynamics found.
+    """Result of inverse dynamics.
 
-    paths, factors : one of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
+    paths, factors : first path of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
     residuals : (m,) force residuals over their standard deviation; jacobian : (m, n) d residual / d factor.
-    clusters, signals : run number, and velocity whose equation it is, of each residual.
-    levels : velocity -> standard deviation of its equation, averaged over a bump [m/s^2, rad/s^2].
-    explained : velocity -> share of the variance of what the base leaves over that the fit explains.
-    collinearity : what these motions can tell apart. settled : whether the iteration ended by itself.
+    clusters, signals : of each residual the run number, and the velocity (u, v, r) of its equation.
+    levels : velocity -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
+    explained : velocity -> share of the residual variance of the base vessel that the fit removes.
+    collinearity : diagnostics of the Jacobian. settled : whether the iteration converged.
     """
 
     paths: tuple[str, ...]
@@ -87,12 +87,12 @@ def inverse_dynamics(
 
     Parameters
     ----------
-    groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's own.
-    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0); at most 1, so
-        that what data hardly see stays near its base, a start that can be simulated. Clean data outweigh it.
-    environment : run -> channel -> value, for what is not logged; 0 by default.
-    noise : smooth the runs first by the kinematic filter (EKF + RTS); default: take them as logged.
-    window : length of a bump [s]; default: the time for one ship length, at least 8 samples.
+    groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's.
+    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0). It is limited to
+        1, so that a factor with little information stays near its base and the result can be simulated.
+    environment : run -> channel -> constant value [SI] of channels that are not logged; default: 0.
+    noise : settings of the kinematic smoother (EKF + RTS) applied first; default: no smoothing.
+    window : length of a test function [s]; default: the time for one ship length, at least 8 samples.
 
     Raises
     ------
@@ -100,7 +100,11 @@ def inverse_dynamics(
     """
     base = vessel.parameters
     tied = [list(group) for group in groups]
-    sizes = [[base[path] for path in group] for group in tied] if scale is None else [list(own) for own in scale]
+    sizes = (
+        [[base[path] for path in group] for group in tied]
+        if scale is None
+        else [list(sizes_of_group) for sizes_of_group in scale]
+    )
     paths = tuple(group[0] for group in tied)
     centre = np.array([0.0 if base[path] == 0 else 1.0 for path in paths])
     given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
@@ -126,9 +130,9 @@ def inverse_dynamics(
 
 
 def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float], bool]:
-    """Gauss-Newton steps on weighted residuals and priors, halved where they do not help; weights from the residuals.
+    """Gauss-Newton iteration with step halving on weighted residuals and priors; weights from the residuals.
 
-    What no data and no prior see stays at its base: steps are of least norm.
+    Returns factors (n,), levels, and whether it converged. Minimum-norm steps keep undetermined factors at their base.
     """
     factors, (residual, jacobian) = centre.copy(), problem.evaluate(centre)
     levels = problem.levels(residual)
@@ -141,12 +145,12 @@ def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tu
         step = -np.linalg.lstsq(rows / lengths, left, rcond=RANK)[0] / lengths
         for _ in range(HALVINGS):
             trial = factors + step
-            found = (residual + jacobian @ step, jacobian) if linear else problem.evaluate(trial)
-            cost = float(((found[0] * weight) ** 2).sum() + (((trial - centre) / widths) ** 2).sum())
+            evaluated = (residual + jacobian @ step, jacobian) if linear else problem.evaluate(trial)
+            cost = float(((evaluated[0] * weight) ** 2).sum() + (((trial - centre) / widths) ** 2).sum())
             if linear or cost <= float(left @ left):
                 break
             step = step / 2
-        factors, (residual, jacobian) = trial, found
+        factors, (residual, jacobian) = trial, evaluated
         after = problem.levels(residual)
         moved = max(abs(after[name] / levels[name] - 1) for name in levels)
         levels = after
@@ -157,10 +161,11 @@ def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tu
 
 @dataclass(frozen=True)
 class _Stretch:
-    """One unbroken stretch: inputs of the equations side by side, and how bumps weigh them.
+    """One unbroken stretch of a run: inputs of the equations of motion, and quadrature weights of the test functions.
 
-    inputs : state, memory, commands, environment at each point, channels first.
-    nu : (num_rows, n_dof) velocities. weigh : (num_bumps, num_points) of forces, pull : (num_bumps, num_rows) of nu.
+    inputs : state, memory, commands, environment, each (channels, num_points).
+    nu : (num_rows, n_dof) velocities. weigh : (num_bumps, num_points) weights of the forces.
+    pull : (num_bumps, num_rows) weights of nu.
     """
 
     run: int
@@ -171,7 +176,7 @@ class _Stretch:
 
 
 class _Problem:
-    """Residuals of all equations and bumps, and their derivatives to the factors."""
+    """Residuals of all equations and test functions, and their derivatives to the factors."""
 
     def __init__(
         self,
@@ -187,37 +192,37 @@ class _Problem:
         self.free = [names.index(path) for group in groups for path in group]
         self.spread = np.zeros((len(self.free), len(groups)))
         row = 0
-        for j, own in enumerate(scales):
-            for size in own:
+        for j, stretch in enumerate(scales):
+            for size in stretch:
                 self.spread[row, j] = size
                 row += 1
         velocities = model.state[model.num_dof :]
         self.rows = [velocities.index(name) for name in MEASURED]
         equations = _equations(model, tuple(self.free))
         shared = [equations.n_in() - 1]  # the parameters
-        sizes = {own.inputs[0].shape[1] for own in stretches}
+        sizes = {stretch.inputs[0].shape[1] for stretch in stretches}
         by_size = {size: equations.map("equations", "serial", size, shared, []) for size in sizes}
-        self.mapped = [by_size[own.inputs[0].shape[1]] for own in stretches]
+        self.mapped = [by_size[stretch.inputs[0].shape[1]] for stretch in stretches]
         still = equations(*(np.zeros(equations.size1_in(i)) for i in range(shared[0])), self.base)
         self.inertia = np.diag(np.array(still[2]))[self.rows]
-        counts = [len(own.weigh) for own in stretches]
+        counts = [len(stretch.weigh) for stretch in stretches]
         self.signals = tuple(name for count in counts for name in MEASURED for _ in range(count))
-        self.clusters = np.repeat([own.run for own in stretches], [count * len(MEASURED) for count in counts])
+        self.clusters = np.repeat([stretch.run for stretch in stretches], [count * len(MEASURED) for count in counts])
 
     def evaluate(self, factors: Array) -> tuple[Array, Array]:
-        """Residuals (m,) [m/s^2, rad/s^2] and d residual / d factor (m, n): each equation over the base's inertia."""
+        """Residuals (m,) [m/s^2, rad/s^2] and d residual / d factor (m, n); forces are divided by the base inertia."""
         values = self.base.copy()
         values[self.free] = self.spread @ factors
         residuals, jacobians = [], []
-        for own, mapped in zip(self.stretches, self.mapped, strict=True):
-            force, by_force, mass, by_mass = (np.array(out) for out in mapped(*own.inputs, values))
+        for stretch, mapped in zip(self.stretches, self.mapped, strict=True):
+            force, by_force, mass, by_mass = (np.array(out) for out in mapped(*stretch.inputs, values))
             dof, points = force.shape
             free = len(self.free)
             by_force = by_force.reshape(dof, points, free)
             mass, by_mass = mass[:, :dof], by_mass[:, :free].reshape(dof, dof, free, order="F")
-            pulled = own.pull @ own.nu  # (bumps, dof): integral of phi' nu
-            residual = own.weigh @ force.T + pulled @ mass.T
-            slope = np.einsum("bp,dpf->bdf", own.weigh, by_force, optimize=True)
+            pulled = stretch.pull @ stretch.nu  # (bumps, dof): integral of phi' nu
+            residual = stretch.weigh @ force.T + pulled @ mass.T
+            slope = np.einsum("bp,dpf->bdf", stretch.weigh, by_force, optimize=True)
             slope += np.einsum("be,def->bdf", pulled, by_mass)
             residuals.append((residual[:, self.rows] / self.inertia).T.ravel())
             kept = slope[:, self.rows] / self.inertia[:, None] @ self.spread
@@ -225,14 +230,14 @@ class _Problem:
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def levels(self, residuals: Array) -> dict[str, float]:
-        """Root mean square of each equation's residuals, never 0."""
+        """Velocity -> root mean square of the residuals (m,) of its equation, at least a small positive number."""
         labels = np.array(self.signals)
         rms = {name: float(np.sqrt((residuals[labels == name] ** 2).mean())) for name in MEASURED}
         least = 1e-12 * max(max(rms.values()), 1e-12)
         return {name: max(value, least) for name, value in rms.items()}
 
     def linear(self, factors: Array) -> NDArray[np.bool_]:
-        """Whether each column stays what it is when all factors change."""
+        """Mask (n,): whether each column of the Jacobian stays constant when all factors change."""
         rng = np.random.default_rng(0)
         before = self.evaluate(factors)[1]
         after = self.evaluate(factors + PROBE * rng.uniform(0.5, 1.0, len(factors)))[1]
@@ -242,9 +247,9 @@ class _Problem:
 
 @lru_cache(maxsize=16)
 def _equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
-    """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free; derivatives side by side.
+    """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free.
 
-    Both come from the accelerations, which are M^-1 (F + tau): M is the inverse of their derivative to tau.
+    The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
     """
     sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
     inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
@@ -276,22 +281,22 @@ def _runs(
     noise: Noise | None,
     window: float | None,
 ) -> list[_Stretch]:
-    """Stretches of the runs that hold a bump."""
+    """Unbroken stretches of the runs that are long enough for one test function."""
     missing = next((name for name in runs if name not in dataset.runs), None)
     if missing is not None:
         raise DataError(f"no run {missing!r}", path="runs")
     order = {name: number for number, name in enumerate(runs)}
-    found = []
+    result = []
     for run, rows in pieces(dataset):
         if run not in order or len(rows) <= LEAST_SAMPLES:
             continue
         length = _window(vessel, rows) if window is None else window
-        own = _stretch(vessel, model, order[run], rows, environment.get(run, {}), noise, length)
-        if own is not None:
-            found.append(own)
-    if not found:
+        stretch = _stretch(vessel, model, order[run], rows, environment.get(run, {}), noise, length)
+        if stretch is not None:
+            result.append(stretch)
+    if not result:
         raise DataError(f"no stretch of these runs is longer than {LEAST_SAMPLES} rows and the window", path="runs")
-    return found
+    return result
 
 
 def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
@@ -312,7 +317,7 @@ def _stretch(
     noise: Noise | None,
     window: float,
 ) -> _Stretch | None:
-    """One stretch; None if it holds no bump."""
+    """One stretch with its weights; None if it is shorter than a test function."""
     t = rows["t"].to_numpy(dtype=float)
     columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
     columns |= {name: np.unwrap(columns[name]) for name in columns if wraps(name)}
@@ -333,7 +338,7 @@ def _stretch(
     before, after, pull = _bumps(t, window)
     if not len(pull):
         return None
-    # an order holds until the next row, so where it changes the end of an interval is a point of its own
+    # an order is held until the next row, so where it changes the end of the interval is an additional point
     changed = 1 + np.flatnonzero((np.diff(commands, axis=1) != 0).any(axis=0))
     rows_at = np.append(np.arange(len(t)), changed)
     weigh = np.concatenate([before + after, before[:, changed]], axis=1)
@@ -344,10 +349,11 @@ def _stretch(
 
 
 def _bumps(t: Array, window: float) -> tuple[Array, Array, Array]:
-    """Weights (num_bumps, N) of forces at the end and at the start of intervals, and of velocities; bumps of mean 1.
+    """Quadrature weights (num_bumps, N) of the test functions at times t [s], each of integral 1.
 
-    phi = c (1 - s^2)^p, s in -1..1 over the window, by the trapezoid rule. The weights of velocities, phi' by the same
-    rule, are corrected so that velocities that are constant, or linear in time, have exactly their accelerations.
+    Returns the weights of forces at the end and at the start of intervals, and of velocities. phi = c (1 - s^2)^p with
+    s from -1 to 1 over the window [s]; trapezoid rule. The weights of velocities (phi') are corrected so that constant
+    velocities, and velocities linear in time, give their exact accelerations.
     """
     first = np.arange(t[0], t[-1] - window + 1e-9 * window, window / STRIDE)
     s = 2 * (t - first[:, None]) / window - 1

@@ -1,4 +1,4 @@
-"""The whole of an identification for who asks: settings, fit, what can be trusted, what it is worth, a patch."""
+"""A complete identification: settings, fit, uncertainty, free runs before and after, and the vessel as a patch."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ from shipid.vessel.perturb import patch_text
 
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
-LONG = 10.0  # a horizon of so many memories of the residuals is long
-BETTER = 0.01  # of the limit of a profile: so much better is another place
+LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
+BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 SIGNALS = ("u", "v", "r", "position")
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
 """Standard manoeuvres [deg] that both vessels perform in calm water."""
@@ -59,15 +59,15 @@ class Settings(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """An identification with all that can be said of it.
+    """Result of an identification with its statistics and its validation.
 
-    vessel : the base. runs, held_out : fitted, and never seen by the fit. digest : of the dataset.
+    vessel : the base vessel. runs, held_out : runs of the fit, and of the test. digest : of the dataset.
     estimates : `path`, `name` (short), `with` (tied paths), `unit`, `base`, `value`, `error`, `low`, `high` [unit],
         `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
     ahead : length of a free run [s], 0 for whole runs. free : set (`fit`, `test`) -> free runs `before` and `after`.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
-    colours : `signal`, `lag` [s], `correlation` of the residuals.
-    programme : manoeuvres to run next, as `shipid.identification.design.rank` orders them; None: not asked for.
+    colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
+    programme : manoeuvres to run next, ranked by `shipid.identification.design.rank`; None: not requested.
     """
 
     vessel: Vessel
@@ -87,19 +87,21 @@ class Identified:
 
     @property
     def errors(self) -> pd.DataFrame:
-        """`set` beside the columns of `FreeRuns.errors`."""
-        return pd.concat([own.errors.assign(set=name) for name, own in self.free.items()], ignore_index=True)
+        """Errors of all free runs: the columns of `FreeRuns.errors`, and `set` (`fit` or `test`)."""
+        return pd.concat([runs.errors.assign(set=name) for name, runs in self.free.items()], ignore_index=True)
 
     @property
     def unseen(self) -> tuple[str, ...]:
-        """What keeps parameters from being identified: combinations that the data do not see, then other reasons."""
+        """Sentences that explain unidentified parameters: collinear combinations first, then other reasons."""
         vague = self.estimates[~self.estimates["identified"].astype(bool)]
-        found = [
-            own for own in self.statistics.collinearity.combinations if not set(own.paths).isdisjoint(vague["path"])
+        combinations = [
+            combination
+            for combination in self.statistics.collinearity.combinations
+            if not set(combination.paths).isdisjoint(vague["path"])
         ]
-        explained = {path for own in found for path in own.paths}
+        explained = {path for combination in combinations for path in combination.paths}
         others = vague.loc[~vague["path"].isin(explained), "reason"]
-        return (*(own.sentence() for own in found), *map(str, others))
+        return (*(combination.sentence() for combination in combinations), *map(str, others))
 
     def patch(self, file: Path) -> str:
         """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly."""
@@ -144,7 +146,10 @@ class Identified:
 
 
 def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = None) -> Identify:
-    """Settings of a TOML file with an `[identify]` table, or none, with values changed at dotted paths in it."""
+    """Read settings from the `[identify]` table of a TOML file (None: defaults).
+
+    changes : dotted path in the table -> value that replaces the file's.
+    """
     document = {BLOCK: {}} if file is None else documents.read(file)
     if not isinstance(document.get(BLOCK, {}), dict):
         raise DocumentError("must be a table", file=file, path=BLOCK)
@@ -155,16 +160,19 @@ def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = 
 def pick_runs(
     dataset: Dataset, runs: Sequence[str] = (), held_out: Sequence[str] = ()
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Runs to fit (default: all) and runs held out, by names in which `*` stands for anything; none is in both."""
+    """Names of the runs to fit (default: all) and of the runs held out, which are never fitted.
+
+    runs, held_out : names or patterns in which `*` matches any characters. Raises DataError for an unknown run.
+    """
 
     def chosen(patterns: Sequence[str], option: str) -> list[str]:
-        found: set[str] = set()
+        selected: set[str] = set()
         for pattern in patterns:
             names = documents.match(pattern, dataset.runs)
             if not names:
                 raise DataError(f"{pattern!r} is no run: {choices(pattern, dataset.runs)}", path=option)
-            found.update(names)
-        return [run for run in dataset.runs if run in found]
+            selected.update(names)
+        return [run for run in dataset.runs if run in selected]
 
     tested = chosen(held_out, "held out")
     fitted = [run for run in (chosen(runs, "runs") if runs else dataset.runs) if run not in tested]
@@ -185,69 +193,69 @@ def run_identification(
     programme: bool = False,
     progress: Progress | None = None,
 ) -> Identified:
-    """Identify from some runs, and find out what the result is worth, on runs held out above all.
+    """Identify a vessel from recorded runs, and validate it by free runs, also of the runs held out.
 
     Parameters
     ----------
     runs, held_out : names or patterns, as `pick_runs` takes them.
     ahead : length of the free runs [s], 0 for whole runs.
-    profiles : factors whose profile likelihood is followed. programme : whether to rank what to run next.
-    progress : as `identify` takes it.
+    profiles : factors whose profile likelihood is computed. programme : whether to rank manoeuvres to run next.
+    progress : called with the iteration number and the objective; a true return value stops.
 
     Raises
     ------
     DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
-    ShipidError : the fit did not converge, in a sentence.
+    ShipidError : the fit did not converge; the message says why.
     """
     fitted, tested = pick_runs(dataset, runs, held_out)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
-    with uninterrupted() as held:  # a library that is interrupted complains of something else
+    with uninterrupted() as held:  # an interrupted library call raises an unrelated error
 
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
             return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
 
         _check(vessel, dataset, settings, (*fitted, *tested), profiles)
-        free({BEFORE: vessel})  # what cannot be run is said before the fit, not after it
+        free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
         _go_on(held)
-        own = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
-        solution = identify(vessel, dataset, fitted, own, progress=progress)
+        fit_settings = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
+        solution = identify(vessel, dataset, fitted, fit_settings, progress=progress)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         if (solution.at_bound | solution.held).all():
-            raise ShipidError("every parameter stands at a bound, is held or was dropped: nothing is left to be judged")
+            raise ShipidError("every parameter is at a bound, held or dropped: no parameter is left to estimate")
         _go_on(held)
-        found = statistics(LinearFit.of(solution))
-        curves = tuple(_profile(path, dataset, solution, found) for path in profiles)
+        judged = statistics(LinearFit.of(solution))
+        curves = tuple(_profile(path, dataset, solution, judged) for path in profiles)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
         _go_on(held)
-        warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, found, pairs), *_left(solution, curves))
+        warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
         return Identified(
             vessel=vessel,
             solution=solution,
-            statistics=found,
+            statistics=judged,
             runs=fitted,
             held_out=tested,
             digest=dataset.digest,
-            estimates=_estimates(vessel, solution, found),
+            estimates=_estimates(vessel, solution, judged),
             ahead=ahead,
             free=pairs,
             manoeuvres=_manoeuvres(pair),
             colours=_colours(solution),
-            programme=_programme(pair[AFTER], dataset, fitted, solution, found) if programme else None,
+            programme=_programme(pair[AFTER], dataset, fitted, solution, judged) if programme else None,
             profiles=curves,
             warnings=warnings,
         )
 
 
 def _go_on(held: Sequence[int]) -> None:
-    """Stop here where Ctrl-C was pressed on the way."""
+    """Raise KeyboardInterrupt if Ctrl-C was pressed since the last check."""
     if held:
         raise KeyboardInterrupt
 
 
 def _check(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
-    """Refuse overrides of what is not there and profiles of what is not free."""
+    """Raise for overrides of unknown names and for profiles of parameters that are not free."""
     overrides(settings, runs, vessel, dynamics(vessel).environment, known=dataset.runs)
     known = unknowns(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
@@ -256,23 +264,23 @@ def _check(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[
 
 
 def _of_runs(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
-    """Overrides of some runs alone."""
+    """The settings' overrides `<run>.<path>` -> value that belong to the given runs."""
     given = documents.leaves(settings.runs)
     return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
-def write_patch(found: Identified, file: Path) -> Path:
-    """Write the identified vessel as a patch on its base; one that exists is never written over."""
-    return write_new(found.patch(file), file, "patch")
+def write_patch(outcome: Identified, file: Path) -> Path:
+    """Write the identified vessel as a patch on its base; an existing file is never overwritten."""
+    return write_new(outcome.patch(file), file, "patch")
 
 
-def _estimates(vessel: Vessel, solution: Solution, found: Statistics) -> pd.DataFrame:
+def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.DataFrame:
     unknown = unknowns(solution.vessel, solution.settings)
     rows = []
     parts = zip(unknown.groups, unknown.scale, short(unknown.paths), strict=True)
     for j, (group, scales, name) in enumerate(parts):
         path, scale = group[0], scales[0]
-        low, high = sorted((scale * found.low[j], scale * found.high[j]))
+        low, high = sorted((scale * judged.low[j], scale * judged.high[j]))
         dropped = path in solution.dropped
         rows.append(
             {
@@ -282,22 +290,22 @@ def _estimates(vessel: Vessel, solution: Solution, found: Statistics) -> pd.Data
                 "unit": vessel.units[path],
                 "base": vessel.parameters[path],
                 "value": solution.values[path],
-                "error": abs(scale) * found.errors[j],
+                "error": abs(scale) * judged.errors[j],
                 "low": low,
                 "high": high,
                 "factor": solution.factors[j],
-                "factor_error": found.errors[j],
-                "factor_low": found.low[j],
-                "factor_high": found.high[j],
-                "identified": bool(found.identifiable[j]) and not dropped,
-                "reason": "dropped: the data do not support a change" if dropped else found.sentences[j],
+                "factor_error": judged.errors[j],
+                "factor_low": judged.low[j],
+                "factor_high": judged.high[j],
+                "identified": bool(judged.identifiable[j]) and not dropped,
+                "reason": "dropped: the data do not support a change" if dropped else judged.sentences[j],
             }
         )
     return pd.DataFrame(rows)
 
 
 def _manoeuvres(pair: Mapping[str, Vessel]) -> pd.DataFrame:
-    """Measures of both vessels; a manoeuvre that one cannot perform leaves numbers out and says why."""
+    """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`."""
     rows = []
     for kind, angles in TRIED:
         title = f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
@@ -311,17 +319,17 @@ def _manoeuvres(pair: Mapping[str, Vessel]) -> pd.DataFrame:
                 notes.append(f"{name}: {error.message}")
         for measure in COMPARED[kind]:
             label = measure.replace("_", " ")
-            own = {name: values[name].get(label) for name in pair}
-            unit = next((row["unit"] for row in own.values() if row is not None), "")
-            numbers = {name: float("nan") if row is None else row["value"] for name, row in own.items()}
-            why = [f"{name}: {row['note']}" for name, row in own.items() if row is not None and row["note"]]
+            measured = {name: values[name].get(label) for name in pair}
+            unit = next((row["unit"] for row in measured.values() if row is not None), "")
+            numbers = {name: float("nan") if row is None else row["value"] for name, row in measured.items()}
+            why = [f"{name}: {row['note']}" for name, row in measured.items() if row is not None and row["note"]]
             note = "; ".join([*notes, *why])
             rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
     return pd.DataFrame(rows)
 
 
 def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, dict[str, Any]]:
-    """Measure -> row of `shipid.measures.rows`."""
+    """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
     chosen = standard(vessel, kind, angles)
     log = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
     columns = {str(name): log[name].to_numpy() for name in log if name != "run" and not str(name).startswith("actual.")}
@@ -331,8 +339,8 @@ def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, d
 
 def _spacing(solution: Solution) -> float:
     """Time between residuals of one signal [s]."""
-    own = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
-    steps = np.diff(solution.times[own])
+    selected = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
+    steps = np.diff(solution.times[selected])
     return float(np.median(steps)) if len(steps) else solution.settings.step
 
 
@@ -345,9 +353,9 @@ def _longest(solution: Solution) -> float:
 def _colours(solution: Solution) -> pd.DataFrame:
     labels, between, frames = np.array(solution.signals), _spacing(solution), []
     for name in dict.fromkeys(solution.signals):
-        own = labels == name
+        selected = labels == name
         rho = autocorrelation(
-            [solution.residuals[own & (solution.clusters == run)] for run in np.unique(solution.clusters)]
+            [solution.residuals[selected & (solution.clusters == run)] for run in np.unique(solution.clusters)]
         )
         lags = np.arange(min(len(rho), 61))
         frames.append(pd.DataFrame({"signal": name, "lag": between * lags, "correlation": rho[lags]}))
@@ -355,31 +363,31 @@ def _colours(solution: Solution) -> pd.DataFrame:
 
 
 def _programme(
-    vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, found: Statistics
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
 ) -> pd.DataFrame:
-    """What to run next, at the median speed of the fitted runs and at half of it, no shaft faster than logged."""
+    """Ranked manoeuvres at the median speed of the fitted runs and at half of it, within the recorded shaft speeds."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = float(np.median(np.hypot(rows["u"], rows["v"])))
     shafts = [name for name in dynamics(vessel).commands if is_shaft(name)]
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
-    spread = {name: width * _level(found, name) for name, width in settings.weights.items()}
-    told = design.informed(
+    spread = {name: width * _level(judged, name) for name, width in settings.weights.items()}
+    contributions = design.informed(
         vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
         interval=settings.step,
     )  # fmt: skip
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    return design.rank(told, unknown.paths, found.information + np.diag(prior))
+    return design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
 
 
-def _level(found: Statistics, signal: str) -> float:
-    """How many declared standard deviations the residuals of a signal have."""
+def _level(judged: Statistics, signal: str) -> float:
+    """Standard deviation of the residuals of a signal, over the declared one."""
     columns = {"position": "north"}
-    return found.whiteness[columns.get(signal, signal)].level
+    return judged.whiteness[columns.get(signal, signal)].level
 
 
-def _profile(path: str, dataset: Dataset, solution: Solution, found: Statistics) -> Profile:
+def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics) -> Profile:
     index = solution.paths.index(path)
     unknown = unknowns(solution.vessel, solution.settings)
     held = {
@@ -390,103 +398,103 @@ def _profile(path: str, dataset: Dataset, solution: Solution, found: Statistics)
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
         limits = {**solution.settings.bounds, **held, name: (factor, factor)}
-        own = solution.settings.model_copy(update={"bounds": limits, "drop": None})
+        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None})
         begin = dict(zip(solution.paths, start.tolist(), strict=True))
-        again = identify(solution.vessel, dataset, solution.runs, own, start=begin)
+        again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors
 
-    free = found.collinearity.paths
+    free = judged.collinearity.paths
     if path not in free:
-        raise DataError(f"{path!r} stands at a bound: it has no profile", path="profile")
+        raise DataError(f"{path!r} is at a bound: it has no profile", path="profile")
     return profile(
         path,
         solution.factors,
         index,
         solution.objective,
         refit,
-        half_width=float(found.high[index] - solution.factors[index]),
-        freedom=float(found.covariances[found.chosen].freedom[free.index(path)]),
-        ratio=variance_ratio(found, path),
+        half_width=float(judged.high[index] - solution.factors[index]),
+        freedom=float(judged.covariances[judged.chosen].freedom[free.index(path)]),
+        ratio=variance_ratio(judged, path),
         bounds=(float(unknown.low[index]), float(unknown.high[index])),
     )
 
 
 def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
-    """Whether steps hide what the commands do between them."""
+    """A warning if the step of the fit is longer than the interval of the log."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     between = float(rows.groupby("run", sort=False)["t"].diff().median())
     if settings.step <= 1.5 * between:
         return []
     return [
-        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: what "
-        f"moves in between is blurred; compare with step {between:.3g}"
+        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
+        f"changes of the commands are lost; compare with step {between:.3g}"
     ]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
-    """Profiles that found something better than the estimate."""
-    told = []
+    """Warnings for profiles that contain a better fit than the estimate."""
+    warnings = []
     for curve in curves:
         estimate = solution.factors[solution.paths.index(curve.path)]
         best = curve.values[np.argmin(curve.rises)]
         if curve.rises[np.argmin(np.abs(curve.values - estimate))] > BETTER * curve.limit:
-            told.append(
-                f"the estimate is not the best there is: the profile of {curve.path} fits better at {best:.4g}; give "
+            warnings.append(
+                f"the estimate is not the optimum: the profile of {curve.path} fits better at {best:.4g}; give "
                 "priors, or another start or horizon"
             )
-    return told
+    return warnings
 
 
-def _warnings(solution: Solution, found: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
-    """What a careful reader would ask first."""
-    told, between = [], _spacing(solution)
-    coloured = {name: own.memory * between for name, own in found.whiteness.items() if not own.white}
+def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
+    """Warnings about the fit: coloured residuals, short horizon, untrusted errors, bounds, no test, worse free runs."""
+    warnings, between = [], _spacing(solution)
+    coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
     horizon = solution.settings.horizon
     if coloured:
         longest = max(coloured.values())
-        told.append(
-            f"residuals of {listed(list(coloured))} remember earlier ones, for {_digits(longest)} s: the model, or "
-            "what is known of wind and current, lacks something"
+        warnings.append(
+            f"residuals of {listed(list(coloured))} are correlated over {_digits(longest)} s: the model, or "
+            "the wind and current data, are incomplete"
         )
         if 0 < horizon < LONG * longest:
             longer = f"{_digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
-            told.append(
-                f"the horizon of {horizon:g} s is short against that: estimates may be biased beyond their intervals; "
+            warnings.append(
+                f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals; "
                 f"compare with {longer}whole runs (horizon 0)"
             )
-    best = found.covariances[found.chosen]
+    best = judged.covariances[judged.chosen]
     if not best.trusted:
-        told.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
+        warnings.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
-        told.append(f"at a bound, so without an interval: {listed(bound)}")
+        warnings.append(f"at a bound, so without an interval: {listed(bound)}")
     if "test" not in free:
-        told.append("no run was held out: how well others are predicted is not known")
-    for name, own in free.items():
-        every = own.errors[own.errors["run"] == ALL].set_index("model")
+        warnings.append("no run was held out: the accuracy on other runs is not known")
+    for name, runs in free.items():
+        every = runs.errors[runs.errors["run"] == ALL].set_index("model")
         diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
         if diverged:
-            told.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
+            warnings.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
         worse = [signal for signal in SIGNALS if float(every[signal][AFTER]) > float(every[signal][BEFORE])]
         if worse and not diverged:
-            told.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
-    return told
+            warnings.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
+    return warnings
 
 
 def _digits(value: float) -> str:
-    """Three digits, all of those before the point."""
+    """Format with 3 significant digits, but never round digits before the decimal point."""
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _rounded(value: float) -> float:
-    """Six digits: what a reader needs, the same on every machine."""
+    """Round to 6 significant digits, so that the text does not depend on the machine."""
     return float(f"{value:.6g}")
 
 
 def _plain(value: Any) -> Any:
-    """What TOML can hold: no null, lists for tuples."""
+    """Convert a value for TOML: None entries are removed, tuples become lists."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(own) for key, own in value.items() if own is not None}
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):
-        return [_plain(own) for own in value]
+        return [_plain(item) for item in value]
     return value

@@ -55,7 +55,10 @@ class Profile:
 
 @dataclass
 class _Curve:
-    """Points of the profile: what has been asked of `refit`, best objective so far."""
+    """Points of a profile so far.
+
+    points : value of the factor -> objective and factors (n,) of its refit. failed : values whose refit failed.
+    """
 
     path: str
     refit: Refit
@@ -68,11 +71,14 @@ class _Curve:
         return min(objective for objective, _ in self.points.values())
 
     def rise(self, value: float) -> float:
-        """Profile at a value, refitted from the nearest point; infinite where the refit fails."""
+        """(C - C_min) / s^2 with the factor held at `value`; infinite where the refit fails.
+
+        The refit begins at the factors of the nearest known point.
+        """
         if value in self.failed:
             return float("inf")
         if value not in self.points:
-            nearest = min(self.points, key=lambda own: abs(own - value))
+            nearest = min(self.points, key=lambda known: abs(known - value))
             start = self.points[nearest][1]
             objective, factors = self.refit(self.path, value, start)
             if not np.isfinite(objective):
@@ -94,21 +100,23 @@ def profile(
     ratio: float = 1.0,
     bounds: tuple[float, float] = (-np.inf, np.inf),
 ) -> Profile:
-    """Follow the profile of one factor from the estimate to both sides until it leaves the 95 % interval.
+    """Compute the profile of one factor, from the estimate to both sides, until it leaves the 95 % interval.
 
     Parameters
     ----------
-    factors, index, objective : the estimate (n,), which of them is held, and the objective there.
-    half_width, freedom : of the linear interval, for the first step, and of t (`Statistics.chosen`).
+    path : name of the factor.
+    factors, index, objective : the estimate (n,), index of the factor, and the objective at the estimate.
+    refit : function that fits the other factors with this one held, see `Refit`.
+    half_width : half-width of the linear 95 % interval, for the first step. freedom : degrees of freedom of t.
     ratio : s^2, variance of the residuals over the declared one, or `variance_ratio`.
-    bounds : of the factor.
+    bounds : lower and upper bound of the factor.
     """
     curve = _Curve(path, refit, ratio, {float(factors[index]): (objective, np.asarray(factors, dtype=float))})
     limit = float(stats.t.ppf(0.5 + LEVEL / 2, freedom) ** 2)
     step = STEP * (half_width if 0 < half_width < FARTHEST else 1.0)
     ends: dict[int, float] = {}
     least = np.inf
-    while curve.least < least * (1 - 1e-6) - 1e-9 or not ends:  # anew where a better fit is found on the way
+    while curve.least < least * (1 - 1e-6) - 1e-9 or not ends:  # again if a refit improves on the estimate
         least = curve.least
         centre = min(curve.points, key=lambda value: curve.points[value][0])
         for side, bound in ((-1, bounds[0]), (1, bounds[1])):
@@ -124,9 +132,9 @@ def profile(
 
 
 def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, bound: float) -> float:
-    """Where the profile crosses the limit on one side: outwards by growing steps, then regula falsi on its root.
+    """Value of the factor where the profile crosses the limit on one side (-1 or 1); infinite if it stays below.
 
-    sqrt(profile) is nearly linear in the factor, so few refits do. Infinite where it stays below.
+    Growing steps bracket the crossing, then regula falsi on sqrt(profile), which is nearly linear in the factor.
     """
     farthest = bound if np.isfinite(bound) else estimate + side * FARTHEST
     inside, outside, value = estimate, None, estimate
@@ -147,27 +155,29 @@ def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, b
         low, high = np.sqrt(curve.rise(inside)), np.sqrt(curve.rise(outside))
         share = (root - low) / (high - low) if np.isfinite(high) else 0.5
         value = inside + float(np.clip(share, NEAR, 1 - NEAR)) * (outside - inside)
-        found = np.sqrt(curve.rise(value))
-        if abs(found - root) <= NEAR * root or abs(outside - inside) <= 1e-6 * max(abs(value), 1.0):
+        middle = np.sqrt(curve.rise(value))
+        if abs(middle - root) <= NEAR * root or abs(outside - inside) <= 1e-6 * max(abs(value), 1.0):
             break
-        inside, outside = (value, outside) if found < root else (inside, value)
+        inside, outside = (value, outside) if middle < root else (inside, value)
     return float(value)
 
 
 def _sentence(path: str, low: float, high: float, tried: tuple[float, float], best: float | None) -> str:
-    """The interval in words."""
+    """One sentence with the interval, the open sides, and a better fit if there is one."""
     if np.isfinite(low) and np.isfinite(high):
-        told = f"{path} lies between {low:.4g} and {high:.4g} times its base value"
+        sentence = f"{path} lies between {low:.4g} and {high:.4g} times its base value"
     elif np.isfinite(low):
-        told = f"{path} is above {low:.4g}; upwards it is open: at {tried[1]:.4g} the data are fitted as well"
+        sentence = f"{path} is above {low:.4g}; upwards it is open: at {tried[1]:.4g} the data are fitted as well"
     elif np.isfinite(high):
-        told = f"{path} is below {high:.4g}; downwards it is open: at {tried[0]:.4g} the data are fitted as well"
+        sentence = f"{path} is below {high:.4g}; downwards it is open: at {tried[0]:.4g} the data are fitted as well"
     else:
-        told = f"{path} is not identified: from {tried[0]:.4g} to {tried[1]:.4g} the data are fitted as well"
-    return told if best is None else f"{told}; the fit had not ended: {best:.4g} is better than the estimate"
+        sentence = f"{path} is not identified: from {tried[0]:.4g} to {tried[1]:.4g} the data are fitted as well"
+    return (
+        sentence if best is None else f"{sentence}; the fit had not converged: {best:.4g} fits better than the estimate"
+    )
 
 
-def variance_ratio(found: Statistics, path: str) -> float:
-    """s^2 of one factor's profile: its variance in the chosen form, over that under the declared deviations."""
-    j = found.fit.paths.index(path)
-    return float((found.errors[j] / declared_error(found.fit, path)) ** 2)
+def variance_ratio(judged: Statistics, path: str) -> float:
+    """s^2 for the profile of one factor: its variance in the chosen form, over that for the declared deviations."""
+    j = judged.fit.paths.index(path)
+    return float((judged.errors[j] / declared_error(judged.fit, path)) ** 2)

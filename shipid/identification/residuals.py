@@ -1,6 +1,7 @@
-"""A fit as numbers: weighted residuals of many predictions and their exact derivatives.
+"""Weighted residuals of many predictions, and their exact derivatives to the unknowns.
 
-Each prediction begins at a measured state of the log (or one to be found near it), and all of them run at once.
+Each prediction begins at a measured state of the log, or at an estimated state near it. All predictions run in one
+call of the engine.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from shipid.data.dataset import Dataset
 from shipid.engine.native import compiler
 from shipid.errors import DataError, DocumentError
 from shipid.identification.compiled import pack, run_compiled
-from shipid.identification.segments import Segment, cut_segments
+from shipid.identification.segments import ShootingSegment, cut_segments
 from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
 from shipid.identification.settings import (
     BLOCK,
@@ -37,18 +38,21 @@ SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "
     **dict.fromkeys(("phi", "theta"), math.radians(1.0)),
     **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
 }
-"""Ordinary error of a state that is not fitted [SI]: the scale on which the solver sees it."""
-COMPILE_FROM = 4e4  # steps times entries of the sensitivities: below it the virtual machine is done sooner
+"""Typical error [SI] of a state that is not fitted: the scale of its correction in the solver."""
+COMPILE_FROM = (
+    4e4  # steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling
+)
 MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """All numbers of one fit.
+    """All data of one fit with R runs, P parameters, nq nuisances and ny signals.
 
-    names, centres, widths : scalars of the per-run nuisances, (nq,) values where nothing is wrong and prior widths.
-    start_width : of the initial states in standard deviations of the signals; None where they are as measured.
-    base : (R, P) parameters of each run with its own overrides. deviations : (ny,) of the signals.
+    segments : predictions, ordered by run. unknown : the factors to estimate.
+    names, centres, widths : scalars of the per-run nuisances, their fault-free values (nq,) and prior widths (nq,).
+    start_width : prior width of the initial states in standard deviations of the signals; None: they are not free.
+    base : (R, P) parameters of each run with the overrides for that run. deviations : (ny,) of the signals.
     """
 
     vessel: Vessel
@@ -56,7 +60,7 @@ class Problem:
     settings: Identify
     unknown: Unknowns
     layout: Layout
-    segments: tuple[Segment, ...]
+    segments: tuple[ShootingSegment, ...]
     base: Array
     names: tuple[str, ...]
     centres: Array
@@ -66,34 +70,34 @@ class Problem:
 
     @cached_property
     def model(self) -> Variation:
-        """The compiled equations."""
+        """The variational equations of this fit, as CasADi functions."""
         return variation(self.layout)
 
     @cached_property
     def node_scale(self) -> Array:
-        """(nn,) size of the error of each entry of a node: of the signal where it is fitted."""
-        own = dict(zip(self.layout.signals, self.deviations, strict=True))
-        return np.array([own.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
+        """(nn,) scale of each initial state: the signal's standard deviation where it is fitted, else `SIZES`."""
+        deviation_of = dict(zip(self.layout.signals, self.deviations, strict=True))
+        return np.array([deviation_of.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
 
     @cached_property
     def whole(self) -> Predictions:
-        """The predictions, packed."""
+        """All predictions with their inputs, as arrays for the engine."""
         return Predictions(self)
 
     @property
     def num_factors(self) -> int:
-        """Factors to find."""
+        """Number of factors."""
         return len(self.unknown.groups)
 
     def fixed(self, factors: Array, nuisances: Array) -> Array:
-        """(R, .) numbers that stay the same along each run: factors, its nuisances, base parameters, scales."""
+        """(R, .) inputs that are constant along each run: factors, nuisances, base parameters, scales."""
         scale = np.concatenate([*map(np.array, self.unknown.scale)])
         count = len(self.runs)
         return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
 
 
 def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
-    """Everything that a fit needs; DocumentError or DataError says what is missing."""
+    """Assemble a fit of the vessel to the runs; DocumentError or DataError names what is missing or wrong."""
     if not runs:
         raise DataError("no run to fit: name at least one", path="runs")
     if len(set(runs)) < len(runs):
@@ -105,15 +109,15 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
     model, unknown = dynamics(vessel), unknowns(vessel, settings)
-    own = overrides(settings, runs, vessel, model.environment, dataset.runs)
+    overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
-    numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in own.items()}
+    numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
     segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers)
-    weather = _weather(segments, own, model.environment, [n for n in names if n.startswith("current")])
+    weather = _weather(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
     free = {path for group in unknown.groups for path in group}
-    twice = next(((run, path) for run, values in own.items() for path in values if path in free), None)
+    twice = next(((run, path) for run, values in overridden.items() for path in values if path in free), None)
     if twice is not None:
         path = f"{BLOCK}.runs.{'.'.join(twice)}"
         raise DocumentError("is free in the fit: fix it, or set it in no run", file=vessel.file, path=path)
@@ -125,8 +129,10 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         layout=Layout(
             model, unknown.groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
         ),
-        segments=tuple(_with_weather(segment, weather, own[runs[segment.run]]) for segment in segments),
-        base=np.array([[own[run].get(path, value) for path, value in vessel.parameters.items()] for run in runs]),
+        segments=tuple(_with_weather(segment, weather, overridden[runs[segment.run]]) for segment in segments),
+        base=np.array(
+            [[overridden[run].get(path, value) for path, value in vessel.parameters.items()] for run in runs]
+        ),
         names=names,
         centres=np.array([scalars[name][0] for name in names]),
         widths=np.array([scalars[name][1] for name in names]),
@@ -136,32 +142,36 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
 
 
 def _weather(
-    segments: Sequence[Segment],
-    own: Mapping[str, Mapping[str, float]],
+    segments: Sequence[ShootingSegment],
+    overridden: Mapping[str, Mapping[str, float]],
     channels: Sequence[str],
     estimated: Sequence[str],
 ) -> list[str]:
-    """Environment channels that the data or an override give."""
+    """Environment channels that the data or an override provide and that the fit does not estimate."""
     given = {name for segment in segments for name, values in segment.columns.items() if np.any(values != 0)}
-    given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in own.values() for path in values}
+    given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
     return [name for name in channels if name in given and not (estimated and name in ("V_c", "beta_c"))]
 
 
-def _with_weather(segment: Segment, weather: Sequence[str], own: Mapping[str, float]) -> Segment:
+def _with_weather(segment: ShootingSegment, weather: Sequence[str], overridden: Mapping[str, float]) -> ShootingSegment:
     zero = np.zeros_like(segment.t)
     columns = {
         **segment.columns,
         **{name: segment.columns.get(name, zero) for name in weather},
-        **{name: zero + own[f"{ENVIRONMENT}.{name}"] for name in weather if f"{ENVIRONMENT}.{name}" in own},
+        **{
+            name: zero + overridden[f"{ENVIRONMENT}.{name}"]
+            for name in weather
+            if f"{ENVIRONMENT}.{name}" in overridden
+        },
     }
-    return Segment(segment.run, segment.t, columns, segment.earlier, segment.memory, segment.measured)
+    return ShootingSegment(segment.run, segment.t, columns, segment.earlier, segment.memory, segment.measured)
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Predictions at one place: nn entries of an initial state, nc columns (initial state, factors, nuisances).
+    """Output of the engine for S predictions of N steps.
 
-    r : (S, N ny) weighted residuals. R : (S, N ny, nc) their slopes.
+    r : (S, N ny) weighted residuals. R : (S, N ny, nc) their derivatives to initial state, factors and nuisances.
     """
 
     r: Array
@@ -169,10 +179,10 @@ class Evaluation:
 
 
 class Predictions:
-    """The predictions of a fit side by side, packed for the engine; shorter ones are padded without weight.
+    """All S predictions of a fit as arrays for the engine; shorter predictions are padded with weight 0.
 
-    run : (S,) of each. log : (S, columns) the log where they begin, for the states there.
-    weight : (S, N, ny), 0 where nothing was measured. time : (S, N) [s] of each residual.
+    run : (S,) index of the run. log : (S, columns) row of the log where each prediction begins.
+    weight : (S, N, ny), 1 / standard deviation, or 0 without a measurement. time : (S, N) [s] of each residual.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -191,15 +201,15 @@ class Predictions:
     def __len__(self) -> int:
         return len(self.run)
 
-    def _log(self, segment: Segment) -> list[float]:
+    def _log(self, segment: ShootingSegment) -> list[float]:
         columns = (segment.columns.get(COLUMNS.get(name, name)) for name in self.problem.model.entries)
         values = [0.0 if column is None else float(column[0]) for column in columns]
         if self.problem.layout.carried:
             values += [float(segment.memory[name][0]) for name in self.problem.layout.model.memory]
         return values
 
-    def _known(self, segment: Segment) -> Array:
-        """Inputs of every step (N, .), the last ones held where the prediction is shorter than the longest."""
+    def _known(self, segment: ShootingSegment) -> Array:
+        """Inputs (N, .) of every step: commands, weather, memories; the last are repeated up to the common length."""
         layout = self.problem.layout
         steps = np.minimum(np.arange(self.length), segment.num_steps - 1)
         commands = {
@@ -213,7 +223,7 @@ class Predictions:
             columns += [segment.memory[name][steps] for name in layout.model.memory]
         return np.array(columns).reshape(-1, self.length).T
 
-    def _seen(self, segment: Segment) -> tuple[Array, Array, Array]:
+    def _seen(self, segment: ShootingSegment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
         layout, steps = self.problem.layout, 1 + np.arange(self.length)
         at = np.minimum(steps, segment.num_steps)
@@ -222,7 +232,7 @@ class Predictions:
         return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
-        """Initial states in the log (S, nn), and their slopes in the nuisances (S, nn, nq), given those (R, nq)."""
+        """Initial states (S, nn) from the log, and their derivatives (S, nn, nq) to the nuisances (R, nq) [SI]."""
         model, count = self.problem.model, len(self)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
@@ -233,7 +243,10 @@ class Predictions:
         return np.hstack([nodes, self.log[:, entries:]]), slope
 
     def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
-        """Run all from initial states (S, nn) with factors (n,) and nuisances (R, nq); what diverges is not finite."""
+        """Run all predictions; those that diverge give residuals that are not finite.
+
+        nodes : (S, nn) initial states. factors : (n,). nuisances : (R, nq) [SI].
+        """
         model, count = self.problem.model, len(self)
         num_nodes, num_states = len(model.node), len(model.states)
         num_signals, split = len(self.problem.layout.signals), num_states * (1 + model.num_columns)
@@ -257,11 +270,12 @@ class Predictions:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Residuals of all predictions and their slopes.
+    """Residuals of all predictions with their derivatives.
 
-    factors (n,), nuisances (R, nq) and away (S, nn): starts less what was measured, all in prior widths (away is empty
-    where starts are as measured). r : (m,) weighted residuals; by_factor (m, n), by_nuisance (m, nq), by_start (m, nn)
-    their slopes. segment, run, time, signals : (m,) where each belongs.
+    factors : (n,). nuisances : (R, nq) in prior widths. away : (S, nn) initial states minus the measured ones, in prior
+        widths; empty if the initial states are not free.
+    r : (m,) weighted residuals. by_factor (m, n), by_nuisance (m, nq), by_start (m, nn) : their derivatives.
+    segment, run, time, signals : (m,) prediction, run, time [s] and column of each residual.
     """
 
     problem: Problem
@@ -278,10 +292,11 @@ class Prediction:
     signals: NDArray[np.str_]
 
     def marginal(self, threshold: float = np.inf) -> tuple[Array, Array, Array]:
-        """Residuals (m,) and their slopes (m, n) with the nuisances taken out, and the share (m,) that those take.
+        """Marginal residuals (m,), their Jacobian (m, n), and the leverage (m,) of the nuisances.
 
-        With A the slopes in the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi): its squares sum to those of
-        r and xi where xi is best, and its slopes give the information on the factors. Robust weights are within.
+        With A the derivatives to the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi). At the optimum of xi
+        its sum of squares is that of r and xi, and its Jacobian gives the Fisher information of the factors.
+        threshold : of the Huber loss, in standard deviations; the weights are applied to residuals and Jacobian.
         """
         root = np.ones(len(self.r))
         if np.isfinite(threshold):
@@ -294,47 +309,50 @@ class Prediction:
             A, xi = self.unknown(run, rows, root)
             U, s, _ = np.linalg.svd(A, full_matrices=False)
             shrunk = U * (1 / np.sqrt(1 + s**2) - 1)
-            own = e[rows] - A @ xi
-            e[rows], J[rows] = own + shrunk @ (U.T @ own), J[rows] + shrunk @ (U.T @ J[rows])
+            remaining = e[rows] - A @ xi
+            e[rows], J[rows] = remaining + shrunk @ (U.T @ remaining), J[rows] + shrunk @ (U.T @ J[rows])
             spent[rows] = (U**2) @ (s**2 / (1 + s**2))
         return e, J, spent
 
     def rows(self, run: int) -> slice:
-        """Rows of a run, which lie together."""
+        """Slice of the residuals of a run, which are contiguous."""
         first, last = np.searchsorted(self.run, [run, run + 1])
         return slice(int(first), int(last))
 
     def unknown(self, run: int, rows: slice, root: Array) -> tuple[Array, Array]:
-        """Slopes (rows, k) in a run's nuisances and initial states, times `root` (m,), and the values of those (k,)."""
+        """Derivatives (rows, k) to a run's nuisances and initial states, times `root` (m,), and their values (k,)."""
         parts, xi = [self.by_nuisance[rows]], [self.nuisances[run]]
         if self.away.size:
             segments = np.unique(self.segment[rows])
-            own = self.segment[rows][:, None] == segments  # (rows, segments)
-            parts.append((own[:, :, None] * self.by_start[rows][:, None]).reshape(len(own), -1))
+            belongs = self.segment[rows][:, None] == segments  # (rows, segments)
+            parts.append((belongs[:, :, None] * self.by_start[rows][:, None]).reshape(len(belongs), -1))
             xi.append(self.away[segments].ravel())
         return np.hstack(parts) * root[rows, None], np.concatenate(xi)
 
     def named(self) -> dict[str, dict[str, float]]:
-        """Run -> nuisance -> value [SI]; initial states as differences from the measured ones."""
+        """Run -> nuisance -> estimate [SI]; initial states as differences from the measured ones."""
         problem, result = self.problem, dict[str, dict[str, float]]()
         values = problem.centres + problem.widths * self.nuisances
         for number, run in enumerate(problem.runs):
             result[run] = dict(zip(problem.names, values[number].tolist(), strict=True))
-            own = [i for i, segment in enumerate(problem.segments) if segment.run == number] if self.away.size else []
-            for place, i in enumerate(own):
+            places = (
+                [i for i, segment in enumerate(problem.segments) if segment.run == number] if self.away.size else []
+            )
+            for place, i in enumerate(places):
                 for name, away, size in zip(problem.model.node, self.away[i], problem.node_scale, strict=True):
-                    key = f"initial_state.{name}" if len(own) == 1 else f"initial_state.{place + 1}.{name}"
+                    key = f"initial_state.{name}" if len(places) == 1 else f"initial_state.{place + 1}.{name}"
                     result[run][key] = float(away * size * (problem.start_width or 0.0))
         return result
 
 
 def predict(problem: Problem, factors: Array, nuisances: Array, away: Array | None = None) -> Prediction:
-    """Run every prediction from its start.
+    """Run all predictions of a fit.
 
     Parameters
     ----------
-    nuisances : (R, nq) in prior widths. away : (S, nn) initial states less those of the log, in prior widths of
-        `initial_state`; default, or where those are not free: none.
+    factors : (n,). nuisances : (R, nq) in prior widths.
+    away : (S, nn) initial states minus those of the log, in prior widths of `initial_state`; default: 0. It is ignored
+        if initial states are not free.
     """
     whole = problem.whole
     q = problem.centres + problem.widths * nuisances

@@ -1,4 +1,4 @@
-"""From runs to segments: what is predicted in one go, from one measured state on."""
+"""Cuts runs into segments (multiple shooting): each is one prediction from one measured state."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ LEAST_STEPS = 2
 
 
 @dataclass(frozen=True)
-class Segment:
-    """One prediction: a stretch of a run on the grid of the integrator.
+class ShootingSegment:
+    """Data of one prediction: an unbroken part of a run, sampled at the steps of the integrator.
 
     run : index into the runs of the fit.
     t : (N + 1,) [s], in equal steps.
     columns : name -> (N + 1,), states, commands and environment, SI.
-    earlier : command -> (lags,) its values at the steps before, the latest first.
-    memory : hidden state -> (N + 1,), modelled from the orders.
+    earlier : command -> (lags,) values at the steps before the segment, the latest first.
+    memory : actuator state -> (N + 1,), simulated from the commands.
     measured : (N + 1,) whether a row of the log lies within half a step.
     """
 
@@ -40,7 +40,7 @@ class Segment:
 
     @property
     def num_steps(self) -> int:
-        """Steps of the integrator."""
+        """Number of integrator steps N."""
         return len(self.t) - 1
 
 
@@ -51,13 +51,20 @@ def cut_segments(
     step: float,
     horizon: float,
     lags: int = 0,
-    own: Mapping[str, Mapping[str, float]] | None = None,
-) -> list[Segment]:
-    """Cut the runs into predictions of `horizon` [s] (0: as long as a run is unbroken), one after the other.
+    parameters_of_run: Mapping[str, Mapping[str, float]] | None = None,
+) -> list[ShootingSegment]:
+    """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
 
-    What is left at the end of a run counts where it is at least half a horizon. `own` are parameters that single runs
-    have of their own, which their actuators feel. Raises DataError for a run that is not
-    there, a command that was not recorded, or runs that are all too short.
+    A shorter segment at the end of a stretch is kept if it has at least half a horizon.
+
+    Parameters
+    ----------
+    step : of the integrator [s]. lags : number of earlier command values to keep.
+    parameters_of_run : run -> path -> value, overrides that the actuator simulation of that run uses.
+
+    Raises
+    ------
+    DataError : an unknown run, a command that was not recorded, or a run without a long enough stretch.
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
     if unknown is not None:
@@ -65,10 +72,12 @@ def cut_segments(
     model = dynamics(vessel)
     missing = next((name for name in model.commands if name not in dataset.commands), None)
     if missing is not None:
-        found = ", ".join(dataset.commands) or "none"
-        raise DataError(f"{vessel.name} takes this command; the data have {found}", path=missing)
+        recorded = ", ".join(dataset.commands) or "none"
+        raise DataError(f"{vessel.name} needs this command; the data have {recorded}", path=missing)
     result = []
-    vessels = {run: vessel.with_values(values) if values else vessel for run, values in (own or {}).items()}
+    vessels = {
+        run: vessel.with_values(values) if values else vessel for run, values in (parameters_of_run or {}).items()
+    }
     table = {name: dataset.frame[name].to_numpy() for name in map(str, dataset.frame.columns) if name != "run"}
     for run, places in stretches(dataset):
         if run in runs:
@@ -85,7 +94,7 @@ def cut_segments(
 
 def _cut(
     vessel: Vessel, rows: Mapping[str, NDArray[Any]], run: int, step: float, horizon: float, lags: int
-) -> list[Segment]:
+) -> list[ShootingSegment]:
     t = rows["t"]
     count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
     each = round(horizon / step) if horizon else max(count, 1)
@@ -99,15 +108,15 @@ def _cut(
     measured = np.minimum(near, before) <= step / 2 + clock_slack(t)
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
-    found = []
+    result = []
     for first in range(0, count, each):
         last = min(first + each, count)
         if last - first < least:
             continue
         here = slice(first, last + 1)
         past = np.clip(first - 1 - np.arange(lags), 0, None)
-        found.append(
-            Segment(
+        result.append(
+            ShootingSegment(
                 run,
                 grid[here],
                 {name: np.asarray(values[here], dtype=float) for name, values in columns.items()},
@@ -116,4 +125,4 @@ def _cut(
                 measured[here],
             )
         )
-    return found
+    return result

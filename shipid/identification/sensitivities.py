@@ -1,8 +1,9 @@
-"""The variational step: how a ship moves and how her motion changes with what is unknown, in one integration.
+"""Variational equations: the ship's motion and its forward sensitivities to the unknowns, in one integration.
 
-The state z is carried with its sensitivities S = dz/d[node, factors, nuisances]: S' = (df/dz) S + df/d[...], through
-the same integrator, so that S is the exact derivative of the discrete motion. Numbers are inputs; one structure is
-made once. What no fitted signal feels (the position, say) is left out.
+The state z is integrated together with its sensitivities S = dz/d[node, factors, nuisances],
+S' = (df/dz) S + df/d[...], by one integrator, so that S is the exact derivative of the discrete motion. The node is
+the initial state of a prediction. Numbers are inputs, so each structure is built once. States that do not influence a
+fitted signal (for example the position) are left out.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ COLUMNS = {"down": "z"}
 
 @dataclass(frozen=True)
 class Layout:
-    """What is compiled: the structure of a fit without its numbers.
+    """Structure of a fit without its numbers: the key under which equations are built and compiled.
 
-    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, the moving ones first.
-    weather : environment channels that are given; the others are zero. lags : steps that commands may be late by.
+    groups : paths that share each factor. signals : fitted columns. nuisances : scalars, those that change the motion
+    first. weather : environment channels that are inputs; the others are 0. lags : largest delay of commands in steps.
     """
 
     model: Dynamics
@@ -47,12 +48,12 @@ class Layout:
 
     @property
     def num_moving(self) -> int:
-        """Nuisances that change how the ship moves."""
+        """Number of nuisances that change the motion."""
         return sum(name in MOVING for name in self.nuisances)
 
     @cached_property
     def carried(self) -> bool:
-        """Whether the memory of actuators depends on what is unknown."""
+        """Whether the actuator states depend on an unknown, and so are integrated with sensitivities."""
         free = any(".actuator." in path for group in self.groups for path in group)
         return bool(self.model.memory) and (free or "latency" in self.nuisances)
 
@@ -70,8 +71,9 @@ class Variation:
     rates : (z, m, fixed, known) -> d(z)/dt; z holds the states and the columns of S, m memories (and theirs).
     advance : (m, fixed, known, dt) -> m after dt.
     outputs : (z, m, fixed, seen) -> weighted residuals and their sensitivities, column by column.
-    begin : (measured, nuisances) -> what the states of a node are where the log says `measured`.
-    node : names of the node's entries: states, then memories where they depend on what is unknown.
+    begin : (measured, nuisances) -> states of a node for the row `measured` of the log.
+    begin_slope : derivative of `begin` to the nuisances. states : names of the states.
+    node : names of the node's entries: states, then memories where they depend on an unknown.
     """
 
     layout: Layout
@@ -85,17 +87,17 @@ class Variation:
 
     @cached_property
     def entries(self) -> tuple[str, ...]:
-        """Names of what `begin` takes as measured."""
+        """Names of the log columns that `begin` takes as `measured`."""
         return _entries(self.states)
 
     @property
     def num_columns(self) -> int:
-        """Columns of S: node, factors, nuisances that move the ship."""
+        """Number of columns of S: node, factors, and nuisances that change the motion."""
         return len(self.node) + len(self.layout.groups) + self.layout.num_moving
 
     @property
     def size(self) -> int:
-        """Entries of the state with its sensitivities, memories included where they are carried."""
+        """Number of entries of the state with its sensitivities; includes memories where they are integrated."""
         return len(self.node) * (1 + self.num_columns)
 
     @cached_property
@@ -121,7 +123,7 @@ class Variation:
 
 
 class _Ship:
-    """Symbols of everything that a layout takes in, and the ship's equations on them."""
+    """Symbols of all inputs of a layout, and the ship's equations in these symbols."""
 
     def __init__(self, layout: Layout) -> None:
         model = layout.model
@@ -134,19 +136,19 @@ class _Ship:
         self.memory = SX.sym("memory", len(model.memory))
         self.names = (*model.state, *model.hidden)
         self.value_of = dict(zip(layout.nuisances, ca.vertsplit(self.q) if layout.nuisances else [], strict=True))
-        told = _told(layout, self.commands, self.value_of)
+        commands = _delayed(layout, self.commands, self.value_of)
         environment = _environment(layout, self.weather, self.value_of)
         parameters = _parameters(layout, self.base, self.scale, self.theta, self.value_of)
-        self.inputs = [self.memory, told, environment, parameters]
+        self.inputs = [self.memory, commands, environment, parameters]
 
     @property
     def moving(self) -> SX:
-        """What is unknown and changes how the ship moves."""
+        """Unknowns that change the motion: factors, then nuisances."""
         return ca.vertcat(self.theta, *self._nuisances[: self.layout.num_moving])
 
     @property
     def seen(self) -> SX:
-        """What is unknown and changes only what is seen of it."""
+        """Unknowns that change only the measurement: the other nuisances."""
         return ca.vertcat(SX(0, 1), *self._nuisances[self.layout.num_moving :])
 
     @property
@@ -155,12 +157,12 @@ class _Ship:
 
     @property
     def fixed(self) -> SX:
-        """What stays the same along a run."""
+        """Inputs that are constant along a run."""
         return ca.vertcat(self.theta, self.q, self.base, self.scale)
 
     @property
     def known(self) -> SX:
-        """What is known of every step."""
+        """Inputs of every step: commands, weather, and actuator states that are not integrated."""
         given = [] if self.layout.carried else [SX.sym("given", self.memory.shape[0])]  # goes in as the memory
         return ca.vertcat(self.commands, self.weather, *given)
 
@@ -170,13 +172,13 @@ class _Ship:
         return SX(summed_rates(self.model, [state, *self.inputs], SX(self.model.num_dof, 1), drawn))
 
     def advance(self, dt: SX) -> SX:
-        """Memory after dt."""
+        """Actuator states after a time dt [s]."""
         return SX(self.model.advance(SX(len(self.names), 1), *self.inputs, dt))
 
 
 @lru_cache(maxsize=32)
 def variation(layout: Layout) -> Variation:
-    """Variational equations of a layout, made once."""
+    """Build the variational equations of a layout; the result is cached."""
     ship = _Ship(layout)
     needed = _needed(ship)
     states = tuple(ship.names[i] for i in needed)
@@ -192,7 +194,7 @@ def variation(layout: Layout) -> Variation:
     S, D = SX.sym("S", len(states), width), SX.sym("D", ship.memory.shape[0] if layout.carried else 0, width)
 
     def direct(result: SX) -> SX:
-        """Slopes in what is unknown, none in the node."""
+        """Direct derivative to [node, factors, nuisances]; that to the node is 0."""
         return ca.horzcat(SX(result.shape[0], len(node)), ca.jacobian(result, ship.moving))
 
     slope, more = ca.jacobian(f, z) @ S + direct(f), SX(0, width)
@@ -235,8 +237,11 @@ def _parameters(layout: Layout, base: SX, scale: SX, theta: SX, value_of: Mappin
     return result
 
 
-def _told(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
-    """Commands in force, late by `latency`: linear between the steps' values, the present ones first."""
+def _delayed(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
+    """Commands delayed by the nuisance `latency` [s]; linear interpolation between steps.
+
+    commands : values at this step, then at the `lags` steps before it.
+    """
     parts = ca.vertsplit(commands, [i * len(layout.model.commands) for i in range(layout.lags + 2)])
     if "latency" not in value_of:
         return parts[0]
@@ -245,7 +250,7 @@ def _told(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
 
 
 def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
-    """Every channel: as given, from the nuisances, or zero."""
+    """All environment channels: from the inputs, from the nuisances, or 0."""
     channel = dict(zip(layout.weather, ca.vertsplit(weather) if layout.weather else [], strict=True))
     if "current_north" in value_of:
         north, east = value_of["current_north"], value_of["current_east"]
@@ -254,10 +259,10 @@ def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
 
 
 def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
-    """What a log with these faults would show.
+    """Signals of a log with the sensor faults in `value_of`, from the true states.
 
-    Its velocities are horizontal. heading_bias is what the compass reads too much; u and v are resolved along what it
-    reads, so that the velocity over ground stays. The logged point lies lever_arm ahead of the origin.
+    Velocities are horizontal. heading_bias [rad] is added to the true heading, and u and v are resolved along the
+    biased heading: the velocity over ground is unchanged. The logged point is lever_arm [m] ahead of the origin.
     """
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
@@ -276,7 +281,7 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
 
 
 def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
-    """Columns of a log at an instant, and the states that `_signals` turns into them."""
+    """Symbols of a row of the log, and the true states for which `_signals` gives that row: its inverse."""
     entry = {name: SX.sym(name) for name in _entries(states)}
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
@@ -290,12 +295,12 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
 
 
 def _entries(states: Sequence[str]) -> tuple[str, ...]:
-    """What a start is read from: the states, and what the faults of a log mix with them."""
+    """Columns needed for an initial state: the states, and the columns that sensor faults mix with them."""
     return tuple(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states)))
 
 
 def _needed(ship: _Ship) -> list[int]:
-    """States that the fitted signals feel, sooner or later."""
+    """Indices of the states that influence a fitted signal, directly or through other states; u, v, r always."""
     x = SX.sym("x", len(ship.names))
     h = _signals(ship.layout.signals, dict(zip(ship.names, ca.vertsplit(x), strict=True)), ship.value_of)
     felt, seen = (np.array(ca.DM(ca.jacobian_sparsity(result, x), 1)) != 0 for result in (ship.rates(x), h))
@@ -307,7 +312,7 @@ def _needed(ship: _Ship) -> list[int]:
 
 @lru_cache(maxsize=32)
 def scan(layout: Layout, num_steps: int) -> ca.Function:
-    """One prediction on CasADi's virtual machine: (x, fixed, known, seen) -> outputs of each step."""
+    """One prediction on CasADi's virtual machine: (x, fixed, known, seen) -> outputs of each of `num_steps` steps."""
     model = variation(layout)
     one = model.step
     x, fixed = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("fixed", one.size1_in(1))
@@ -317,7 +322,11 @@ def scan(layout: Layout, num_steps: int) -> ca.Function:
 
 
 def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
-    """Outputs (1, K, N, .) of K predictions; x (K, size), fixed (K, .), known and seen (K, N, .)."""
+    """Outputs (1, K, N, .) of K predictions of N steps, by CasADi's virtual machine.
+
+    x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
+    known, seen : (K, N, .) inputs, and measured signals with their weights.
+    """
     count, num_steps = known.shape[:2]
     with uninterrupted():
         record = scan(layout, num_steps).map(count)(

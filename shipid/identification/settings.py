@@ -1,4 +1,4 @@
-"""The `[identify]` block: which numbers of a vessel are unknown, and what is fitted; the same for files and Python."""
+"""Settings of an identification, the `[identify]` table: unknown parameters, fitted signals, nuisances and solver."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ NUISANCES: dict[str, dict[str, float]] = {
     "velocity_bias": {"velocity_bias_u": 0.0, "velocity_bias_v": 0.0},
     "lever_arm": {"lever_arm": 0.0},
 }
-"""Name in `nuisance` -> its scalars, each with the value that it has where nothing is wrong."""
+"""Name in `nuisance` -> its scalars with their fault-free values."""
 MOVING = ("current_north", "current_east", "thrust_scale", "latency")
-"""Scalars that change how the ship moves; the others change only what is seen of it."""
+"""Scalars that change the motion; the others change only the measurement."""
 WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 5.0} | {
     "heading_bias": math.radians(3.0),
     "velocity_bias": 0.1,
@@ -43,10 +43,11 @@ WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.
 
 
 class Identify(BaseModel):
-    """`[identify]`: the unknowns are factors on the base values; each is a dotted path of the vessel's parameters.
+    """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
-    weights hold standard deviations in m, rad, m/s, rad/s; nuisance widths are in standard deviations of the weights
-    (initial_state), m/s (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency), 1 (thrust_scale).
+    weights : standard deviations of the signals [m/s, rad/s, rad, m]. Units of the nuisance widths: standard deviations
+    of the weights (initial_state), m/s (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency),
+    1 (thrust_scale).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -106,13 +107,13 @@ class Identify(BaseModel):
 
 @dataclass(frozen=True)
 class Unknowns:
-    """The factors to find.
+    """The n factors to estimate.
 
-    groups : paths that share each factor; the first names it.
-    scale : per group, the value of each of its paths at factor 1.
-    centre : (n,) factor of the base, 1, or 0 where the base value is 0.
-    low, high : (n,) bounds; at least 0, or `POSITIVE`, where the vessel's own checks refuse the other sign, or 0.
-    prior : (n,) standard deviations, inf where there is none.
+    groups : paths that share each factor; the first is the name of the factor.
+    scale : for each group, the value of each of its paths at factor 1.
+    centre : (n,) factor of the base vessel: 1, or 0 where the base value is 0.
+    low, high : (n,) bounds. low is 0 where the vessel's checks refuse the other sign, `POSITIVE` where also 0.
+    prior : (n,) standard deviations; inf without a prior.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -124,11 +125,11 @@ class Unknowns:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Name of each factor."""
+        """Name of each factor: the first path of its group."""
         return tuple(group[0] for group in self.groups)
 
     def values(self, factors: Sequence[float] | Array) -> dict[str, float]:
-        """Value of every path that a factor acts on."""
+        """Path -> parameter value [SI] for given factors (n,)."""
         return {
             path: float(scale * factor)
             for group, scales, factor in zip(self.groups, self.scale, factors, strict=True)
@@ -137,7 +138,7 @@ class Unknowns:
 
 
 def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
-    """What the settings leave free in a vessel; DocumentError names what selects nothing or cannot be scaled."""
+    """The factors that the settings leave free; DocumentError for a selection without a match or a zero base value."""
     base, file = vessel.parameters, vessel.file
 
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
@@ -146,11 +147,11 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     asked = chosen(settings.parameters, "parameters")
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
-        found = [path for path in chosen([pattern], key) if path in among]
-        if not found:
+        paths = [path for path in chosen([pattern], key) if path in among]
+        if not paths:
             message = f"{pattern!r} reaches nothing that is free in the fit: add it to parameters, or leave it out"
             raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
-        return found
+        return paths
 
     fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", asked)}
     free = [path for path in asked if path not in fixed]
@@ -187,7 +188,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
 
 @dataclass(frozen=True)
 class _Digested:
-    """A vessel as a key of caches: equal where its document is."""
+    """A vessel as a key of a cache: two are equal if their documents have one digest."""
 
     digest: str
     vessel: Vessel = field(compare=False)
@@ -195,7 +196,7 @@ class _Digested:
 
 @lru_cache(maxsize=4096)
 def _least(key: _Digested, path: str) -> float:
-    """Least factor by the vessel's own checks: -inf, or 0 where they refuse the other sign, `POSITIVE` where also 0."""
+    """Smallest factor that the vessel's checks accept: -inf; 0 if they refuse the other sign; `POSITIVE` if also 0."""
     vessel, base = key.vessel, key.vessel.parameters[path]
     if base == 0 or _accepts(vessel, path, -base):
         return -math.inf
@@ -211,7 +212,7 @@ def _accepts(vessel: Vessel, path: str, value: float) -> bool:
 
 
 def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list[tuple[str, ...]]:
-    """Free paths, those tied together in one group each, in the vessel's order."""
+    """Free paths in the order of the vessel, paths of `together` in one group."""
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
         key = f"together.{number}"
@@ -223,10 +224,10 @@ def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list
                 message = f"{path} is in two groups: tie all of them in one"
                 raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
             of[path] = number
-    found: dict[Any, list[str]] = {}
+    groups: dict[Any, list[str]] = {}
     for path in free:
-        found.setdefault(of.get(path, path), []).append(path)
-    return [tuple(group) for group in found.values()]
+        groups.setdefault(of.get(path, path), []).append(path)
+    return [tuple(group) for group in groups.values()]
 
 
 def overrides(
@@ -234,7 +235,8 @@ def overrides(
 ) -> dict[str, dict[str, float]]:
     """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name.
 
-    known : runs that exist; what is set for those that are not in the fit is left out.
+    channels : environment channels of the vessel. known : all runs of the data; overrides for runs outside the fit are
+    valid and left out.
     """
     result: dict[str, dict[str, float]] = {run: {} for run in (*runs, *known)}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]

@@ -1,4 +1,4 @@
-"""`identify`: from recorded runs to the factors of a vessel's parameters that predict them best."""
+"""`identify`: estimates factors on a vessel's parameters from recorded runs."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from shipid.vessel.load import Vessel
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
-"""Setting `start` -> beginnings in the order in which they are tried, until one converges."""
+"""Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The end of a fit: estimates, what remains of the residuals, and how it went.
+    """Result of a fit: estimates, residuals, Jacobian, and the status of the solver.
 
     Parameters
     ----------
-    paths, factors : name and estimate (n,) of each factor; a tied group goes by its first path.
-    values : path -> value of every parameter that a factor acts on, ties written out.
-    nuisances : run -> name -> value [SI] of its own unknowns.
+    paths, factors : name and estimate (n,) of each factor; the name of a tied group is its first path.
+    values : path -> value [SI] of every parameter that a factor acts on, tied ones included.
+    nuisances : run -> name -> estimate [SI] of the unknowns of that run.
     residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
         time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
         With huber each is scaled by the square root of its weight, and their squares sum to less than that.
@@ -41,8 +41,8 @@ class Solution:
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
     spent : (m,) share of each residual that the nuisances have taken.
     objective_start, objective : sum of squares at the start, from the measured states, and at the end.
-    status, sentence : `ok`, `refused` (converged to values that the vessel's own checks refuse), `not converged`,
-        `diverged` or `stopped`, and what that means here.
+    status : `ok`, `refused` (converged to values that the vessel's checks refuse), `not converged`, `diverged` or
+        `stopped`. sentence : the status with its reason and a remedy.
     at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     """
@@ -75,7 +75,7 @@ class Solution:
 
     @property
     def identified(self) -> Vessel:
-        """The vessel with the values found; DocumentError where it refuses them, as the sentence says then."""
+        """The vessel with the estimated values; DocumentError if its checks refuse them (status `refused`)."""
         return self.vessel.with_values(self.values)
 
 
@@ -87,12 +87,13 @@ def identify(
     start: Mapping[str, float] | Solution | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Find the factors that predict the runs best, over the horizon and with the weights of the settings.
+    """Estimate the factors that minimise the weighted prediction errors of the runs.
 
     Parameters
     ----------
-    start : factors to begin with, or an earlier solution; default: as the settings say.
-    progress : called with the iteration and the objective after each; what is true stops there.
+    runs : names of the runs to fit. settings : unknowns, weights, horizon and solver.
+    start : path -> initial factor, or an earlier solution; default: the setting `start`.
+    progress : called with the iteration number and the objective after each iteration; a true return value stops.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def identify(
 def _searched(
     problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
 ) -> tuple[Result, float]:
-    """The end of the first search that converges, and the objective where it all began."""
+    """Result of the first search that converges (else of the best), and the objective at the initial factors."""
     if isinstance(start, Solution):
         factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
         point = start.point if _fits(start.point, origin(problem)) else origin(problem)
@@ -136,18 +137,18 @@ def _searched(
                 return Result(begin, value.at, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
             begin = by_inverse_dynamics(problem, dataset)
-        found = search(problem, begin, point, progress, before=before)
-        before = found.iterations
-        if result is None or found.status in ("ok", "stopped") or found.objective < result.objective:
-            result = found
-        if found.status in ("ok", "stopped"):
+        attempt = search(problem, begin, point, progress, before=before)
+        before = attempt.iterations
+        if result is None or attempt.status in ("ok", "stopped") or attempt.objective < result.objective:
+            result = attempt
+        if attempt.status in ("ok", "stopped"):
             break
     assert result is not None
     return result, objective_start
 
 
 def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
-    """Factors to begin with (n,), within the bounds: those given, the others of the base."""
+    """Initial factors (n,) within the bounds: those in `start`, the others of the base vessel."""
     unknown = problem.unknown
     factors = unknown.centre.copy()
     for path, factor in start.items():
@@ -159,7 +160,7 @@ def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
 
 
 def _fits(point: Point, other: Point) -> bool:
-    """Whether the unknowns of the runs are as many."""
+    """Whether two points have arrays of equal shapes."""
     return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
@@ -206,16 +207,16 @@ def _solution(problem: Problem, result: Result, objective_start: float, seconds:
 
 
 def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
-    """Why the vessel refuses the values found; None if it takes them."""
+    """The reason why the vessel's checks refuse the estimated values; None if they accept them."""
     try:
         vessel.with_values(values)
     except DocumentError as error:
-        return f"the vessel refuses the values found: {error.path}: {error.message}; give bounds or priors, or fix some"
+        return f"the vessel refuses the estimates: {error.path}: {error.message}; give bounds or priors, or fix some"
     return None
 
 
 def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
-    """What happened, and what to do about it."""
+    """The status of a search in one sentence, with a remedy."""
     if result.status == "ok":
         limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
         tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
@@ -230,12 +231,12 @@ def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> 
         return f"stopped after {result.iterations} iterations: this is not the optimum"
     return (
         f"not converged after {result.iterations} iterations: give priors or bounds, fix or tie parameters that the "
-        "data cannot tell apart, or shorten the horizon"
+        "data do not distinguish, or shorten the horizon"
     )
 
 
 def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None:
-    """The free factor nearest to its target in standard errors (infinite ones if unseen), if within the threshold."""
+    """Index of the free factor with the smallest |factor - target| / standard error; None if above the threshold."""
     information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
     free = ~solution.held
     if not free.any():
@@ -249,7 +250,7 @@ def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None
 
 
 def _without(problem: Problem, number: int, target: float) -> Problem:
-    """The problem with one factor held at a value."""
+    """The problem with factor `number` held at the value `target`."""
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))

@@ -1,8 +1,8 @@
-"""Where a fit begins: a horizon that grows, and inverse dynamics.
+"""Initial factors of a fit: by continuation in the horizon, and by inverse dynamics.
 
-A long prediction from poor factors diverges, and its objective has many minima. Over two steps it is nearly linear in
-the factors. So the same fit is solved for short horizons first, each from the factors of the one before: continuation.
-A start need not be exact: a share of the data and a rough tolerance are enough.
+A long prediction from poor factors diverges, and its objective has many minima. A prediction of two steps is nearly
+linear in the factors. So the fit is solved for short horizons first, each from the factors of the one before:
+continuation. Initial factors need not be exact: part of the data and a loose tolerance are enough.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from shipid.errors import DataError
 from shipid.identification.fit import Progress, Result, origin, search
 from shipid.identification.inverse import inverse_dynamics
 from shipid.identification.residuals import Problem, build
-from shipid.identification.segments import Segment
+from shipid.identification.segments import ShootingSegment
 from shipid.identification.settings import ENVIRONMENT, overrides
 
 Array = NDArray[np.float64]
@@ -30,11 +30,11 @@ ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon
 def grown(
     problem: Problem, dataset: Dataset, factors: Array, progress: Progress | None = None, before: int = 0
 ) -> tuple[Array, int, bool]:
-    """Factors that predict best over horizons that grow up to that of the fit.
+    """Initial factors by fits over growing horizons, each shorter than the horizon of the fit.
 
     Returns
     -------
-    Factors (n,), iterations counted on from those `before`, and whether `progress` asked to stop.
+    Factors (n,), number of iterations including those `before`, and whether `progress` asked to stop.
     """
     longest = max(segment.num_steps for segment in problem.segments) * problem.settings.step
     iterations = before
@@ -42,11 +42,11 @@ def grown(
         steps = max(2, round(horizon / problem.settings.step))
         if steps * problem.settings.step >= longest:
             break
-        found = _at(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
-        if found is None or not np.isfinite(found.objective):
+        result = _at(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
+        if result is None or not np.isfinite(result.objective):
             continue
-        factors, iterations = found.factors, found.iterations
-        if found.status == "stopped":
+        factors, iterations = result.factors, result.iterations
+        if result.status == "stopped":
             return factors, iterations, True
     return factors, iterations, False
 
@@ -54,7 +54,7 @@ def grown(
 def _at(
     problem: Problem, dataset: Dataset, factors: Array, horizon: float, progress: Progress | None, before: int
 ) -> Result | None:
-    """The fit with a shorter horizon; None where the runs cannot be cut so."""
+    """Result of the fit with a shorter horizon [s]; None if the runs cannot be cut into such segments."""
     widths = {name: width for name, width in problem.settings.widths.items() if name != "initial_state"}
     settings = problem.settings.model_copy(update={"horizon": horizon, "nuisance": widths})
     try:
@@ -65,8 +65,8 @@ def _at(
     return search(short, factors, origin(short), progress, before=before, tolerance=ROUGH, most=MOST)
 
 
-def _spread(problem: Problem) -> tuple[Segment, ...]:
-    """Predictions at equal distances, of every run at least one, that have no more steps than are enough."""
+def _spread(problem: Problem) -> tuple[ShootingSegment, ...]:
+    """A subset of the segments at equal distances, at least one of every run, with about `ENOUGH` steps in all."""
     steps = sum(segment.num_steps for segment in problem.segments)
     every = max(1, round(steps / ENOUGH))
     runs = [[one for one in problem.segments if one.run == run] for run in range(len(problem.runs))]
@@ -74,7 +74,7 @@ def _spread(problem: Problem) -> tuple[Segment, ...]:
 
 
 def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
-    """Factors (n,) that explain the accelerations, within the bounds."""
+    """Initial factors (n,) by inverse dynamics, clipped to the bounds."""
     unknown = problem.unknown
     given = overrides(problem.settings, problem.runs, problem.vessel, problem.layout.model.environment, dataset.runs)
     head = f"{ENVIRONMENT}."
@@ -82,7 +82,7 @@ def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
         run: {key.removeprefix(head): value for key, value in values.items() if key.startswith(head)}
         for run, values in given.items()
     }
-    found = inverse_dynamics(
+    estimate = inverse_dynamics(
         problem.vessel,
         dataset,
         problem.runs,
@@ -91,4 +91,4 @@ def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
         prior=unknown.prior,
         environment=weather,
     )
-    return np.asarray(np.clip(found.factors, unknown.low, unknown.high))
+    return np.asarray(np.clip(estimate.factors, unknown.low, unknown.high))

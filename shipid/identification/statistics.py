@@ -1,4 +1,4 @@
-"""How far estimates can be trusted: covariances, intervals, and which parameters the data identify.
+"""Uncertainty of the estimates: covariances, confidence intervals, and identifiability.
 
 A weighted least-squares fit with residuals e (m,) and sensitivities J (m, n) has A = J^T J + Lambda, Lambda the
 precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of what they assume:
@@ -9,12 +9,12 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
               A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1/2)
               takes the bias out that fitting puts in (CR2), t has Satterthwaite's degrees of freedom. To be trusted
               from 4 degrees of freedom on (Tipton).
-    blocks    the same on stretches of a run, each much longer than residuals remember. For few runs; a current or a
-              bias that lasts a run stays unseen.
+    blocks    the sandwich form with clusters that are stretches of a run, each much longer than the correlation time
+              of the residuals. For few runs; it does not account for a current or a bias that lasts a whole run.
 
-None of them sees a bias. Where every prediction has a start of its own to be found, coloured residuals pull the factors
-(incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is against what the
-residuals remember: compare with a fit over a longer one.
+No form accounts for a bias of the estimates. Where every prediction has a free initial state, coloured residuals bias
+the factors (incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is
+against the correlation time of the residuals: compare with a fit over a longer horizon.
 
 Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169; Pustejovsky, Tipton,
 Journal of Business & Economic Statistics 36 (2018) 672 (also that nuisances may be projected out first); Tipton,
@@ -42,21 +42,21 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In order of preference: the first that is to be trusted is reported, else the last that says anything."""
+"""In order of preference: the first trusted form is reported; if none is, `blocks`, or `fisher` with one block only."""
 
 LEVEL = 0.95
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
 LEAST_FREEDOM = 4.0  # degrees of freedom under which t misleads (Tipton 2015)
 WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
-MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; rows of a run that tell any
+MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; fewest rows of a run for that
 BLOCK = 10.0  # length of a block in integrated correlation times
 KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
 
 
 @dataclass(frozen=True)
 class LinearFit:
-    """What a fit leaves behind, as plain arrays; m residuals, n parameters.
+    """Linearisation of a fit at its estimate, as plain arrays; m residuals, n parameters.
 
     Parameters
     ----------
@@ -66,9 +66,8 @@ class LinearFit:
     clusters, signals : run number and signal of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
-    at_bound : (n,) estimates that stand at a bound, and so have no interval. held : (n,) factors that were not free,
-        which have none either. dropped : paths of those that the data did not support.
-    runs : name of each run number; empty: they go by number.
+    at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
+    dropped : paths of the held factors that the drop test has removed. runs : name of each run number, or empty.
     """
 
     paths: tuple[str, ...]
@@ -86,7 +85,7 @@ class LinearFit:
 
     @classmethod
     def of(cls, solution: Solution) -> LinearFit:
-        """What a solution of `identify` holds of it."""
+        """The linearisation in a solution of `identify`."""
         return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
 
     def __post_init__(self) -> None:
@@ -101,10 +100,10 @@ class LinearFit:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Colour of the residuals of one signal.
+    """Autocorrelation of the residuals of one signal.
 
-    probability : of residuals this correlated if they were white (Ljung-Box, summed over runs).
-    memory : integrated correlation time in samples, 1 for white. samples, effective : how many, and worth how many.
+    probability : p-value of the Ljung-Box test of whiteness, its statistics summed over runs.
+    memory : integrated correlation time in samples, 1 for white residuals. samples : number of residuals.
     level : standard deviation over the declared one. freedom : degrees of freedom of that level.
     """
 
@@ -116,20 +115,20 @@ class Whiteness:
 
     @property
     def effective(self) -> float:
-        """Number of independent samples worth as much."""
+        """Effective number of independent samples."""
         return self.samples / max(self.memory, 1.0)
 
     @property
     def white(self) -> bool:
-        """Whether colour can be neglected."""
+        """Whether the autocorrelation is not significant, or negligible."""
         return self.probability >= WHITE or self.memory <= LITTLE
 
 
 @dataclass(frozen=True)
 class Covariance:
-    """One form of covariance: (n, n) of the factors, degrees of freedom (n,), whether to trust it and why.
+    """One form of covariance: matrix (n, n) of the factors, degrees of freedom (n,), whether to trust it, and why.
 
-    influences : (clusters, n) what each cluster does to the estimate, where the form is made of them.
+    influences : (clusters, n) change of the estimate by each cluster; None for the Fisher form.
     """
 
     kind: Kind
@@ -152,11 +151,12 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What is known of the factors.
+    """Uncertainty of the n factors.
 
-    chosen : the form of covariance to report. errors, low, high : (n,); infinite where the data say nothing.
+    chosen : the form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 %
+    intervals. All are infinite for factors that the data do not determine.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST`.
-    sentences : why, for each parameter. correlations : (n, n).
+    sentences : the result in words, one for each factor. correlations : (n, n).
     """
 
     fit: LinearFit
@@ -181,12 +181,12 @@ class Statistics:
 
 
 def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
-    """Judge a fit: covariances, 95 % intervals, identifiability.
+    """Compute covariances, 95 % intervals and identifiability of a fit.
 
-    A factor is identified if the data alone, without its prior, put its 95 % interval within +-`widest` base values: by
-    default, if they can tell the estimate from one that differs by the base value. Collinearity explains an interval
-    that is wider, it does not judge: what is collinear may still be found. All is linear at the estimate; where an
-    interval is wide the profile (`shipid.identification.profile`) says whether it ends at all.
+    A factor is identified if its 95 % interval from the data alone, without its prior, is within +-`widest` base
+    values. Collinearity explains a wider interval; it is not a criterion, because collinear factors may still be
+    identified. All results are linear at the estimate. For a wide interval, the profile likelihood
+    (`shipid.identification.profile`) shows whether the interval is finite.
     """
     free = _free_places(fit)
     if not len(free):
@@ -194,12 +194,14 @@ def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
     inner = _free(fit, free)
     basis = _Basis.of(inner)
     colours = whiteness(inner, basis.leverage)
-    found = _covariances(inner, basis, colours)
-    chosen: Kind = next((kind for kind in KINDS if kind in found and found[kind].trusted), _last(found))
-    best = found[chosen]
+    covariances = _covariances(inner, basis, colours)
+    chosen: Kind = next(
+        (kind for kind in KINDS if kind in covariances and covariances[kind].trusted), _last(covariances)
+    )
+    best = covariances[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
-    alone = _alone(inner, best, found["fisher"], colours)
+    alone = _alone(inner, best, covariances["fisher"], colours)
     seen = collinearity(inner.jacobian, inner.paths)
     n = len(fit.paths)
     full = {name: _spread(values, free, n) for name, values in {"errors": errors, "half": half, "alone": alone}.items()}
@@ -211,7 +213,7 @@ def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
     np.fill_diagonal(correlations, 1.0)
     return Statistics(
         fit=fit,
-        covariances=found,
+        covariances=covariances,
         chosen=chosen,
         errors=full["errors"],
         low=fit.factors - full["half"],
@@ -225,14 +227,14 @@ def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
     )
 
 
-def _last(found: Mapping[Kind, Covariance]) -> Kind:
-    """What is reported where nothing is to be trusted: a single block says nothing, its scores sum to 0."""
-    blocks = found.get("blocks")
+def _last(covariances: Mapping[Kind, Covariance]) -> Kind:
+    """Form to report if none is trusted: `blocks`, but `fisher` for a single block, whose scores sum to 0."""
+    blocks = covariances.get("blocks")
     return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
 
 
 def _nothing(fit: LinearFit) -> Statistics:
-    """What is known where no factor is free."""
+    """Statistics of a fit without a free factor: infinite errors, nothing identified."""
     n, jacobian = len(fit.paths), fit.jacobian[:, :0]
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
     seen = collinearity(jacobian, ())
@@ -247,13 +249,13 @@ def _nothing(fit: LinearFit) -> Statistics:
 def _free_places(fit: LinearFit) -> Index:
     """Columns of the factors that are neither held nor at a bound."""
     fixed = np.zeros(len(fit.paths), dtype=bool)
-    for own in (fit.at_bound, fit.held):
-        fixed |= False if own is None else own
+    for mask in (fit.at_bound, fit.held):
+        fixed |= False if mask is None else mask
     return np.flatnonzero(~fixed)
 
 
 def _free(fit: LinearFit, free: Index) -> LinearFit:
-    """The fit of these columns, all others held."""
+    """The linearisation with only the columns `free`; all other factors are held."""
     widths = _widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return LinearFit(
@@ -267,7 +269,7 @@ def _widths(fit: LinearFit) -> Array:
 
 
 def _spread(values: Array, free: Index, count: int) -> Array:
-    """Values of the free parameters among all; infinite for the others."""
+    """Array (count,) with `values` at the indices `free` and infinity elsewhere."""
     full = np.full(count, np.inf)
     full[free] = values
     return full
@@ -277,8 +279,9 @@ def _spread(values: Array, free: Index, count: int) -> Array:
 class _Basis:
     """A = J^T J + Lambda, inverted with columns scaled to unit length.
 
-    inverse : (n, n), 0 along directions that neither data nor priors see. prior : (n,) precisions.
-    leverage : (m,) of J A^-1 J^T. unseen : (n,) parameters that such a direction moves; held : those with a prior.
+    inverse : (n, n), 0 along the null directions of A. prior : (n,) precisions of the priors.
+    leverage : (m,) diagonal of J A^-1 J^T. unseen : (n,) parameters with a component along a null direction.
+    held : (n,) parameters with a prior.
     """
 
     inverse: Array
@@ -296,7 +299,7 @@ class _Basis:
 
 
 def inverted(information: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse of an information matrix (n, n), 0 along unseen directions; and which parameters those move, (n,)."""
+    """Pseudo-inverse (n, n) of an information matrix, and a mask (n,) of parameters along its null directions."""
     scale = np.sqrt(np.diag(information))
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
@@ -307,18 +310,18 @@ def inverted(information: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def whiteness(fit: LinearFit, leverage: Array | None = None) -> dict[str, Whiteness]:
-    """Colour and level of the residuals of each signal; `leverage` (m,) is what the parameters took of them."""
+    """Autocorrelation and level of the residuals of each signal; leverage : (m,) of the parameters, default 0."""
     taken = (np.zeros(len(fit.residuals)) if leverage is None else leverage) + (0.0 if fit.spent is None else fit.spent)
     labels = np.array(fit.signals)
-    found = {}
+    result = {}
     for name in dict.fromkeys(fit.signals):
-        own = labels == name
-        freedom = max(float(own.sum() - taken[own].sum()), 1.0)
-        level = float(np.sqrt((fit.residuals[own] ** 2).sum() / freedom))
-        runs = [fit.residuals[own & (fit.clusters == run)] for run in np.unique(fit.clusters[own])]
+        selected = labels == name
+        freedom = max(float(selected.sum() - taken[selected].sum()), 1.0)
+        level = float(np.sqrt((fit.residuals[selected] ** 2).sum() / freedom))
+        runs = [fit.residuals[selected & (fit.clusters == run)] for run in np.unique(fit.clusters[selected])]
         probability, memory = _colour(runs)
-        found[name] = Whiteness(probability, memory, int(own.sum()), level, freedom)
-    return found
+        result[name] = Whiteness(probability, memory, int(selected.sum()), level, freedom)
+    return result
 
 
 def _colour(runs: Sequence[Array]) -> tuple[float, float]:
@@ -344,7 +347,7 @@ def _colour(runs: Sequence[Array]) -> tuple[float, float]:
 
 
 def autocorrelation(runs: Sequence[Array]) -> Array:
-    """Correlation of residuals with those so many samples later, (longest run,), pooled over runs; 1 at lag 0."""
+    """Autocorrelation (longest run,) of the residuals at lags 0, 1, ... samples, pooled over runs; 1 at lag 0."""
     longest = max(len(run) for run in runs)
     products, pairs = np.zeros(longest), np.zeros(longest)
     for run in runs:
@@ -358,39 +361,39 @@ def autocorrelation(runs: Sequence[Array]) -> Array:
 
 
 def _lagged(run: Array) -> Array:
-    """Sums (N,) of the products of values so many samples apart."""
+    """Autocovariance sums (N,): sum over i of run[i] run[i + lag], for lags 0 to N - 1."""
     size = len(run)
     return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(run, 2 * size)) ** 2)[:size]) if run.any() else np.zeros(size)
 
 
 def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
-    """Fisher and sandwich, and blocks where neither is to be trusted."""
-    found: dict[Kind, Covariance] = {"fisher": fisher(fit, basis, colours)}
-    found["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
-    if not any(own.trusted for own in found.values()):
+    """The Fisher and sandwich forms, and the block form if neither is trusted."""
+    result: dict[Kind, Covariance] = {"fisher": fisher(fit, basis, colours)}
+    result["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
+    if not any(covariance.trusted for covariance in result.values()):
         length = BLOCK * max(colour.memory for colour in colours.values())
-        found["blocks"] = sandwich(fit, basis, blocks(fit, length), "blocks", f"stretches of {length:.0f} samples")
-    return found
+        result["blocks"] = sandwich(fit, basis, blocks(fit, length), "blocks", f"stretches of {length:.0f} samples")
+    return result
 
 
 def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
-    """Covariance for errors that are independent from sample to sample, each signal with its own level."""
+    """Covariance for errors that are independent from sample to sample, with one level for each signal."""
     labels = np.array(fit.signals)
     parts, freedoms = [], []
     for name, colour in colours.items():
-        own = fit.jacobian[labels == name] @ basis.inverse
-        parts.append(colour.level**2 * (own.T @ own))
+        influence = fit.jacobian[labels == name] @ basis.inverse
+        parts.append(colour.level**2 * (influence.T @ influence))
         freedoms.append(colour.freedom)
     matrix = sum(parts) + (basis.inverse * basis.prior) @ basis.inverse
     total = np.diag(matrix)
     squares = sum(np.diag(part) ** 2 / freedom for part, freedom in zip(parts, freedoms, strict=True))
     coloured = [name for name, colour in colours.items() if not colour.white]
-    reason = "residuals are white" if not coloured else f"residuals of {', '.join(coloured)} remember earlier ones"
+    reason = "residuals are white" if not coloured else f"residuals of {', '.join(coloured)} are correlated in time"
     return Covariance("fisher", matrix, _freedom(total, np.asarray(squares)), not coloured, reason)
 
 
 def declared_error(fit: LinearFit, path: str) -> float:
-    """Standard error of one factor if residuals err independently, by the declared standard deviations."""
+    """Standard error of one factor for independent residuals with the declared standard deviations."""
     inner = _free(fit, _free_places(fit))
     inverse = _Basis.of(inner).inverse
     j = inner.paths.index(path)
@@ -406,7 +409,7 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
     """Cluster-robust covariance (CR2) with Satterthwaite's degrees of freedom under independent errors."""
     n = len(fit.paths)
     root = _root(basis.inverse)
-    scores, own, shared = [], [], []
+    scores, squares, shared = [], [], []
     for number in np.unique(clusters):
         rows = clusters == number
         jacobian = fit.jacobian[rows]
@@ -417,16 +420,16 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
         adjusted = jacobian + left @ (grown[:, None] * (left.T @ jacobian))  # A_g J_g
         scores.append(adjusted.T @ fit.residuals[rows])
         influence = adjusted @ basis.inverse  # (m_g, n)
-        own.append((influence**2).sum(axis=0))
+        squares.append((influence**2).sum(axis=0))
         shared.append(spread.T @ influence)  # (n, n): of (I - H)_gh = delta_gh - spread_g spread_h^T
     influences = -np.array(scores) @ basis.inverse
     spread_of_data = influences.T @ influences
     matrix = spread_of_data + (basis.inverse * basis.prior) @ basis.inverse
-    free = np.array([_satterthwaite(np.array(own)[:, j], np.array(shared)[:, :, j]) for j in range(n)])
+    free = np.array([_satterthwaite(np.array(squares)[:, j], np.array(shared)[:, :, j]) for j in range(n)])
     freedom = np.maximum(_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
     typical = float(np.median(freedom))
     trusted = bool(typical >= LEAST_FREEDOM)
-    reason = f"{len(own)} {what}, worth {typical:.1f} degrees of freedom"
+    reason = f"{len(squares)} {what}, worth {typical:.1f} degrees of freedom"
     if not trusted:
         reason += f"; under {LEAST_FREEDOM:g} the intervals mislead"
     return Covariance(kind, matrix, freedom, trusted, reason, influences)
@@ -440,11 +443,11 @@ def _root(matrix: Array) -> Array:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _satterthwaite(own: Array, shared: Array) -> float:
-    """(tr B)^2 / tr(B^2) of B = diag(own) - shared shared^T; own (clusters,), shared (clusters, n)."""
+def _satterthwaite(diagonal: Array, shared: Array) -> float:
+    """(tr B)^2 / tr(B^2) of B = diag(diagonal) - shared shared^T; diagonal (clusters,), shared (clusters, n)."""
     taken = (shared**2).sum(axis=1)
-    squares = float(own @ own - 2 * own @ taken + ((shared.T @ shared) ** 2).sum())
-    return float((own.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0
+    squares = float(diagonal @ diagonal - 2 * diagonal @ taken + ((shared.T @ shared) ** 2).sum())
+    return float((diagonal.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0
 
 
 def blocks(fit: LinearFit, length: float) -> Index:
@@ -462,40 +465,40 @@ def blocks(fit: LinearFit, length: float) -> Index:
 
 
 def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping[str, Whiteness]) -> Array:
-    """Half-widths (n,) from the data alone: Fisher's without priors, widened as the chosen form widens it."""
+    """Half-widths (n,) without priors: those of the Fisher form, times the ratio of chosen to Fisher errors."""
     levels = np.array([colours[name].level for name in fit.signals])
     inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian)
-    own = (levels[:, None] * fit.jacobian) @ inverse
+    influence = (levels[:, None] * fit.jacobian) @ inverse
     widened = np.where(plain.errors > 0, best.errors / np.where(plain.errors > 0, plain.errors, 1.0), 1.0)
     quantile = stats.t.ppf(0.5 + LEVEL / 2, best.freedom)
-    return np.asarray(np.where(unseen, np.inf, np.sqrt((own**2).sum(axis=0)) * widened * quantile))
+    return np.asarray(np.where(unseen, np.inf, np.sqrt((influence**2).sum(axis=0)) * widened * quantile))
 
 
 def _sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
 ) -> tuple[str, ...]:
-    """One sentence for each parameter: how well it is known or why not."""
-    free, told = _free_places(fit), list[str]()
+    """One sentence for each factor: its interval, or the reason why it has none."""
+    free, sentences = _free_places(fit), list[str]()
     for j, (path, name) in enumerate(zip(fit.paths, short(fit.paths), strict=True)):
-        together = next((own for own in seen.combinations if path in own.paths), None)
+        together = next((combination for combination in seen.combinations if path in combination.paths), None)
         known = f"{name} is known to +-{100 * half[j]:.2g} % of its base value"
         if path in fit.dropped:
-            told.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
+            sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
         elif fit.held is not None and fit.held[j]:
-            told.append(f"{name} was held at {fit.factors[j]:.4g}: no interval")
+            sentences.append(f"{name} was held at {fit.factors[j]:.4g}: no interval")
         elif j not in free:
-            told.append(f"{name} stands at its bound, {fit.factors[j]:.4g}: no interval")
+            sentences.append(f"{name} is at its bound, {fit.factors[j]:.4g}: no interval")
         elif identifiable[j] and together is None:
-            told.append(known)
+            sentences.append(known)
         elif identifiable[j]:
             assert together is not None
-            others = listed([own for own in together.names if own != name])
+            others = listed([other for other in together.names if other != name])
             index = f"collinearity index {together.gamma:.0f}"
-            told.append(f"{known}, if the model is right: {others} do nearly the same ({index})")
+            sentences.append(f"{known}, if the model is right: {others} do nearly the same ({index})")
         elif together is not None:
-            told.append(f"{name} is not identified: {together.sentence()}")
+            sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
-            told.append(f"{name} is not identified: +-{100 * alone[j]:.2g} % of its base value, hardly excited")
+            sentences.append(f"{name} is not identified: +-{100 * alone[j]:.2g} % of its base value, hardly excited")
         else:
-            told.append(f"{name} is not identified: no effect of its own on what these data hold")
-    return tuple(told)
+            sentences.append(f"{name} is not identified: no independent effect on these data")
+    return tuple(sentences)

@@ -16,15 +16,15 @@ FOLDER_VARIABLE = "SHIPID_DATA"
 
 
 def available() -> list[str]:
-    """Names of the bundled mappings, each one that `fetch` understands."""
+    """Return the names of the bundled mappings; `fetch` takes each of them."""
     return list(document.bundled("studies/mappings"))
 
 
 def fetch(name: str) -> Path:
-    """File of the log behind a mapping, its checksum verified.
+    """Return the file of the log that a mapping describes; its checksum is verified.
 
-    With the environment variable SHIPID_DATA set, the log is looked for in that folder and nothing is downloaded;
-    else it comes from the mapping's url, once, into the cache folder of the user.
+    If the environment variable SHIPID_DATA is set, the log must be in that folder and nothing is downloaded. If it is
+    not set, the log is downloaded once from the mapping's url into the cache folder of the user.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def fetch(name: str) -> Path:
 
 
 def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
-    stem = Path(name).stem  # of one's own mapping the name is a path: the cache folder must hold the file anyway
+    stem = Path(name).stem  # the name may be the path of a mapping; the file must still lie in the cache folder
     cache = Path(pooch.os_cache("shipid"))
     pooch.get_logger().setLevel("WARNING")
     try:

@@ -47,7 +47,7 @@ class Imported:
 
 
 def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = ()) -> Dataset:
-    """Turn a log into a dataset as its mapping declares; nothing is mended that is not declared.
+    """Turn a log into a dataset as its mapping declares; nothing is repaired that is not declared.
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, position on the Earth to north and
     east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the mapping,
@@ -103,7 +103,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
 
 
 def runs_of(source: Source, log: Path) -> dict[str, Path]:
-    """Run -> file: of a folder with one run a file every file that fits the pattern, else the log itself."""
+    """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         return {log.stem: log}
     before, _, after = source.runs.partition("*")
@@ -114,7 +114,7 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
 
 
 def digest_of(mapping: Mapping, log: Path) -> str:
-    """SHA-256 of the log; of several files, of their SHA-256 in hex one after another."""
+    """Return the SHA-256 of the log in hex; for several files, the SHA-256 of their SHA-256s joined."""
     files = [*runs_of(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
     digests = [sha256_of(file) for file in files]
     several = mapping.source.runs is not None or mapping.file
@@ -122,7 +122,7 @@ def digest_of(mapping: Mapping, log: Path) -> str:
 
 
 def sha256_of(file: Path) -> str:
-    """SHA-256 of a file, in hex; raises DataError if it cannot be read."""
+    """Return the SHA-256 of a file in hex; raises DataError if it cannot be read."""
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError as error:
@@ -149,7 +149,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
 
 
 def _added(parts: list[Records]) -> Records:
-    """Records of all files, those of one kind and column added up."""
+    """Return the records of all files; counts of one kind and column are added up."""
     if len(parts) == 1:
         return parts[0]
     total: dict[tuple[str, str, int], dict[str, Any]] = {}
@@ -157,9 +157,9 @@ def _added(parts: list[Records]) -> Records:
         seen: list[tuple[str, str]] = []
         for record in records:
             key = (record["kind"], record["column"])
-            found = total.setdefault((*key, seen.count(key)), {**record, "count": 0})
-            found["count"] += record["count"]
-            found["note"] = record["note"] if record["note"] == found["note"] else f"over {len(parts)} files"
+            entry = total.setdefault((*key, seen.count(key)), {**record, "count": 0})
+            entry["count"] += record["count"]
+            entry["note"] = record["note"] if record["note"] == entry["note"] else f"over {len(parts)} files"
             seen.append(key)
     return list(total.values())
 
@@ -200,7 +200,7 @@ def _passed_over(table: pd.DataFrame) -> Records:
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
-    """Time of every row [s]; raises unless it is there and rises."""
+    """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
     if clock.unit == "date":
         t = seconds(_column(log, clock.source, file, f"{path}.from"))
     else:
@@ -211,7 +211,7 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
         if not np.isfinite(t[row]):
             what = "no time here: remove the row"
         elif t[row] == t[row - 1]:
-            what = f"time {t[row]:g} s stands twice: remove one of the rows"
+            what = f"time {t[row]:g} s appears twice: remove one of the rows"
         else:
             what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
@@ -221,7 +221,7 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
 def _common_clock(
     channels: dict[str, Channel], t: NDArray[np.float64], step: float | None, file: Path
 ) -> NDArray[np.float64]:
-    """Instants that every channel covers: `step` [s] apart, or those of the log itself."""
+    """Return the instants [s] that every channel covers: `step` [s] apart, or the instants of the log."""
     spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
     empty = [name for name, times in spans.items() if not len(times)]
     if empty:
@@ -240,14 +240,14 @@ def _common_clock(
 
 
 def _interpolation(name: str, column: Column) -> str:
-    """As declared; else orders hold, angles that wrap go the short way, and all else is linear."""
+    """Return the rule of interpolation: as declared, else `previous` for orders, `angle` where it wraps, `linear`."""
     return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else "linear")
 
 
 def _brought(
     t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64], how: str, max_gap: float
 ) -> NDArray[np.float64]:
-    """Bring a channel to instants t; NaN between samples further apart than max_gap [s], unless it is held."""
+    """Interpolate a channel at instants t [s]; NaN between samples more than max_gap [s] apart, unless it is held."""
     known = np.isfinite(values)
     times, values = times[known], values[known]
     after = np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1) if len(times) > 1 else np.zeros(len(t))
@@ -256,16 +256,16 @@ def _brought(
         return values[np.clip(held, 0, len(values) - 1)]
     if len(times) == 1:
         return np.full(len(t), values[0])
-    found = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
+    result = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
     index = after.astype(int)
     on_sample = (t == times[index]) | (t == times[index - 1])
-    return np.where((times[index] - times[index - 1] > max_gap) & ~on_sample, np.nan, found)
+    return np.where((times[index] - times[index - 1] > max_gap) & ~on_sample, np.nan, result)
 
 
 def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
     names = [str(name) for name in log.columns]
     if names.count(source) > 1:
-        raise DataError(f"column {source!r} stands twice in the log: rename one of them", file=file, path=path)
+        raise DataError(f"column {source!r} appears twice in the log: rename one of them", file=file, path=path)
     if source not in names:
         alone = f"the header is one column, {names[0]!r}: is the separator right?" if names else "there is none"
         remedy = alone if len(names) <= 1 else choices(source, names)
@@ -328,7 +328,7 @@ def _projected(rows: pd.DataFrame, mapping: Mapping) -> tuple[pd.DataFrame, tupl
 
 
 def _in_body(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
-    """Speed and course, or earth-fixed velocities, turned by psi into the body."""
+    """Turn speed and course over ground, or earth-fixed velocities, into u and v [m/s] by the heading psi."""
     if "speed" in columns:
         drift = rows["course"] - rows["psi"]
         turned = rows.drop(columns=["speed", "course"])
@@ -355,10 +355,10 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
             at = f"t = {stretch['t'].iloc[0]:g} s"
             raise DataError(f"a single row between two breaks at {at}: nothing to estimate from", file=file)
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
-        found = smooth(stretch["t"].to_numpy(), logged, noise)
-        squares += found.consistency * len(stretch)
-        columns = {name: found.state(name) for name in lacking}
-        columns |= {STANDARD_DEVIATIONS[name]: found.deviation(name) for name in lacking}
+        smoothed = smooth(stretch["t"].to_numpy(), logged, noise)
+        squares += smoothed.consistency * len(stretch)
+        columns = {name: smoothed.state(name) for name in lacking}
+        columns |= {STANDARD_DEVIATIONS[name]: smoothed.deviation(name) for name in lacking}
         parts.append(stretch.assign(**columns))
     note = f"innovations {np.sqrt(squares / len(rows)):.2f} times as large as the noise declared (1 if it fits)"
     records = [{"kind": "estimated", "column": ", ".join(lacking), "count": len(rows), "note": note}]
@@ -398,7 +398,7 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
     if len(kept) < 2:
         raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
     if max_gap is not None and max_gap < np.median(np.diff(t)):
-        message = f"{max_gap:g} s is shorter than the log's own step of {np.median(np.diff(t)):g} s"
+        message = f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s"
         raise DataError(message, file=file, path="clock.max_gap")
     broken = np.diff(kept, prepend=kept[0]) > (np.inf if max_gap is None else max_gap)
     if broken.any():
@@ -414,7 +414,7 @@ def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
 
 
 def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
-    """Put the runs one after another; rows that belong to two runs stand twice."""
+    """Put the runs one after another; rows that belong to two runs are repeated."""
     t = rows["t"].to_numpy()
     slack, step = clock_slack(t), float(np.median(np.diff(t)))
     runs = []

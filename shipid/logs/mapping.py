@@ -48,8 +48,8 @@ ESTIMATED = ("u", "v", "r")
 class Source(Strict):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
-    With `runs`, a pattern such as `Z_*.dat`, the log is a folder in which every file of that name is one run with a
-    clock of its own, called by what the star stands for.
+    With `runs`, a pattern such as `Z_*.dat`, the log is a folder. Every file of that name is one run with a
+    separate clock; the text matched by the star is the name of the run.
     """
 
     file: str | None = None  # relative to the data folder
@@ -63,7 +63,7 @@ class Source(Strict):
 class Clock(Strict):
     """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
 
-    With `step` [s] the rows of the dataset are that far apart, and every column comes from its own instants.
+    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants.
     """
 
     source: str = Field(alias="from")
@@ -80,7 +80,7 @@ class FileClock(Strict):
 
 
 class File(Strict):
-    """A further file of the log, `path` from the folder of the log on, with its own format and clock."""
+    """A further file of the log, with its format and clock; `path` is relative to the folder of the log."""
 
     path: str
     format: SerializeAsAny[Format] = TextFormat()
@@ -97,7 +97,7 @@ class Origin(Strict):
 class Column(Strict):
     """One column of the dataset: value = sign * factor * (source column in `unit`), then turned as declared.
 
-    Its samples were true `latency` [s] before their time; `interpolation` says how it is brought to other instants.
+    Its samples are of `latency` [s] before their time stamp; `interpolation` is the rule between samples.
     """
 
     source: str = Field(alias="from")
@@ -162,12 +162,12 @@ class Mapping(Strict):
 
     @property
     def resamples(self) -> bool:
-        """Whether columns come from instants of their own."""
+        """Whether columns have other instants than the dataset, so that they must be interpolated."""
         return self.clock.step is not None or any(column.file or column.latency for column in self.columns.values())
 
 
 def read_mapping(name: str | Path) -> Mapping:
-    """Read a bundled mapping by name, or one's own by path; raises DocumentError with file, path and remedy."""
+    """Read a mapping: a bundled one by name, any other by path; raises DocumentError with file, path and remedy."""
     file = document.find(str(name), "studies/mappings")
     raw = document.read(file)
     if "digest" in raw:
@@ -200,7 +200,7 @@ def read_mapping(name: str | Path) -> Mapping:
 
 
 def to_si(unit: str, name: str) -> float:
-    """Factor from a unit of the log to the SI unit of a column."""
+    """Return the factor from a unit of the log to the SI unit of a column."""
     return UNITS[str(INPUTS.get(name) or unit_of(name))][unit]
 
 
@@ -223,8 +223,8 @@ def _format(raw: Any, file: Path, path: str) -> Format:
     kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
     if kind not in READERS:
         raise DocumentError(f"unknown kind {kind!r}: {choices(kind, READERS)}", file=file, path=f"{path}.kind")
-    found: Format = document.parse(READERS[kind].options, raw, file, prefix=path)
-    return found
+    form: Format = document.parse(READERS[kind].options, raw, file, prefix=path)
+    return form
 
 
 def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
@@ -266,7 +266,7 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
 
 
 def _check_missing(mapping: Mapping, file: Path) -> None:
-    """Whether everything a dataset needs is there, converted or estimated."""
+    """Raise DocumentError unless every required column is mapped, converted from another, or estimated."""
     columns = mapping.columns
     for name, other in REPLACED.items():
         if name in columns and other in columns:
@@ -301,7 +301,7 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
 
 
 def _check_instants(mapping: Mapping, file: Path) -> None:
-    """Whether columns that come from other instants can be brought to those of the dataset."""
+    """Raise DocumentError unless columns with other instants can be interpolated at those of the dataset."""
     for name, column in mapping.columns.items():
         path = f"columns.{name}"
         if column.file is not None and column.file not in mapping.file:
@@ -310,12 +310,12 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
         if column.interpolation == "angle" and (INPUTS.get(name) or unit_of(name)) != "rad":
             raise DocumentError("only an angle is interpolated as one", file=file, path=f"{path}.interpolation")
         if column.interpolation is not None and not mapping.resamples:
-            message = "nothing is brought to other instants: set [clock] step, a latency or a file"
+            message = "nothing is interpolated at other instants: set [clock] step, a latency or a file"
             raise DocumentError(message, file=file, path=f"{path}.interpolation")
     for name, entry in mapping.file.items():
         _factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
     if mapping.resamples and mapping.clock.max_gap is None:
-        message = "missing: columns are brought to other instants, so say over how long a gap"
+        message = "missing: columns are interpolated at other instants, so set the longest gap"
         raise DocumentError(message, file=file, path="clock.max_gap")
     if mapping.source.runs is not None and mapping.file:
         raise DocumentError("one run a file, or several files a run; not both", file=file, path="source.runs")

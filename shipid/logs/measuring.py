@@ -20,7 +20,7 @@ from shipid.measures.rows import criterion_rows, measure_rows
 class Measured:
     """Tables of a dataset's manoeuvres, one row each: `run`, `kind`, and the rows of `shipid.measures.rows`.
 
-    left : runs that are no standard manoeuvre, with a sentence why.
+    left : run -> sentence: why it was not measured.
     """
 
     measures: pd.DataFrame
@@ -43,7 +43,7 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
     if kind is not None and kind not in MEASURES:
         raise DataError(f"no manoeuvre is called {kind!r}: {choices(kind, MEASURES)}", path="--manoeuvre")
     if length is not None and not length > 0:
-        raise DataError(f"a length of {length:g} m is none: it must be positive", path="--length")
+        raise DataError(f"a length of {length:g} m: it must be positive", path="--length")
     measures, judged, left = [], [], {}
     for name, rows in _named(dataset):
         if len(rows) < 2:
@@ -54,15 +54,15 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
         if not kinds:
             left[name] = why
         for seen in kinds:
-            found = MEASURES[seen](record)
-            measures += [{"run": name, "kind": seen, **row} for row in measure_rows(found, length)]
-            judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, found, length))]
+            result = MEASURES[seen](record)
+            measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]
+            judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, result, length))]
     return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)
 
 
 def _named(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
-    found = list(pieces(dataset))
-    count, number = Counter(name for name, _ in found), Counter[str]()
-    for name, rows in found:
+    parts = list(pieces(dataset))
+    count, number = Counter(name for name, _ in parts), Counter[str]()
+    for name, rows in parts:
         number[name] += 1
         yield (name if count[name] == 1 else f"{name}/{number[name]}"), rows

@@ -1,7 +1,7 @@
-"""Readers: a log as a table of columns under their own names, from text, Parquet, MATLAB or NMEA 0183.
+"""Readers: a log as a table of columns named as in the log, from text, Parquet, MATLAB or NMEA 0183.
 
 A reader is a row of `READERS`: the options of its format, a function that reads, and one that recognises a file. Values
-come as they are written, text or numbers; units and meaning are the mapping's.
+are returned as written, as text or numbers; the mapping gives units and meaning.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class NmeaFormat(Format):
 
 
 def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
-    """Read a log as its format says; `attrs["unreadable"]` counts the lines that were passed over.
+    """Read a log as its format says; `attrs["unreadable"]` counts the lines that were skipped.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
 
 
 def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
-    """Vectors of a MATLAB file that are as long as the clock."""
+    """Return the vectors of a MATLAB file that are as long as the clock, as a table."""
     from scipy.io import loadmat
 
     try:
@@ -163,7 +163,7 @@ def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     except NotImplementedError:
         message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
         raise DataError(message, file=file, path="format.kind") from None
-    except Exception as error:  # scipy has no error of its own: damaged files end in any of a dozen
+    except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
         message = f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind"
         raise DataError(message, file=file, path="format.kind") from None
     length = len(vectors.get(clock, max(vectors.values(), key=len, default=np.empty(0))))
@@ -188,7 +188,7 @@ def _vectors(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str,
 
 
 def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
-    """Sentences as rows: `time` [s] and what `SENTENCES` names, NaN where a sentence does not say it."""
+    """Return sentences as rows: `time` [s] and the columns of `SENTENCES`, NaN where a sentence has no value."""
     import pynmea2
 
     rows: list[dict[str, float]] = []
@@ -199,18 +199,18 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
             continue
         try:
             sentence = pynmea2.parse(dollar + body.strip(), check=True) if dollar else None
-            found = _said(sentence)
+            values = _said(sentence)
         except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError):
             sentence = None
         if sentence is None:
             unreadable += 1
             continue
         if form.time == "line":
-            rows.append({"time": _stamp(stamp, file, number), **found})
+            rows.append({"time": _stamp(stamp, file, number), **values})
             continue
         clock.read(getattr(sentence, "timestamp", None))
-        if clock.now is not None:  # before the first fix nobody knows the time
-            rows.append({"time": clock.now, **found})
+        if clock.now is not None:  # before the first fix the time is unknown
+            rows.append({"time": clock.now, **values})
     if not rows:
         message = f"no NMEA 0183 sentence with a time in {unreadable} unreadable lines: set [format] kind or time"
         raise DataError(message, file=file, path="format.kind")
@@ -256,7 +256,7 @@ def _stamp(text: str, file: Path, row: int) -> float:
 
 
 def _said(sentence: Any) -> dict[str, float]:
-    """What a sentence says, by name of column; an invalid fix (RMC, GLL: V; GGA: quality 0) says nothing."""
+    """Return the values of a sentence by column; none for an invalid fix (RMC, GLL: V; GGA: quality 0)."""
     kind = getattr(sentence, "sentence_type", "")
     if getattr(sentence, "status", "A") == "V" or str(getattr(sentence, "gps_qual", 1)) == "0":
         return {}
@@ -265,7 +265,7 @@ def _said(sentence: Any) -> dict[str, float]:
 
 
 def _position(name: str) -> Callable[[Any], Any]:
-    """Decimal degrees; nothing where the field is empty (the parser would say 0)."""
+    """Return the position in decimal degrees; nothing where the field is empty (the parser would return 0)."""
     return lambda sentence: getattr(sentence, name) if getattr(sentence, name[:3]) else None
 
 
@@ -278,7 +278,7 @@ def _engine(*numbers: str) -> Callable[[Any], Any]:
 
 
 def _speed(sentence: Any) -> Any:
-    """Apparent wind speed [m/s] from N (knots), K (km/h) or M (m/s)."""
+    """Return the apparent wind speed [m/s] from a value in N (knots), K (km/h) or M (m/s)."""
     if sentence.reference != "R" or not sentence.wind_speed:
         return None
     factor = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
@@ -331,7 +331,7 @@ def _is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
 
 
 def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
-    """Most lines are sentences; the time is before them, or else in the fixes."""
+    """Recognise NMEA 0183: most lines are sentences; the time is before them, or in the position fixes."""
     if b"\0" in head:
         return None
     lines = [line for line in head.decode("latin-1").splitlines()[:LOOKED_AT] if line.strip()]
@@ -343,7 +343,7 @@ def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
 
 
 READERS: dict[str, Reader] = {
-    "text": Reader(TextFormat, _text),  # no signature: a guess takes whatever is nothing else for text
+    "text": Reader(TextFormat, _text),  # no signature: a guess takes every other file for text
     "parquet": Reader(ParquetFormat, _parquet, _is_parquet),
     "mat": Reader(MatFormat, _mat, _is_mat),
     "nmea": Reader(NmeaFormat, _nmea, _is_nmea, scattered=True),

@@ -42,7 +42,7 @@ class ColumnRepair(Repair):
 
 
 class WrapInterpolation(ColumnRepair):
-    """A channel in 0..360 deg was interpolated linearly across 360/0; steps above `threshold` [`unit`] betray it."""
+    """A channel in 0..360 deg was interpolated linearly across 360/0; steps above `threshold` [`unit`] show it."""
 
     threshold: float = Field(gt=0)
     unit: str = "rad"
@@ -85,7 +85,7 @@ class Break(Repair):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Rows after a repair, which of them it `touched`, and what it found."""
+    """Result of a repair: the rows, a mask of those that it `touched`, and a note for the record."""
 
     rows: pd.DataFrame
     touched: Mask
@@ -94,7 +94,7 @@ class Outcome:
 
 
 def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
-    """Values with the missing ones interpolated linearly in time from the finite rest."""
+    """Return values (N,) with the `missing` ones interpolated linearly in time from the finite others."""
     known = ~missing & np.isfinite(values)
     filled = np.where(missing, np.nan, values)
     if known.any():
@@ -105,7 +105,7 @@ def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing:
 def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
     """Drop both neighbours of every step |d psi| > threshold, unwrap the rest, interpolate the dropped.
 
-    Both, because the last true sample before and the first after cannot be told from false ones.
+    Both neighbours are dropped, because nothing shows which of the two samples is false.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     healed: dict[str, NDArray[np.float64]] = {}
@@ -124,7 +124,7 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
 def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
 
-    Windows are whole and do not reach over a break: half a window of a moving ship has its median elsewhere.
+    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     width = 2 * round(repair.window / 2 / float(np.median(np.diff(t)))) + 1

@@ -38,20 +38,20 @@ def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     dataset : whole recordings; one run a manoeuvre gives that manoeuvre.
     unit : of the log's clock [s], in which starts and ends are given.
     """
-    found = []
+    cuts = []
     for _, rows in pieces(dataset):
         t = rows["t"].to_numpy() / unit
-        found += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
+        cuts += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}
     segments = []
-    for kind, start, end in found:
+    for kind, start, end in cuts:
         counts[kind] = counts.get(kind, 0) + 1
         segments.append(Segment(run=f"{kind} {counts[kind]}", start=start, end=end, manoeuvre=kind))  # type: ignore[arg-type]
     return segments
 
 
 def kind_of(rows: pd.DataFrame) -> str:
-    """What a whole run mostly is."""
+    """Return the kind of manoeuvre that takes most of a run."""
     t = rows["t"].to_numpy()
     spans: dict[str, float] = {}
     for kind, (first, last) in _of_stretch(rows):
@@ -60,7 +60,7 @@ def kind_of(rows: pd.DataFrame) -> str:
 
 
 def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Kind, and first and last row, of every manoeuvre in one unbroken stretch."""
+    """Yield the kind, and the first and last row, of every manoeuvre in one unbroken stretch."""
     t, psi = rows["t"].to_numpy(), np.unwrap(rows["psi"].to_numpy())
     if len(t) < 3:
         return
@@ -97,7 +97,7 @@ def _helm(rows: pd.DataFrame) -> Array:
 
 
 def _legs(helm: Array, t: Array) -> list[Leg]:
-    """Stretches with the helm on one side; those shorter than a few seconds join what is before them."""
+    """Return the stretches with the helm on one side; stretches of less than a few seconds join the one before."""
     side = np.where(np.abs(helm) >= HELM, np.sign(helm), 0.0).astype(int)
     short = min(SHORT, (t[-1] - t[0]) / 50)
     legs: list[Leg] = []
@@ -112,7 +112,7 @@ def _legs(helm: Array, t: Array) -> list[Leg]:
 
 
 def _zigzag(legs: list[Leg], psi: Array, t: Array) -> int:
-    """How many legs from here on are one zigzag: helm from side to side, amidships but briefly; 0 if it is none."""
+    """Return how many legs from here on are one zigzag, helm from side to side, only briefly amidships; 0 if none."""
     sides: list[Leg] = []
     size = 0
     for index, leg in enumerate(legs):
@@ -129,13 +129,13 @@ def _zigzag(legs: list[Leg], psi: Array, t: Array) -> int:
 
 
 def _straight(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, tuple[int, int]]]:
-    """What lies between manoeuvres: a speed run if the shaft changes speed, a transit if not; nothing if short."""
+    """Return the part between manoeuvres: a speed run if the shaft changes speed, else a transit; nothing if short."""
     t = rows["t"].to_numpy()
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
         return
     part = rows.iloc[first : last + 1]
     shafts = [name for name in map(str, rows.columns) if is_shaft(name)]
-    watched = part[shafts or ["u"]]  # the ship's own speed changes after every turn, too
+    watched = part[shafts or ["u"]]  # the speed through the water is no sign: it changes after every turn, too
     change = watched.quantile(0.98) - watched.quantile(0.02)
     moved = bool((change > CHANGE * watched.abs().median().clip(lower=1e-9)).any())
     yield ("speed run" if moved else "transit"), (first, last)

@@ -1,4 +1,4 @@
-"""Measures of standard manoeuvres, sailed or simulated: arrays in, named numbers out, by kind of manoeuvre."""
+"""Measures of standard manoeuvres, recorded or simulated: arrays in, named numbers out, by kind of manoeuvre."""
 
 from __future__ import annotations
 
@@ -18,4 +18,4 @@ MEASURES: dict[str, Callable[[Record], Measures]] = {
     "reverse-spiral": reverse_spiral,
     "stop": stop,
 }
-"""Kind of manoeuvre -> what measures it."""
+"""Kind of manoeuvre -> function that computes its measures from a record."""

@@ -12,19 +12,19 @@ from shipid.units import DEGREE
 
 SOURCE = "IMO MSC.137(76)"
 SHORTEST = 100.0  # m: length from which the standards apply
-SAME = 0.5 * DEGREE  # under which an angle is the one that a test asks for
+SAME = 0.5 * DEGREE  # tolerance of the angle of a test
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion beside what was measured.
+    """One criterion with the measured value.
 
     Parameters
     ----------
-    name : what is judged, and its paragraph.
-    value, limit, unit : greatest value allowed, in ship lengths ("L") or rad.
-    met : None where the value is missing or the manoeuvre is not the one that the criterion is about.
-    note : why it is not judged, or what is to be known.
+    name : the measure, and the paragraph of the resolution.
+    value, limit, unit : measured value, largest value allowed, and their unit: ship lengths ("L") or rad.
+    met : whether value <= limit; None if the value is missing or the manoeuvre is not that of the criterion.
+    note : why it is not judged, or a remark.
     """
 
     name: str
@@ -36,10 +36,10 @@ class Criterion:
 
 
 def criteria(kind: str, measures: Measures, length: float | None) -> list[Criterion]:
-    """Judge a manoeuvre of a ship of a length between perpendiculars [m]; empty for kinds without a criterion.
+    """Criteria of a manoeuvre; `length` [m] is that between perpendiculars. Empty for kinds without a criterion.
 
-    The test speed (90 % of that at 85 % of the greatest engine power, or more), full load, deep calm water (5.2) and a
-    logged point at midships are for the user to see to.
+    The user must ensure the test conditions: test speed of at least 90 % of that at 85 % of the maximum engine power,
+    full load, deep calm water (5.2), and a logged point at midships.
     """
     if kind == "turning":
         return list(_turning(measures, length))
@@ -47,9 +47,22 @@ def criteria(kind: str, measures: Measures, length: float | None) -> list[Criter
         return list(_zigzag(measures, length))
     if kind == "stop":
         track = _lengths(measures, "track_reach", length)
-        found = _judged("stopping ability: track reach (5.3.4)", track, 15.0, "L", measures["track_reach"].why, length)
-        note = "; ".join(filter(None, [found.note, "up to 20 L where a large displacement makes 15 L impracticable"]))
-        return [Criterion(found.name, found.value, 15.0, "L", found.met, note if found.met is False else found.note)]
+        criterion = _judged(
+            "stopping ability: track reach (5.3.4)", track, 15.0, "L", measures["track_reach"].why, length
+        )
+        note = "; ".join(
+            filter(None, [criterion.note, "up to 20 L where a large displacement makes 15 L impracticable"])
+        )
+        return [
+            Criterion(
+                criterion.name,
+                criterion.value,
+                15.0,
+                "L",
+                criterion.met,
+                note if criterion.met is False else criterion.note,
+            )
+        ]
     return []
 
 
@@ -66,9 +79,9 @@ def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
     small = _wrong(measures, {"helm": 10.0, "execute_heading": 10.0})
     large = _wrong(measures, {"helm": 20.0, "execute_heading": 20.0})
     if not large:
-        found = measures["overshoot_1"]
+        overshoot = measures["overshoot_1"]
         yield _judged(
-            "yaw checking: 20/20 first overshoot (5.3.3.3)", found.value, 25 * DEGREE, "rad", found.why, length
+            "yaw checking: 20/20 first overshoot (5.3.3.3)", overshoot.value, 25 * DEGREE, "rad", overshoot.why, length
         )
     if small:
         return
@@ -78,19 +91,19 @@ def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
     speed = measures["approach_speed"].value
     ratio = length / speed if length and speed > 0 else float("nan")
     for number, paragraph, limit in ((1, "5.3.3.1", first_limit(ratio)), (2, "5.3.3.2", second_limit(ratio))):
-        found = measures[f"overshoot_{number}"]
+        overshoot = measures[f"overshoot_{number}"]
         ordinal = "first" if number == 1 else "second"
         label = f"yaw checking: 10/10 {ordinal} overshoot ({paragraph})"
-        yield _judged(label, found.value, limit, "rad", found.why, length)
+        yield _judged(label, overshoot.value, limit, "rad", overshoot.why, length)
 
 
 def first_limit(ratio: float) -> float:
-    """Greatest first overshoot [rad] of a 10/10 zigzag for L/V [s]."""
+    """Largest first overshoot [rad] allowed in a 10/10 zigzag, for `ratio` L/V [s]."""
     return float(np.clip(5 + ratio / 2, 10, 20)) * DEGREE
 
 
 def second_limit(ratio: float) -> float:
-    """Greatest second overshoot [rad] of a 10/10 zigzag for L/V [s]."""
+    """Largest second overshoot [rad] allowed in a 10/10 zigzag, for `ratio` L/V [s]."""
     return float(np.clip(17.5 + 0.75 * ratio, 25, 40)) * DEGREE
 
 
@@ -99,7 +112,7 @@ def _lengths(measures: Measures, name: str, length: float | None) -> float:
 
 
 def _wrong(measures: Measures, asked: dict[str, float]) -> str:
-    """What differs from the angles [deg] that a test asks for; empty if nothing does."""
+    """Text of the angles that differ from those of a test [deg]; empty if none differs."""
     said = {name: (measures[name].value / DEGREE, angle) for name, angle in asked.items()}
     return ", ".join(
         f"{name.replace('_', ' ')} is {value:.1f} deg, not {angle:g}"

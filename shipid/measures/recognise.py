@@ -1,4 +1,4 @@
-"""From the columns of a run to a record, and which standard manoeuvre it is."""
+"""Record of a run from the columns of a dataset, and recognition of the standard manoeuvre."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 def record_of(columns: Mapping[str, Array]) -> Record:
     """Record of one run from the columns of a dataset.
 
-    The helm is the mean of the angle commands that move, each with the sign that turned the ship to starboard: that of
-    the integral of helm over yaw rate. The shaft is the mean of the speeds that run at first.
+    The helm is the mean of the angle commands that move. Each has the sign that turns the ship to starboard: the sign
+    of the sum of angle times change of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
 
     Raises
     ------
@@ -51,17 +51,18 @@ def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> li
 
 
 def _sense(angle: Array, r: Array) -> float:
-    """+1 or -1, the sign with which an angle turns the ship to starboard; 0 for one that does nothing."""
+    """+1 or -1, the sign with which an angle turns the ship to starboard; 0 for an angle without effect."""
     return float(np.sign(angle[:-1] @ np.diff(r)))
 
 
 def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
-    """Kinds of manoeuvre that a run is, keys of `MEASURES`; where it is none, a sentence why.
+    """Kinds of manoeuvre of a run (keys of `MEASURES`), and the reason as a sentence if there is none.
 
-    A stop: the shaft turns from ahead to astern. Else by the helm, from where it is first put over, to a ship that goes
-    straight. Zigzag: over to either side in turn, at least once reversed, while the ship turns by less than 90 deg.
-    Turning: over to one side through 90 deg or more. Pull-out as well: then amidships for a fifth of the time of the
-    turn, or more. A helm of many levels is some spiral, and the user has to say which.
+    Stop: the shaft changes from ahead to astern. The other kinds follow from the helm, and the ship must be on a
+    straight course when the helm is first put over. Zigzag: the helm is reversed at least once while the heading
+    changes by less than 90 deg. Turning: the helm stays on one side for 90 deg or more. Pull-out, in addition: the helm
+    is then amidships for at least a fifth of the time of the turn. Many helm levels are a spiral; the user has to say
+    which kind.
     """
     shaft, over = record.shaft, helm_over(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():

@@ -1,4 +1,4 @@
-"""A manoeuvre as it was sailed, and how instants, extremes and means are found between its samples."""
+"""The record of a manoeuvre, and interpolation of instants, extremes and means between its samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shipid.errors import DataError
 
 Array = NDArray[np.float64]
 
-POINTS = 4  # of the polynomial on which a value between samples lies
+POINTS = 4  # samples of the interpolating polynomial
 HALVINGS = 60
 TOP = 0.2  # share of a rise that is its top
 DRIFT = 1.5  # tolerances by which a level differs from the next one at least
@@ -65,14 +65,14 @@ class Record:
         return np.hypot(self.u, self.v)
 
     def upto(self, row: int) -> Record:
-        """The rows before one, two at least."""
+        """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
         names = ("t", "north", "east", "psi", "u", "v", "r", "helm")
         given = {name: getattr(self, name)[cut] for name in names}
         return replace(self, **given, shaft=None if self.shaft is None else self.shaft[cut])
 
     def along(self, start: float) -> tuple[Array, Array]:
-        """Place ahead and to starboard (N,) [m] of where the ship is at `start` [s], on her heading there."""
+        """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""
         psi, north, east = (value_at(self.t, values, start) for values in (self.psi, self.north, self.east))
         c, s = np.cos(psi), np.sin(psi)
         return c * (self.north - north) + s * (self.east - east), c * (self.east - east) - s * (self.north - north)
@@ -80,7 +80,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Measure:
-    """A number with its SI unit; where it is NaN, `why` says in a sentence what is missing."""
+    """A number with its SI unit; if it is NaN, `why` is a sentence with the reason."""
 
     value: float
     unit: str
@@ -91,25 +91,25 @@ class Measures(Mapping[str, Measure]):
     """Measures by name, in the order in which they were added."""
 
     def __init__(self) -> None:
-        self._found: dict[str, Measure] = {}
+        self._by_name: dict[str, Measure] = {}
 
     def add(self, name: str, value: float, unit: str, why: str) -> None:
-        """Add one; `why` is kept where the value is NaN."""
+        """Add a measure; `why` is kept only if the value is not finite."""
         missing = not np.isfinite(value)
-        self._found[name] = Measure(float("nan") if missing else float(value), unit, why if missing else "")
+        self._by_name[name] = Measure(float("nan") if missing else float(value), unit, why if missing else "")
 
     def __getitem__(self, name: str) -> Measure:
-        return self._found[name]
+        return self._by_name[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
+        return iter(self._by_name)
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._by_name)
 
 
 def value_at(t: Array, values: Array, when: float) -> float:
-    """Value at an instant [s] on the cubic through the two samples before and the two after it; NaN outside the log."""
+    """Value at the time `when` [s] by cubic interpolation of the two samples before and after; NaN outside the log."""
     if not t[0] <= when <= t[-1]:
         return float("nan")
     first = int(np.clip(np.searchsorted(t, when) - POINTS // 2, 0, max(len(t) - POINTS, 0)))
@@ -120,9 +120,9 @@ def value_at(t: Array, values: Array, when: float) -> float:
 
 
 def crossing(t: Array, values: Array, level: float, start: float, rising: bool = True) -> float:
-    """First instant [s] from `start` on at which values pass a level upwards (or downwards); NaN if they do not.
+    """First time [s] from `start` on at which values cross a level upwards (or downwards); NaN if they do not.
 
-    It is `start` where they are beyond the level by then.
+    It is `start` if the values are already beyond the level at `start`.
     """
     beyond = (values - level) * (1.0 if rising else -1.0)
     here = value_at(t, beyond, start)
@@ -139,11 +139,11 @@ def crossing(t: Array, values: Array, level: float, start: float, rising: bool =
 
 
 def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
-    """Instant [s] and value of the greatest of values between two instants, on a quartic about it.
+    """Time [s] and value of the maximum between two times, from a fitted polynomial of degree 4.
 
-    The quartic is the best through the samples within a fifth of the rise since `start`, five at least: the
-    stretch does not depend on how often one samples, and noise is averaged where samples are many. NaN where the
-    greatest lies at an end of the stretch: then it is none of the values' own.
+    The polynomial is fitted to the samples whose distance to the maximum is at most a fifth of the rise since `start`,
+    at least five. So the result does not depend on the sampling interval, and noise is averaged. NaN if the largest
+    value is at an end of the interval, because it is then not a maximum.
     """
     nothing = float("nan"), float("nan")
     inside = np.flatnonzero((t >= start) & (t <= end))
@@ -168,7 +168,7 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
 
 
 def integral(t: Array, values: Array, start: float, end: float) -> float:
-    """Integral of values over time between two instants [s] by the trapezoid rule; NaN where one is."""
+    """Integral of values over time from `start` to `end` [s] by the trapezoid rule; NaN if either is NaN."""
     if not start <= end:
         return float("nan")
     instants = np.concatenate([[start], t[(t > start) & (t < end)], [end]])
@@ -176,21 +176,21 @@ def integral(t: Array, values: Array, start: float, end: float) -> float:
 
 
 def mean(t: Array, values: Array, start: float, end: float) -> float:
-    """Mean of values over the time between two instants [s]; NaN where there is none."""
+    """Mean of values over the time from `start` to `end` [s]; NaN if end <= start."""
     return integral(t, values, start, end) / (end - start) if end > start else float("nan")
 
 
 def settled(t: Array, values: Array, start: float, end: float, scale: float) -> float:
-    """Mean over the last quarter of a stretch; NaN if it differs from the quarter before by 5 % of `scale`."""
+    """Mean over the last quarter of the time; NaN if it differs from the quarter before by more than 5 % of `scale`."""
     quarter = (end - start) / 4
     before, last = (mean(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (1, 0))
     return last if abs(last - before) <= STEADY * abs(scale) else float("nan")
 
 
 def departure(t: Array, order: Array, index: int) -> float:
-    """Instant [s] at which a move that is under way in row `index` (at least 1) began.
+    """Time [s] at which the change of `order` that is in progress in row `index` (at least 1) began.
 
-    An order that jumps holds from its row on; a measured angle that moves is traced back to where its motion began.
+    A step order begins at its row; a measured angle that moves gradually is traced back to the start of its motion.
     """
     sense = np.sign(order[index] - order[index - 1])
     moved = sense * np.diff(order)
@@ -206,13 +206,13 @@ def departure(t: Array, order: Array, index: int) -> float:
 
 @dataclass(frozen=True)
 class HelmOver:
-    """The helm as it is first put over.
+    """The first execute: the helm is first put over.
 
     Parameters
     ----------
-    start : instant [s] at which it began to move; NaN where it never does.
-    row : first in which it is over by half.
-    angle, side : how far [rad], the median while it is over by half or more of the most, and +1 to starboard.
+    start : time [s] at which the helm begins to move; NaN if it never moves.
+    row : first row with at least half of the angle.
+    angle : helm angle [rad], the median of the angles above half of the largest. side : +1 to starboard, -1 to port.
     """
 
     start: float
@@ -222,10 +222,10 @@ class HelmOver:
 
 
 def helm_over(record: Record) -> HelmOver:
-    """How the helm is first put over.
+    """The first execute of a record.
 
-    One that is over from the first row on was put over there if the ship does not turn by then; else it is left from
-    before, and the next time counts.
+    A helm that is over in the first row counts as executed there if the ship does not turn yet. Otherwise it belongs to
+    an earlier manoeuvre, and the next execute counts.
     """
     size = np.abs(record.helm)
     if not size.max() > 0:
@@ -234,7 +234,7 @@ def helm_over(record: Record) -> HelmOver:
     over = size >= angle / 2
     if over[0] and abs(record.r[0]) > STEADY * np.abs(record.r).max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
-        over &= np.logical_or.accumulate(~(over & same))  # what is left from before ends where it is first let go
+        over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
     if not over.any():
         return HelmOver(float("nan"), 0, 0.0, 1.0)
     row = int(np.argmax(over))
@@ -243,25 +243,25 @@ def helm_over(record: Record) -> HelmOver:
 
 
 def released(record: Record, over: HelmOver) -> int:
-    """First row after the helm is put over in which it is back by half; the number of rows if it is held to the end."""
+    """First row after the execute with less than half of the helm angle; the number of rows if there is none."""
     back = np.flatnonzero(over.side * record.helm[over.row :] < over.angle / 2)
     return over.row + int(back[0]) if over.angle and len(back) else len(record.t)
 
 
 def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:
-    """First and last rows of the stretches that end level: all within `tolerance` of their last value.
+    """First and last rows of the plateaus: stretches with all values within `tolerance` of their last value.
 
-    Left out are stretches shorter than a quarter of the longest, and those that drift into the next one.
+    Plateaus shorter than a quarter of the longest are left out, and those that drift into the next one.
     """
-    found: list[tuple[int, int]] = []
+    stretches: list[tuple[int, int]] = []
     last = len(t) - 1
     while last > 0:
         off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
         first = int(off[-1]) + 1 if len(off) else 0
-        found.append((first, last))
+        stretches.append((first, last))
         last = first - 1
-    longest = max((t[b] - t[a] for a, b in found), default=0.0)
-    level = [(a, b) for a, b in reversed(found) if t[b] - t[a] >= longest / 4 > 0]
+    longest = max((t[b] - t[a] for a, b in stretches), default=0.0)
+    level = [(a, b) for a, b in reversed(stretches) if t[b] - t[a] >= longest / 4 > 0]
     return [
         (a, b)
         for (a, b), (c, d) in zip(level, [*level[1:], (-1, -1)], strict=True)

@@ -1,4 +1,4 @@
-"""Measures and criteria as rows of a table, in degrees and ship lengths as sailors read them."""
+"""Measures and criteria as rows of a table, in degrees and ship lengths."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from shipid.measures.criteria import Criterion
 from shipid.measures.record import Measures
 from shipid.units import DEGREE
 
-SHOWN = {"rad": ("deg", DEGREE), "rad/s": ("deg/s", DEGREE)}  # SI unit -> what is shown, and how much of SI it is
+SHOWN = {"rad": ("deg", DEGREE), "rad/s": ("deg/s", DEGREE)}  # SI unit -> unit in tables, and its size in SI units
 
 
 def measure_rows(measures: Measures, length: float | None) -> list[dict[str, Any]]:
-    """Rows of `measure`, `value`, `unit`, `lengths` (of the ship [m]; NaN for what is no distance), `note`."""
+    """Rows of `measure`, `value`, `unit`, `lengths`, `note`.
+
+    lengths : value in ship lengths; NaN if it is no distance or the ship length `length` [m] is None.
+    """
     rows = []
-    for name, found in measures.items():
-        unit, size = SHOWN.get(found.unit, (found.unit, 1.0))
-        lengths = found.value / length if length and found.unit == "m" else float("nan")
+    for name, measure in measures.items():
+        unit, size = SHOWN.get(measure.unit, (measure.unit, 1.0))
+        lengths = measure.value / length if length and measure.unit == "m" else float("nan")
         label = name.replace("_", " ")
         rows.append(
-            {"measure": label, "value": found.value / size, "unit": unit, "lengths": lengths, "note": found.why}
+            {"measure": label, "value": measure.value / size, "unit": unit, "lengths": lengths, "note": measure.why}
         )
     return rows
 

@@ -9,14 +9,14 @@ import numpy as np
 from shipid.measures.record import Array, Measures, Record, mean, plateaus, settled
 from shipid.units import DEGREE
 
-LEVEL_HELM = 0.5 * DEGREE  # under which two helm angles are one level
-LEVEL_RATE = 0.05  # of the greatest rate, under which two rates are one level
+LEVEL_HELM = 0.5 * DEGREE  # helm angles closer than this are one level
+LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
 NAN = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Steady points of a spiral in the order sailed: helm (K,) [rad] and yaw rate (K,) [rad/s].
+    """Steady points of a spiral in the order of time: helm (K,) [rad] and yaw rate (K,) [rad/s].
 
     skipped : levels that were not steady.
     """
@@ -32,10 +32,10 @@ def levels(record: Record) -> Levels:
     helm, rate = [], []
     stretches = plateaus(t, record.helm, LEVEL_HELM)
     for first, last in stretches:
-        found = settled(t, record.r, float(t[first]), float(t[last]), most)
-        if np.isfinite(found):
+        settled_rate = settled(t, record.r, float(t[first]), float(t[last]), most)
+        if np.isfinite(settled_rate):
             helm.append(float(np.median(record.helm[first : last + 1])))
-            rate.append(found)
+            rate.append(settled_rate)
     return Levels(np.array(helm), np.array(rate), len(stretches) - len(helm))
 
 
@@ -52,23 +52,24 @@ def spiral(record: Record) -> Measures:
 
     Returns
     -------
-    Measures : `neutral_helm`, mean of the helm at which the rate changes sign on the two ways; `loop_width`, the helm
-        by which these differ [rad]; `loop_height`, the difference of the rates at helm 0 [rad/s]. Both are 0 for a
-        stable ship, and no finer than the levels are apart. `levels` and `levels_not_steady`: counts.
+    Measures : `neutral_helm` [rad], mean of the helm angles at which the rate changes sign on the two branches;
+        `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Width and
+        height are 0 for a stable ship; their resolution is the distance of the levels. `levels` and
+        `levels_not_steady`: counts.
     """
-    found, points = Measures(), levels(record)
+    measures, points = Measures(), levels(record)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(points.helm))) != 0) + 1
     corner = int(turns[0]) if len(turns) else 0
     ways = [(points.helm[: corner + 1], points.rate[: corner + 1]), (points.helm[corner:], points.rate[corner:])]
     zero = [_at_zero(rate, helm) for helm, rate in ways] if corner else [NAN, NAN]
     flat = [_at_zero(helm, rate) for helm, rate in ways] if corner else [NAN, NAN]
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
-    found.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
-    found.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
-    found.add("loop_height", abs(flat[1] - flat[0]), "rad/s", "the helm does not pass 0 on both ways")
-    found.add("levels", len(points.helm), "-", "")
-    found.add("levels_not_steady", points.skipped, "-", "")
-    return found
+    measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
+    measures.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
+    measures.add("loop_height", abs(flat[1] - flat[0]), "rad/s", "the helm does not pass 0 on both ways")
+    measures.add("levels", len(points.helm), "-", "")
+    measures.add("levels_not_steady", points.skipped, "-", "")
+    return measures
 
 
 def _at_zero(x: Array, y: Array) -> float:
@@ -84,16 +85,16 @@ def reverse_spiral(record: Record) -> Measures:
 
     Returns
     -------
-    Measures : `neutral_helm` at rate 0; `loop_width`, the most that the helm falls while the rate rises [rad], 0 for a
-        stable ship; `levels`: their count.
+    Measures : `neutral_helm` [rad] at rate 0; `loop_width` [rad], the largest decrease of the helm with rising rate, 0
+        for a stable ship; `levels`, their count.
     """
-    found, points = Measures(), rate_levels(record)
+    measures, points = Measures(), rate_levels(record)
     order = np.argsort(points.rate)
     helm, rate = points.helm[order], points.rate[order]
     both = len(rate) >= 3 and rate[0] < 0 < rate[-1]
     why = "there are no three steady rates to both sides"
-    found.add("neutral_helm", float(np.interp(0.0, rate, helm)) if both else NAN, "rad", why)
+    measures.add("neutral_helm", float(np.interp(0.0, rate, helm)) if both else NAN, "rad", why)
     width = float((np.maximum.accumulate(helm) - helm).max()) if both else NAN
-    found.add("loop_width", width, "rad", why)
-    found.add("levels", len(rate), "-", "")
-    return found
+    measures.add("loop_width", width, "rad", why)
+    measures.add("levels", len(rate), "-", "")
+    return measures

@@ -22,14 +22,14 @@ from shipid.measures.record import (
 from shipid.units import DEGREE
 
 NAN = float("nan")
-MIDSHIPS = 0.25  # of the helm in the turn, up to which it counts as amidships
+MIDSHIPS = 0.25  # of the helm in the turn: smaller angles count as amidships
 STILL = "the helm is never moved"
 
 
 def turning(record: Record) -> Measures:
-    """Measures of a turning circle, up to where the helm is let go.
+    """Measures of a turning circle, up to the release of the helm.
 
-    Distances are of the logged point, in axes of the heading at the execute.
+    Distances are those of the logged point, in axes of the heading at the execute.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def turning(record: Record) -> Measures:
         `steady_diameter` (2 V / r) [m], `steady_speed` [m/s], `steady_rate` [rad/s], `steady_drift` (> 0: the bow
         points inwards) [rad], and `speed_loss` (share of the approach speed).
     """
-    over, found = helm_over(record), Measures()
+    over, measures = helm_over(record), Measures()
     start, helm, side = over.start, over.angle, over.side
     record = record.upto(released(record, over))
     t, moving = record.t, np.isfinite(start)
@@ -48,26 +48,29 @@ def turning(record: Record) -> Measures:
     before = float(np.interp(start, t, record.speed)) if moving else NAN
     passed = {angle: crossing(t, turned, angle * DEGREE, start) for angle in (90, 180, 270, 360)}
     why = {angle: f"the heading changes by less than {angle} deg" for angle in passed}
-    found.add("execute", start, "s", STILL)
-    found.add("helm", helm if helm else NAN, "rad", STILL)
-    found.add("approach_speed", before, "m/s", STILL)
-    found.add("advance", value_at(t, ahead, passed[90]), "m", why[90])
-    found.add("transfer", side * value_at(t, aside, passed[90]), "m", why[90])
-    found.add("tactical_diameter", side * value_at(t, aside, passed[180]), "m", why[180])
-    found.add("greatest_advance", _greatest(t, ahead, start, passed[180]), "m", why[180])
-    found.add("greatest_transfer", _greatest(t, side * aside, start, passed[270]), "m", why[270])
+    measures.add("execute", start, "s", STILL)
+    measures.add("helm", helm if helm else NAN, "rad", STILL)
+    measures.add("approach_speed", before, "m/s", STILL)
+    measures.add("advance", value_at(t, ahead, passed[90]), "m", why[90])
+    measures.add("transfer", side * value_at(t, aside, passed[90]), "m", why[90])
+    measures.add("tactical_diameter", side * value_at(t, aside, passed[180]), "m", why[180])
+    measures.add("greatest_advance", _greatest(t, ahead, start, passed[180]), "m", why[180])
+    measures.add("greatest_transfer", _greatest(t, side * aside, start, passed[270]), "m", why[270])
     for angle in (90, 180, 360):
-        found.add(f"time_to_{angle}", passed[angle] - start, "s", why[angle])
-    _steady(record, side, turned, passed[180], before, found)
-    return found
+        measures.add(f"time_to_{angle}", passed[angle] - start, "s", why[angle])
+    _steady(record, side, turned, passed[180], before, measures)
+    return measures
 
 
 def _greatest(t: Array, values: Array, start: float, end: float) -> float:
     return extreme(t, values, start, end)[1] if np.isfinite(end) else NAN
 
 
-def _steady(record: Record, side: float, turned: Array, beyond: float, before: float, found: Measures) -> None:
-    """Means over the last half turn, that must lie beyond the first half and be as fast as the quarter turns in it."""
+def _steady(record: Record, side: float, turned: Array, beyond: float, before: float, measures: Measures) -> None:
+    """Add the measures of the steady turn: means over the last 180 deg of heading, after the first 180 deg.
+
+    The turn is steady if the last two quarter turns differ by at most 5 % in time.
+    """
     t, end = record.t, float(record.t[-1])
     first, middle = (
         crossing(t, turned, turned[-1] - angle * DEGREE, float(t[0])) if np.isfinite(beyond) else NAN
@@ -81,22 +84,22 @@ def _steady(record: Record, side: float, turned: Array, beyond: float, before: f
         why = "the turn is not steady: the last two quarter turns differ by more than 5 % in time"
     drift = np.arctan2(-side * record.v, record.u)
     speed = mean(t, record.speed, first, end) if np.isfinite(rate) else NAN
-    found.add("steady_diameter", 2 * speed / rate, "m", why)
-    found.add("steady_speed", speed, "m/s", why)
-    found.add("steady_rate", rate, "rad/s", why)
-    found.add("steady_drift", mean(t, drift, first, end) if np.isfinite(rate) else NAN, "rad", why)
-    found.add("speed_loss", 1 - speed / before if before else NAN, "-", why)
+    measures.add("steady_diameter", 2 * speed / rate, "m", why)
+    measures.add("steady_speed", speed, "m/s", why)
+    measures.add("steady_rate", rate, "rad/s", why)
+    measures.add("steady_drift", mean(t, drift, first, end) if np.isfinite(rate) else NAN, "rad", why)
+    measures.add("speed_loss", 1 - speed / before if before else NAN, "-", why)
 
 
 def pull_out(record: Record) -> Measures:
-    """Measures of a pull-out: what is left of the yaw rate after the helm is put amidships; 0 for a stable ship.
+    """Measures of a pull-out: the residual yaw rate after the helm is put amidships; 0 for a stable ship.
 
     Returns
     -------
     Measures : `execute`, its instant [s]; `helm` [rad]; `turning_rate`, at the release, and `residual_rate`, settled at
         the end [rad/s], both > 0 to the side of the turn; `heading_change` from the release to the end [rad].
     """
-    over, found = helm_over(record), Measures()
+    over, measures = helm_over(record), Measures()
     row = released(record, over)
     put = row < len(record.t)
     release = departure(record.t, record.helm, row) if put else NAN
@@ -108,11 +111,11 @@ def pull_out(record: Record) -> Measures:
     t, end = record.t, float(record.t[-1])
     rate = over.side * float(np.interp(release, t, record.r)) if put else NAN
     why = "the helm is not put amidships after the turn"
-    found.add("execute", over.start, "s", STILL)
-    found.add("helm", over.angle if over.angle else NAN, "rad", STILL)
-    found.add("turning_rate", rate, "rad/s", why)
+    measures.add("execute", over.start, "s", STILL)
+    measures.add("helm", over.angle if over.angle else NAN, "rad", STILL)
+    measures.add("turning_rate", rate, "rad/s", why)
     residual = over.side * settled(t, record.r, release, end, rate) if put else NAN
     late = "the rate still changes over the last half of the log: let it run longer"
-    found.add("residual_rate", residual, "rad/s", late if put else why)
-    found.add("heading_change", over.side * integral(t, record.r, release, end), "rad", why)
-    return found
+    measures.add("residual_rate", residual, "rad/s", late if put else why)
+    measures.add("heading_change", over.side * integral(t, record.r, release, end), "rad", why)
+    return measures

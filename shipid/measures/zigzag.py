@@ -11,21 +11,21 @@ from shipid.units import DEGREE
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
 MOST = 4  # overshoots that are measured: later ones repeat them
-NEAR = 1.5 * DEGREE  # how far from the execute heading a rudder may be seen to be reversed
+NEAR = 1.5 * DEGREE  # tolerance of the execute heading at a reversal
 STILL = "the helm is never moved"
 
 
 def zigzag(record: Record, execute_heading: float | None = None, course: float | None = None) -> Measures:
     """Measures of a zigzag.
 
-    The n-th execute after the first is where the heading passes the execute heading, whatever the rudder does by then;
-    the n-th overshoot is what the heading goes beyond it before it turns back. The zigzag ends where the helm is let
-    go for longer than it was ever over.
+    Each execute after the first is the time at which the heading passes the execute heading, independent of the delay
+    of the rudder. The n-th overshoot is the largest heading beyond the execute heading before the ship turns back. The
+    zigzag ends where the helm is released for longer than it was ever over.
 
     Parameters
     ----------
-    execute_heading : off the course [rad]; default: at which the helm is seen to be reversed.
-    course : of the approach [rad]; default: the heading at the first execute.
+    execute_heading : change of heading from the course [rad]; default: estimated from the reversals of the helm.
+    course : course of the approach [rad]; default: the heading at the first execute.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
         back on course) [s]; `period` (second to fourth execute) [s]; `speed_loss` (greatest until the third execute, as
         a share of the approach speed).
     """
-    over, found = helm_over(record), Measures()
+    over, measures = helm_over(record), Measures()
     start, helm = over.start, over.angle
     record = record.upto(last_over(record, over) + 1)
     t = record.t
@@ -44,32 +44,32 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
     executes = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else float("nan")
-    found.add("execute", start, "s", STILL)
-    found.add("helm", helm if helm else float("nan"), "rad", STILL)
-    found.add("execute_heading", angle, "rad", "the helm is never reversed")
-    found.add("approach_speed", before, "m/s", STILL)
+    measures.add("execute", start, "s", STILL)
+    measures.add("helm", helm if helm else float("nan"), "rad", STILL)
+    measures.add("execute_heading", angle, "rad", "the helm is never reversed")
+    measures.add("approach_speed", before, "m/s", STILL)
     second, third, fourth = (*executes, *[float("nan")] * 3)[:3]
     missing = "the log ends before the {} execute".format
-    found.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
-    found.add("initial_turning_time", second - start, "s", missing("second"))
+    measures.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
+    measures.add("initial_turning_time", second - start, "s", missing("second"))
     for number, (moment, until) in enumerate(_legs(executes, float(t[-1])), start=1):
         sense = 1.0 if number % 2 else -1.0
         turned, peak = extreme(t, sense * off, moment, until)
         why = "the log ends before the heading turns back" if np.isfinite(moment) else missing("next")
-        found.add(f"overshoot_{number}", peak - angle, "rad", why)
-        found.add(f"time_to_check_{number}", turned - moment, "s", why)
+        measures.add(f"overshoot_{number}", peak - angle, "rad", why)
+        measures.add(f"time_to_check_{number}", turned - moment, "s", why)
     back = crossing(t, off, 0.0, second, rising=False) if np.isfinite(second) else float("nan")
-    found.add("reach", back - start, "s", "the log ends before the ship is back on her course")
-    found.add("period", fourth - second, "s", missing("fourth"))
+    measures.add("reach", back - start, "s", "the log ends before the ship is back on its course")
+    measures.add("period", fourth - second, "s", missing("fourth"))
     slowest = float("nan")
     if np.isfinite(third):
         slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
-    found.add("speed_loss", 1 - slowest / before if before else float("nan"), "-", missing("third"))
-    return found
+    measures.add("speed_loss", 1 - slowest / before if before else float("nan"), "-", missing("third"))
+    return measures
 
 
 def last_over(record: Record, over: HelmOver) -> int:
-    """Row in which the helm of a zigzag is last over to a side: then it is let go for longer than it was ever over."""
+    """Last row of a zigzag with the helm over; after it the helm is released for longer than it was ever over."""
     rows = np.flatnonzero(np.abs(record.helm) >= over.angle / 2)
     rows = rows[rows >= over.row] if over.angle else rows[-1:]
     gaps = np.flatnonzero(np.diff(rows) > 1)
@@ -80,27 +80,27 @@ def last_over(record: Record, over: HelmOver) -> int:
 
 
 def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
-    """Instants [s] of the second, third, ... execute: the heading off the course passes +angle, -angle, +angle ..."""
-    found: list[float] = []
+    """Times [s] of the second, third, ... execute: the change of heading passes +angle, -angle, +angle, ... [rad]."""
+    instants: list[float] = []
     moment, sense = start, 1.0
     while np.isfinite(moment) and np.isfinite(angle):
         moment = crossing(t, sense * off, angle, moment)
         if np.isfinite(moment):
-            found.append(moment)
+            instants.append(moment)
         sense = -sense
-    return found
+    return instants
 
 
 def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
-    """Each execute with the next one, or the end of the log; two at least, as the criteria ask for two overshoots."""
+    """Pairs of an execute and the next one, or the end of the log; at least two, as criteria need two overshoots."""
     legs = list(pairwise([*executes, end]))[:MOST]
     return legs + [(float("nan"), float("nan"))] * (2 - len(legs))
 
 
 def _seen(record: Record, off: Array, helm: float, start: float) -> float:
-    """Heading off the course [rad] at which the helm is reversed.
+    """Execute heading [rad]: change of heading from the course at which the helm is reversed.
 
-    It lies about the last row with the old helm and the first with another, or, as helms are late, a little before:
+    It is between the last row with the old helm and the next row, or slightly before because of the delay of the helm:
     the multiple of 5 deg there, else the last whole degree.
     """
     over = np.where(np.abs(record.helm) >= helm / 2, np.sign(record.helm), 0.0)
@@ -118,6 +118,6 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
 
 
 def _last_full(size: Array, helm: float) -> int:
-    """Last row in which the helm is fully over, of those up to the one before it passes half."""
+    """Last row with at least 95 % of the helm angle [rad]; the last row if there is none."""
     full = np.flatnonzero(size >= 0.95 * helm)
     return int(full[-1]) if len(full) else len(size) - 1

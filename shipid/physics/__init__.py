@@ -1,8 +1,8 @@
-"""Symbols in, symbols out: every force on a ship as a pure CasADi function.
+"""Every force on a ship as a pure CasADi function of symbols.
 
-The signature is the schema: positional arguments are signals, keyword-only arguments are parameters (with unit), a
-`**` table is open and checked by its grammar. To add a term: write the function, name it here. To add a signal: one
-row in `signals.SIGNALS`.
+The signature of a function is the schema of its block. Positional arguments are signals. Keyword-only arguments are
+parameters with their unit. A `**` table is open and checked by its grammar. To add a term: write the function and name
+it here. To add a signal: add one row to `signals.SIGNALS`.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from shipid.physics import hull, learned, propeller, radiation, restoring, rudde
 
 @dataclass(frozen=True)
 class Term:
-    """A member of the sum of forces.
+    """One term of the sum of forces.
 
     function : signals (and component arrays) in, wrench (6) [N, N m] out.
     components : for a sum over components, a function from structural keys to one array per component argument;
         `function` is then written for one component.
-    drawn : the same where components are drawn outside, for each sample of a rollout: from structural keys to the
-        width of each component argument.
-    states : for a term with states of its own, a function from its block to their names; `function` and `rates` then
-        take them as the signal `state`.
-    rates : d(state)/dt from signals; integrated with the motion. Takes what parameters of `function` it names.
-    gives : signal -> function of signals and of parameters of `function`: what a term whose block says that it is
-        `behind` this one takes as that signal.
+    drawn : for a sum over components that are inputs of a rollout (random waves), a function from structural keys to
+        the width of each component argument.
+    states : for a term with additional states, a function from its block to their names; `function` and `rates` take
+        them as the signal `state`.
+    rates : d(state)/dt from signals; integrated with the motion. Its parameters are parameters of `function`.
+    gives : signal -> function of signals and parameters of `function`. A term whose block says that it is `behind` this
+        one receives that signal.
     """
 
     function: Callable[..., Any]
@@ -40,20 +40,20 @@ class Term:
 
 @dataclass(frozen=True)
 class Memory:
-    """A term with memory on a signal: `output(state)` replaces it, `advance(signal, state, dt)` moves the state."""
+    """An actuator model: `output(state)` replaces the command, `advance(command, state, dt)` gives the next state."""
 
     output: Callable[..., Any]
     advance: Callable[..., Any]
 
 
 MOTION = ("eta", "nu", "nu_r", "psi", "state")
-"""What every term may ask for by a positional argument beside the commands and the environment of `signals.SIGNALS`."""
+"""Positional arguments that every term may have, besides the commands and environment of `signals.SIGNALS`."""
 GIVEN = ("wash",)
-"""What a term may ask for that another component gives: the one that its block says it is `behind`."""
+"""Positional arguments that another component provides: the one named by the key `behind` of the block."""
 
 
 class _Commands:
-    """Commands and their units, for what does not ask `signals.SIGNALS` yet."""
+    """Commands and their units, for code that does not read `signals.SIGNALS` directly."""
 
     @property
     def commands(self) -> dict[str, str]:

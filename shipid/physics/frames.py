@@ -7,7 +7,7 @@ from casadi import SX
 
 
 def vector(*entries: float | SX) -> SX:
-    """Column vector of the given scalars; zeros stay structural so that they cost nothing downstream."""
+    """Column vector of the given scalars; zeros stay structural, so that later operations skip them."""
     return ca.vertcat(*(SX(1, 1) if isinstance(entry, int | float) and entry == 0 else entry for entry in entries))
 
 
@@ -49,7 +49,7 @@ def kinematics(eta: SX, nu: SX) -> SX:
 
 
 def heave_rate(eta: SX, nu: SX) -> SX:
-    """Downward velocity [m/s] of the origin in the inertial frame: zero in any steady motion, whatever the trim."""
+    """Downward velocity [m/s] of the origin in the inertial frame: zero in any steady motion, for any trim."""
     return rotation(eta[3], eta[4], eta[5])[2, :] @ nu[:3]
 
 

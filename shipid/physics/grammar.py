@@ -1,4 +1,4 @@
-"""Names that are formulas: a coefficient's name gives its monomial, its unit and its prime scaling.
+"""Grammar of coefficient names: a name gives the monomial, the unit and the prime scaling of the coefficient.
 
 `Y_vvr` is v^2 r, `X_u|u|` is u|u|, `Y_|r|v` is |r| v, `N_vdot` multiplies the sway acceleration. The same grammar
 reads the polynomials of a thruster in J and J_y.
@@ -22,7 +22,7 @@ POSITIVE = object()  # marks a parameter that must be greater than zero
 
 @dataclass(frozen=True)
 class Monomial:
-    """One coefficient's formula: a force or moment axis and its factors, each a symbol, bare or absolute."""
+    """Formula of a coefficient: axis of the force or moment, and factors (symbol, whether the absolute value)."""
 
     axis: str
     factors: tuple[tuple[str, bool], ...]
@@ -34,7 +34,7 @@ class Monomial:
 
     @cached_property
     def canonical(self) -> tuple[str, tuple[tuple[str, bool], ...]]:
-        """The same for names that mean the same: order of factors does not matter and |x||x| = xx."""
+        """Normal form: equal for names of one monomial, because the order of factors is free and |x||x| = x x."""
         moduli = [symbol for symbol, absolute in self.factors if absolute]
         pairs = {symbol: moduli.count(symbol) // 2 * 2 for symbol in moduli}
         plain = [(symbol, False) for symbol, absolute in self.factors if not absolute]
@@ -43,7 +43,7 @@ class Monomial:
         return self.axis, tuple(sorted(plain))
 
     def value(self, symbols: Mapping[str, SX]) -> SX:
-        """Product of the factors."""
+        """Product of the factors; `symbols` maps each symbol to its value."""
         product = SX(1)
         for symbol, absolute in self.factors:
             product *= ca.fabs(symbols[symbol]) if absolute else symbols[symbol]
@@ -52,7 +52,7 @@ class Monomial:
 
 @cache
 def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
-    """Read a name whose factors are words of the alphabet; ValueError says what it should look like."""
+    """Parse a coefficient name whose factors are words of the alphabet; ValueError shows the expected form."""
     word = f"(?:{'|'.join(alphabet)})"
     factor, before = rf"{word}|\|{word}\|", rf"([{axes}])_" if axes else "()"
     parts = re.fullmatch(rf"{before}((?:{factor})+)", name)
@@ -62,19 +62,19 @@ def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Mo
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    found = re.findall(factor, parts[2])
-    return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in found))
+    tokens = re.findall(factor, parts[2])
+    return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in tokens))
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """An open table of coefficients: which names it takes and the unit that follows from each name."""
+    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name."""
 
     check_name: Callable[[str], Monomial]
     unit: Callable[[str], str]
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise ValueError at the first unknown name, or the second name of one monomial."""
+        """Raise ValueError for the first invalid name, or for a second name of one monomial."""
         seen: dict[object, str] = {}
         for name in names:
             formula = self.check_name(name).canonical
@@ -84,21 +84,21 @@ class Grammar:
 
 
 def derivative(name: str) -> Monomial:
-    """A hull derivative's formula from its name (SNAME 1950); acceleration derivatives are refused."""
+    """Monomial of a hull derivative from its name (SNAME 1950); ValueError for acceleration derivatives."""
     if name.endswith("dot"):
         raise ValueError(f"{name!r} is an acceleration derivative: it belongs in [added_mass]")
     return monomial(name, MOTIONS)
 
 
 def acceleration_derivative(name: str) -> Monomial:
-    """An added-mass derivative's formula from its name, such as `Y_rdot`."""
+    """Monomial of an added-mass derivative from its name, such as `Y_rdot`."""
     if not re.fullmatch(rf"[{AXES}]_[{MOTIONS}]dot", name):
         raise ValueError(f"{name!r} is not an added-mass derivative: write it like 'X_udot' or 'N_vdot'")
     return Monomial(name[0], ((name[2], False),))
 
 
 def kg_unit(metre: int, second: int) -> str:
-    """`kg m^a s^b` in words."""
+    """The unit `kg m^metre s^second` as text, without factors of power 0."""
     powers = [f"{symbol}^{power}" if power != 1 else symbol for symbol, power in (("m", metre), ("s", second)) if power]
     return " ".join(["kg", *powers])
 
@@ -128,20 +128,20 @@ def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
 
 
 def deviation(name: str) -> Monomial:
-    """A derivative about straight running at the service speed: factors u (its change), v, r and delta."""
+    """Monomial of an Abkowitz derivative about the service speed: factors u (change of speed), v, r and delta."""
     return monomial(name, DEVIATIONS)
 
 
-def of_the_hull(name: str) -> Monomial:
-    """The same without the rudder angle."""
+def hull_deviation(name: str) -> Monomial:
+    """Monomial of an Abkowitz derivative of the hull: no factor delta; ValueError for a rudder derivative."""
     formula = deviation(name)
     if any(symbol == "delta" for symbol, _ in formula.factors):
         raise ValueError(f"{name!r} is a rudder derivative: it belongs in a rudder of kind 'rudder_derivatives'")
     return formula
 
 
-def of_the_rudder(name: str) -> Monomial:
-    """The same with it."""
+def rudder_deviation(name: str) -> Monomial:
+    """Monomial of an Abkowitz derivative of the rudder: at least one factor delta; ValueError without it."""
     formula = deviation(name)
     if all(symbol != "delta" for symbol, _ in formula.factors):
         raise ValueError(f"{name!r} has no factor delta: it belongs in [hull.abkowitz]")
@@ -149,13 +149,13 @@ def of_the_rudder(name: str) -> Monomial:
 
 
 def thrust_monomial(name: str) -> Monomial:
-    """A thruster coefficient's formula: factors J, y (for J_y) and t (for tanh(|J_y| / width)); `1` is the constant."""
+    """Monomial of a thruster coefficient: factors J, y (J_y) and t (tanh(|J_y| / width)); `1` is the constant term."""
     return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
 
 
 DERIVATIVES = Grammar(derivative, derivative_unit)
 PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime")
-HULL_DEVIATIONS = Grammar(of_the_hull, lambda _: "prime")
-RUDDER_DEVIATIONS = Grammar(of_the_rudder, lambda _: "prime")
+HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime")
+RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime")
 ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
 THRUST = Grammar(thrust_monomial, lambda _: "-")

@@ -66,7 +66,8 @@ def mmg(
     """Wrench (6) of the MMG hull polynomial (Yasukawa and Yoshimura 2015, eqs. 9-11).
 
     X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
-    resistance turns round with the ship's motion: fully where the drift angle is below 45 deg. U as above.
+    resistance opposes the motion along the ship: with its full value for drift angles below 45 deg. U [m/s] is the
+    instantaneous speed through the water with a floor of 0.01 m/s.
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)

@@ -1,4 +1,4 @@
-"""A force that data teaches: a small bounded network of the velocity through the water, a term like any other."""
+"""A force term learned from data: a small bounded neural network of the velocity through the water."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def learned(
     *,
     u_scale: Annotated[SX, "m s^-1", POSITIVE],
     v_scale: Annotated[SX, "m s^-1", POSITIVE],
-    r_scale: Annotated[SX, "rad s^-1", POSITIVE],
+    r_scale: Annotated[SX, "s^-1", POSITIVE],
     X_max: Annotated[SX, "N", POSITIVE],
     Y_max: Annotated[SX, "N", POSITIVE],
     N_max: Annotated[SX, "N m", POSITIVE],
@@ -33,7 +33,7 @@ def learned(
     Unit j is h_j(u, v, r) = tanh(w_u u / u_scale + w_v v / v_scale + w_r r / r_scale + w_0). Its even part e_j is half
     the sum of h_j at (u, v, r) and at (u, -v, -r), its odd part o_j half the difference:
     X = X_max tanh(sum_j c_X (e_j - tanh(w_0))), Y = Y_max tanh(sum_j c_Y o_j), N = N_max tanh(sum_j c_N o_j).
-    So a ship is the same on both sides, a ship at rest feels nothing, and without output weights c there is no force.
+    So the force has port-starboard symmetry, is zero at rest, and is zero if all output weights c are 0.
     Every list has one number for each unit; nu_r (6) [m/s, rad/s] is the velocity through the water.
 
     A network inside the equations of motion is a universal differential equation (Rackauckas et al. 2020,

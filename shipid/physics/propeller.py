@@ -1,4 +1,4 @@
-"""Propellers behind a hull: of fixed pitch (MMG), of controllable pitch, or as a shaft speed for a ship's speed."""
+"""Propellers behind a hull: fixed pitch (MMG), controllable pitch, or thrust minus resistance about a service speed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shipid.physics.thruster import SHAFT_FLOOR, polynomial
 def drift(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
 
-    Going ahead it is the MMG's; astern it is counted from the stern, so that it stays small.
+    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small.
     """
     square = nu_r[0] ** 2 + nu_r[1] ** 2
     along = ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, ca.fabs(nu_r[0]))
@@ -37,7 +37,7 @@ def inflow(nu_r: SX, x: SX, y: SX, w_P0: SX, C_1: SX, C_2_plus: SX, C_2_minus: S
 
 
 def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX, J_max: SX) -> SX:
-    """K_T(J), J = u_P / (|n| D_p) turned when astern and kept within J_min..J_max."""
+    """K_T(J) with J = u_P / (|n| D_p), its sign reversed for n < 0, limited to J_min..J_max."""
     sense = ca.if_else(n >= 0, 1, -1)
     J = sense * u_P / (ca.fmax(ca.fabs(n), SHAFT_FLOOR) * D_p)
     return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), SX(1, 1), SX(1))
@@ -65,7 +65,7 @@ def propeller(
     """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
 
     n [rev/s]; wake w_P0 on a straight course, C_1, C_2 its change with drift (C_2_plus where beta_P > 0). Astern the
-    polynomial is read from the other side, times k_astern. Yasukawa and Yoshimura (2015).
+    polynomial is used with the sign of J reversed, times k_astern. Yasukawa and Yoshimura (2015).
     """
     u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus)
     sense = ca.if_else(n >= 0, 1, -k_astern)
@@ -88,7 +88,7 @@ def wash(
     C_2_plus: Annotated[SX, "-"],
     C_2_minus: Annotated[SX, "-"],
 ) -> SX:
-    """What a rudder behind it stands in, (3): inflow u_P [m/s], speed far down the race [m/s], D_p [m].
+    """Propeller slipstream at a rudder behind it, (3): inflow u_P [m/s], slipstream speed far behind [m/s], D_p [m].
 
     Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)); no race astern.
     """
@@ -129,10 +129,10 @@ def controllable_pitch(
     """Wrench (6) of a controllable-pitch propeller: X = (1 - t_P) rho D_p^4 (k_P p n|n| - k_J |n| u_P / D_p).
 
     n [rev/s]; pitch p [-], the ratio P/D at 0.7 of the radius, negative to drive astern. That is K_T = k_P p - k_J J:
-    no thrust at p = 0 in still water, thrust vanishes at the advance J = k_P p / k_J, a turning disc of zero pitch
-    drags. Inflow u_P as behind a hull (see `inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
-    Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a line through the K_T curves of the
-    Wageningen B-series over pitch, not a fit of them. Linear in p, so the greatest pitches give less than it says.
+    no thrust at p = 0 in still water, zero thrust at J = k_P p / k_J, and drag of a rotating propeller of zero pitch.
+    The inflow u_P is that behind a hull (see `inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
+    Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T curves of
+    the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
     """
     u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus))
     thrust = rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
@@ -155,7 +155,7 @@ def controllable_wash(
     C_2_plus: Annotated[SX | float, "-"] = 1.0,
     C_2_minus: Annotated[SX | float, "-"] = 1.0,
 ) -> SX:
-    """Flow at a rudder behind a controllable-pitch propeller, (3): inflow, speed far down the race [m/s], D_p [m].
+    """Slipstream of a controllable-pitch propeller, (3): inflow [m/s], slipstream speed far behind [m/s], D_p [m].
 
     u_race^2 = u_P^2 + 8 T / (pi rho D_p^2) by momentum theory; no race where the propeller drives astern.
     """
@@ -177,10 +177,10 @@ def service_speed(
     U_0: Annotated[SX, "m s^-1", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
-    """Wrench (6) of thrust less resistance about the speed U_0 n / n_0 that belongs to a shaft speed n [rev/s].
+    """Wrench (6) of thrust minus resistance about the steady speed U_0 n / n_0 for a shaft speed n [rev/s].
 
-    X = 1/2 rho L^2 U_0^2 (X_u d + X_uu d^2 + X_uuu d^3), d = u / U_0 - n / n_0 (Abkowitz 1964): an expansion about
-    steady running, from which nothing far off follows.
+    X = 1/2 rho L^2 U_0^2 (X_u d + X_uu d^2 + X_uuu d^3), d = u / U_0 - n / n_0 (Abkowitz 1964). This expansion about
+    steady motion is valid only near that speed.
     """
     d = nu_r[0] / U_0 - n / n_0
     return vector(rho / 2 * L_pp**2 * U_0**2 * d * (X_u + d * (X_uu + d * X_uuu)), 0, 0, 0, 0, 0)

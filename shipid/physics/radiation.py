@@ -1,9 +1,9 @@
 """Wave radiation with memory (Cummins 1962): retardation kernels as sums of damped cosines and sines.
 
-K(t) = sum over k of exp(-sigma_k t) (a_k cos omega_k t + b_k sin omega_k t); each velocity drives one pair of states a
-mode, c' = -sigma c - omega s + velocity, s' = omega c - sigma s, and the force is -(a c + b s). Added mass at infinite
-frequency belongs in [added_mass]. The horizontal plane has no memory here: a manoeuvring model carries its own added
-mass and damping at zero frequency, and would count them twice.
+K(t) = sum over k of exp(-sigma_k t) (a_k cos omega_k t + b_k sin omega_k t). Each velocity drives a pair of states
+(c, s) for each mode k: c' = -sigma c - omega s + velocity, s' = omega c - sigma s; the force is -(a c + b s). Added
+mass at infinite frequency belongs in [added_mass]. Surge, sway and yaw have no radiation memory here, because a
+manoeuvring model includes their added mass and damping at zero frequency: they would be counted twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from shipid.physics.grammar import POSITIVE
 
 
 def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]) -> list[SX]:
-    """d(state)/dt of the pairs (c, s) of all modes, driven by one velocity."""
+    """d(state)/dt of the states (c, s) of all modes, driven by one velocity; sigma [1/s], omega [rad/s] by mode."""
     rates = []
     for k, (decay, frequency) in enumerate(zip(sigma, omega, strict=True)):
         c, s = state[2 * k], state[2 * k + 1]
@@ -28,7 +28,7 @@ def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]
 
 
 def kernel_force(state: SX, a: Sequence[SX], b: Sequence[SX]) -> SX:
-    """Convolution of a kernel with the velocity that drives the pairs (c, s) of `state`."""
+    """Convolution of the kernel a cos + b sin with the velocity that drives the states (c, s) of each mode."""
     pairs = zip(a, b, strict=True)
     return sum((a_k * state[2 * k] + b_k * state[2 * k + 1] for k, (a_k, b_k) in enumerate(pairs)), SX(1, 1))
 
@@ -38,7 +38,7 @@ def _names(block: Mapping[str, Any], drivers: Sequence[str]) -> tuple[str, ...]:
 
 
 def heave_pitch_states(block: Mapping[str, Any]) -> tuple[str, ...]:
-    """A pair of states a mode, for heave and for pitch."""
+    """Names of the states: two (c, s) for each mode, first driven by the heave rate, then by the pitch rate."""
     return _names(block, ("w", "q"))
 
 
@@ -54,7 +54,7 @@ def heave_pitch(
 ) -> SX:
     """Wrench (6) of heave and pitch radiation; states (4 x modes) [m, rad] are driven by heave rate and pitch rate.
 
-    K_ij : force i by velocity j, and the other way round, the a (`cos`) and b (`sin`) of each mode.
+    K_ij : kernel of force i by velocity j (K_35 = K_53): a (`cos`) and b (`sin`) of each mode.
     """
     middle = state.numel() // 2
     heave, pitch = state[:middle], state[middle:]
@@ -71,14 +71,14 @@ def heave_pitch_rates(
     sigma: Annotated[list[SX], "s^-1", POSITIVE],
     omega: Annotated[list[SX], "s^-1"],
 ) -> SX:
-    """Rates of the pairs driven by heave and by pitch. Heave is inertial: w - u theta, not w."""
+    """d(state)/dt of the heave and pitch radiation states; the heave rate is inertial: w - u theta, not w."""
     middle = state.numel() // 2
     heave = mode_rates(heave_rate(eta, nu), state[:middle], sigma, omega)
     return ca.vertcat(*heave, *mode_rates(nu[4], state[middle:], sigma, omega))
 
 
 def roll_states(block: Mapping[str, Any]) -> tuple[str, ...]:
-    """A pair of states a mode."""
+    """Names of the states: two (c, s) for each mode, driven by the roll rate."""
     return _names(block, ("p",))
 
 
@@ -99,5 +99,5 @@ def roll_rates(
     sigma: Annotated[list[SX], "s^-1", POSITIVE],
     omega: Annotated[list[SX], "s^-1"],
 ) -> SX:
-    """Rates of the pairs driven by roll."""
+    """d(state)/dt of the roll radiation states."""
     return ca.vertcat(*mode_rates(nu[3], state, sigma, omega))

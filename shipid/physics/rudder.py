@@ -34,11 +34,13 @@ def rudder(
     x_H: Annotated[SX, "m"],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
-    """Wrench (6) of a rudder in the wash (u_P, u_race, D_p) of a propeller (Yasukawa and Yoshimura 2015, eqs. 18-27).
+    """Wrench (6) of a rudder in the slipstream `wash` of a propeller (Yasukawa and Yoshimura 2015, eqs. 18-27).
+
+    wash : (u_P, u_race, D_p), inflow and slipstream speed [m/s] and propeller diameter [m]. delta [rad].
 
     F_N = 1/2 rho A_R f_alpha U_R^2 sin(alpha_R); X = -(1 - t_R) F_N sin(delta), Y = -(1 + a_H) F_N cos(delta),
     N = -(x + a_H x_H) F_N cos(delta). Along: u_R = epsilon sqrt(eta (u_P + kappa (u_race - u_P))^2 + (1 - eta) u_P^2),
-    eta = D_p / H_R at most 1. Across: v_R = gamma_R (U beta - ell_R r), gamma_R_plus where that is > 0.
+    eta = D_p / H_R at most 1. Across: v_R = gamma_R (U beta - ell_R r), gamma_R_plus if U beta - ell_R r > 0.
     """
     u_P, u_race, D_p = wash[0], wash[1], wash[2]
     U, beta = drift(nu_r)
@@ -65,6 +67,6 @@ def rudder_derivatives(
 ) -> SX:
     """Wrench (6) of rudder derivatives (Y_delta, X_deltadelta, Y_vvdelta) about the service speed (Abkowitz 1964).
 
-    In the prime system of that speed, as in `hull.abkowitz`; delta [rad] enters as it is.
+    Prime system of the service speed U_0, as in `hull.abkowitz`; delta [rad] is not scaled.
     """
     return about_service_speed(nu_r, delta, values, L_pp, U_0, rho)

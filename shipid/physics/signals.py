@@ -1,6 +1,6 @@
-"""The one table of signals: what a ship does, is ordered and meets; unit, sign in the mirror, names in logs, ranges.
+"""The table of signals (motion, commands, environment): unit, mirror sign, names in logs, ranges.
 
-To add a signal, write one row in `SIGNALS`, and a term that takes it. Everything else asks this table at run time: the
+To add a signal, write one row in `SIGNALS`, and a term that uses it. All other code reads this table at run time: the
 schema of vessels, datasets, the importer and its guesses, checks, truths, corrections, figures.
 """
 
@@ -22,21 +22,21 @@ class Signal:
 
     role : `motion` of the ship; `command`, named `<component>.<signal>` in data; `environment`; `derived` from others.
     unit : SI unit, `-` for a pure number.
-    word : what a figure calls it.
-    shown : unit in which sailors read it; None is `unit`.
+    word : label in figures.
+    shown : unit in tables and figures; None: `unit`.
     factor : SI units in one `shown` unit.
     angle : whether it is an angle, interpolated across its wrap.
-    shaft : whether it is a speed of revolutions.
-    turns : of an angle that steers: sign of the yaw rate that a positive one gives, aft of the origin; 0: steers not.
-    mirror : its sign in the port-starboard mirror.
-    column : whether datasets need it, may have it, or have it under no name. A command may always stand.
-    names : regular expression of how logs call it, in lower case and without the unit; empty where logs have it not.
-    plausible : largest magnitude [SI] that a check lets pass; None is not checked.
-    read_as_SI : largest magnitude that a log column without a unit is taken to have in SI; beyond, it is in `shown`.
-    reach : least and greatest value [SI] over which the laws of the physics are tested.
-    usual : least and greatest value [SI] of a command in ordinary use: what a simulated truth draws from.
-    neutral : value [SI] of a command where nobody says anything: helm amidships, shaft stopped, pitch of service.
-    component : name of the component that a log's column without a side belongs to.
+    shaft : whether it is a shaft speed.
+    turns : sign of the yaw rate by a positive angle aft of the origin; 0: the signal does not steer.
+    mirror : sign under port-starboard reflection.
+    column : whether a dataset must, may, or cannot have this column. Commands are always allowed.
+    names : regular expression of its names in logs, in lower case and without the unit; empty: not in logs.
+    plausible : largest plausible magnitude [SI] for checks; None: not checked.
+    read_as_SI : a log column without a unit is read as SI up to this magnitude, and in `shown` above it.
+    reach : smallest and largest value [SI] in the tests of physical laws.
+    usual : smallest and largest value [SI] of a command in normal operation: the default range of a simulated truth.
+    neutral : default value [SI] of a command: helm amidships, shaft stopped, service pitch.
+    component : component name for a log column that does not name its side.
     """
 
     role: Role
@@ -60,7 +60,7 @@ class Signal:
 
     @property
     def read_in(self) -> str:
-        """Unit in which sailors read it."""
+        """Unit in tables and figures."""
         return self.shown or self.unit
 
 
@@ -245,7 +245,7 @@ SIGNALS: dict[str, Signal] = {
         component="propeller",
     ),
 }
-"""Name -> row. Order counts: columns of datasets and messages list signals in the order of the table."""
+"""Name -> row. Columns of datasets and messages list signals in the order of this table."""
 
 
 def signal_of(name: str) -> str:
@@ -254,7 +254,7 @@ def signal_of(name: str) -> str:
 
 
 def row_of(name: str) -> Signal | None:
-    """Row of a command (`port.n`) or of another signal (`u`); None where the table has none."""
+    """Row of a command (`port.n`) or of another signal (`u`); None for an unknown name."""
     return SIGNALS.get(signal_of(name))
 
 
@@ -264,14 +264,14 @@ def named(role: Role) -> dict[str, Signal]:
 
 
 def is_command(name: str) -> bool:
-    """Whether a name is one of a command, `<component>.<signal>`."""
+    """Whether a name is that of a command, `<component>.<signal>`."""
     component, dot, signal = name.partition(".")
     row = SIGNALS.get(signal)
     return bool(dot) and row is not None and row.role == "command" and component.isidentifier() and component.isascii()
 
 
 def is_shaft(command: str) -> bool:
-    """Whether a command is a speed of revolutions, such as `port.n`."""
+    """Whether a command is a shaft speed, such as `port.n`."""
     row = row_of(command)
     return row is not None and row.shaft
 
@@ -283,13 +283,13 @@ def steers(command: str) -> bool:
 
 
 def orders_thrust(name: str) -> bool:
-    """Whether a name ends in a command that does not steer: a shaft speed, a pitch; whatever it says of when."""
+    """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
     row = row_of(name)
     return row is not None and row.role == "command" and row.turns == 0
 
 
 def neutral(command: str) -> float:
-    """Value [SI] of a command where nobody says anything: helm amidships, shaft stopped, pitch of service."""
+    """Default value [SI] of a command: helm amidships, shaft stopped, service pitch."""
     row = row_of(command)
     return 0.0 if row is None else row.neutral
 
@@ -301,11 +301,11 @@ def mirror_sign(name: str) -> float:
 
 
 def read_unit(name: str) -> tuple[str, float]:
-    """Unit in which sailors read a signal, and the factor from SI to it."""
+    """Unit of a signal in tables and figures, and the factor from SI to it."""
     row = SIGNALS[signal_of(name)]
     return row.read_in, 1.0 / row.factor
 
 
 def units(names: Iterable[str]) -> dict[str, str]:
-    """SI unit of each of some commands or signals."""
+    """Name -> SI unit of the given commands or signals."""
     return {name: SIGNALS[signal_of(name)].unit for name in names}

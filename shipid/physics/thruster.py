@@ -46,10 +46,10 @@ def azimuth(
 ) -> SX:
     """Wrench (6) of an azimuth thruster: F = R(alpha) k_T rho n^2 D_p^4 [K_x(J, J_y), K_y(J, J_y)].
 
-    n [rev/s], alpha [rad, > 0 turns the thrust to starboard]; J, J_y from the water velocity at the unit in its own
-    axes, J = u'/(|n| D_p), turned when astern. The polynomials are used inside J_min..J_max and |J_y| < Jy_max and
-    continued beyond (k_over, k_over2 over-running; k_under; k_side, k_sideJ side drag); astern thrust is k_astern
-    of ahead. Finite at n = 0, where the over-running drag remains.
+    n [rev/s], alpha [rad, > 0 turns the thrust to starboard]; J, J_y from the water velocity in the axes of the unit,
+    J = u'/(|n| D_p), its sign reversed for n < 0. The polynomials are used inside J_min..J_max and |J_y| < Jy_max and
+    continued beyond (k_over, k_over2 over-running; k_under; k_side, k_sideJ side drag). Astern thrust is k_astern times
+    ahead thrust. Finite at n = 0, where the over-running drag remains.
     """
     along, across = nu_r[0] - nu_r[5] * y, nu_r[1] + nu_r[5] * x
     c, s = ca.cos(alpha), ca.sin(alpha)
@@ -84,7 +84,7 @@ def tunnel(
 
 
 def first_order_output(state: SX) -> SX:
-    """The actual value that a lagged command has reached."""
+    """The actual value of a command behind a first-order lag: the actuator state."""
     return state
 
 

@@ -23,23 +23,23 @@ TABLES = {"waves.first_order": ("omega", "beta_deg", *FORCES), "waves.drift": ("
 
 
 def passage(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
-    """Waves go on with time and are carried by the water: the time, and how far a current has taken the water."""
+    """Names of the wave states: time [s], and the displacement of the water by the current, north and east [m]."""
     return ("t", "north", "east")
 
 
 def passage_rates(eta: SX, nu: SX, nu_r: SX) -> SX:
-    """Time runs, and the water moves with the current: 1, then its velocity [m/s] north and east."""
+    """d(state)/dt of the wave states: 1, then the current velocity north and east [m/s]."""
     return ca.vertcat(SX(1), (rotation(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
 
 
 def first_order_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
-    """Component arguments of `first_order`: six series of complex coefficients."""
+    """Widths of the component arguments of `first_order`; `real`, `imag`: six series of complex coefficients."""
     series = 6 * (harmonics + 1)
     return {"omega": 1, "k": 1, "c_chi": 1, "s_chi": 1, "epsilon": 1, "real": series, "imag": series}
 
 
 def drift_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
-    """Component arguments of `drift`: three series of real coefficients."""
+    """Widths of the component arguments of `drift`; `drift`: three series of real coefficients."""
     return {"c_chi": 1, "s_chi": 1, "drift": 3 * (harmonics + 1)}
 
 
@@ -61,10 +61,10 @@ def relative_heading(psi: SX, c_chi: SX, s_chi: SX) -> tuple[SX, SX]:
 def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsilon: SX, real: SX, imag: SX) -> SX:
     """Wrench (6) of one component: Re F(omega, beta) a exp(i(omega t - k(N cos chi + E sin chi) + epsilon)).
 
-    The phase is that at the ship's own position in the water, which a current carries along; so her speed through the
-    water enters as the frequency of encounter. The transfer function is that of the wave's own frequency. omega
-    [rad/s]; k [rad/m]; c_chi, s_chi: cosine and sine of the direction of travel; epsilon [rad] at the origin at t = 0;
-    real, imag (6 series, one after the other): Fourier coefficients of a F [N, N m].
+    The phase is that at the ship's position relative to the water, which moves with the current. So the ship's speed
+    through the water gives the frequency of encounter. The transfer function is evaluated at the wave frequency omega
+    [rad/s]. k [rad/m]; c_chi, s_chi: cosine and sine of the direction of travel; epsilon [rad]: phase at the origin at
+    t = 0; real, imag (6 series, one after the other): Fourier coefficients of a F [N, N m].
     """
     phase = omega * state[0] - k * (c_chi * (eta[0] - state[1]) + s_chi * (eta[1] - state[2])) + epsilon
     c, s = ca.cos(phase), ca.sin(phase)
@@ -73,8 +73,8 @@ def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsi
     wrench = []
     for axis in range(6):
         basis = cosines if axis in EVEN else sines
-        own = slice(axis * count, (axis + 1) * count)
-        wrench.append(c * _series(real[own], basis) - s * _series(imag[own], basis))
+        entries = slice(axis * count, (axis + 1) * count)
+        wrench.append(c * _series(real[entries], basis) - s * _series(imag[entries], basis))
     return ca.vertcat(*wrench)
 
 

@@ -28,7 +28,7 @@ def relative_wind(nu: SX, psi: SX, V_w: SX, beta_w: SX) -> tuple[SX, SX]:
 
 
 def interpolate(x: SX, grid: SX, values: SX) -> SX:
-    """Piecewise linear interpolation as a sum of ramps, constant beyond the ends; stays SX, so it lowers."""
+    """Piecewise linear interpolation as a sum of ramps, constant beyond the ends; in SX, for all engines."""
     x = ca.fmin(ca.fmax(x, grid[0]), grid[-1])
     slopes = ca.diff(values) / ca.diff(grid)
     result = values[0] + slopes[0] * (x - grid[0])

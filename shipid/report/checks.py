@@ -72,7 +72,7 @@ def _answer(checks: pd.DataFrame) -> list[Sentence]:
 
 
 def _table(checks: pd.DataFrame) -> Table:
-    """Every check, what failed first."""
+    """Return the table of all checks, failed ones first."""
     ordered = checks.assign(ok=checks["ok"].astype(bool)).sort_values("ok", kind="stable")
     rows = [
         [
@@ -102,7 +102,7 @@ def motion(series: pd.DataFrame) -> Figure | None:
         takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {worst.max():.1f} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
-        alternative="Lines over time; the table above holds what the checks make of them.",
+        alternative="Lines over time; the table above has the results of the checks.",
         height=240,
         views=views,
         controls=[Control("run", runs)],

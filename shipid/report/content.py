@@ -14,7 +14,7 @@ Indices = np.ndarray[tuple[int, ...], np.dtype[np.signedinteger]]
 PathKey = tuple[str, str, int]
 
 DATA_DRIVEN = "none"  # the family of the model without physics
-# Columns of a trial; whatever else its frame holds is a searched hyperparameter.
+# Columns of a trial; every other column of its frame is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
 
@@ -36,7 +36,7 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim of the paper, what the results say about it, and the numbers they say it with."""
+    """A claim of the paper, the verdict of the results, and the numbers behind it."""
 
     id: str
     claim: str
@@ -75,8 +75,8 @@ def _empty(*columns: str) -> pd.DataFrame:
 class ReportContent:
     """Everything one report shows; a frame without rows leaves its figure out.
 
-    `source` is "physics", "cooperative" or "naive". Rows of physics and naive hold whatever the number of
-    manoeuvres and have N_D = 0; the pure data-driven model is the one of family "none", its source "cooperative".
+    `source` is "physics", "cooperative" or "naive". Rows of physics and naive do not depend on the number
+    of manoeuvres and have N_D = 0; the pure data-driven model is the one of family "none", its source "cooperative".
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class ReportContent:
         compensator), and one float column per searched hyperparameter; yes or no is 1 or 0.
     horizon : model, N_D, seed, source, ahead [s], mean, p90 [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
-    commands : run, t [s], one column per command in sailors' units, the unit in brackets: "port shaft [rpm]".
+    commands : run, t [s], one column per command in the units used on board, in brackets: "port shaft [rpm]".
     snapshots : windows of the test runs.
     tracks : run, set ("train", "validation", "test", ...), north, east [m].
     envelope : set, quantity, unit, min, mean, max; the set "published" holds the numbers of the paper.

@@ -29,7 +29,8 @@ def nice_levels(values: Floats, most: int) -> list[float]:
 def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
     """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
 
-    What is not finite stays so and counts for nothing. A grid smaller than six rows or columns stays as it is along it.
+    Values that are not finite stay so and have no weight. A grid with fewer than six rows or
+    columns is not smoothed along them.
     """
     finite = np.isfinite(values) & (values > 0)
     total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
@@ -71,11 +72,11 @@ def contour(x: Floats, y: Floats, values: Floats, level: float) -> list[Floats]:
 
 
 def _triangles(rows: int, columns: int) -> list[tuple[Node, Node, Node]]:
-    found = []
+    triangles = []
     for i, j in product(range(rows - 1), range(columns - 1)):
         a, b, c, d = (i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)
-        found += [(a, b, d), (a, d, c)]
-    return found
+        triangles += [(a, b, d), (a, d, c)]
+    return triangles
 
 
 def _crossing(edge: Edge, x: Floats, y: Floats, values: Floats, level: float) -> tuple[float, float]:

@@ -31,7 +31,7 @@ FACES = [(4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3
 
 
 class Spot(NamedTuple):
-    """A model and an N_D: H and its range over seeds [m], whether it beats pure data-driven, and what hover says."""
+    """A model and an N_D: H and its range over seeds [m], whether it beats pure data-driven, and its hover text."""
 
     model: str
     row: int
@@ -74,7 +74,7 @@ def error_map(content: ReportContent) -> Figure | None:
 
 
 def _rows(content: ReportContent) -> pd.DataFrame:
-    """Models of the cells by A, what has no A on top: model, family, A [m], y (square root of A, strips above)."""
+    """Return the models of the cells by A: model, family, A [m], y (square root of A; models without A above)."""
     frame = families(content)
     frame = frame[frame.model.isin(content.cells.model)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
@@ -84,14 +84,14 @@ def _rows(content: ReportContent) -> pd.DataFrame:
 
 
 def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> list[Spot]:
-    found = {(str(model), int(size)): float(H) for model, size, H in zip(means.model, means.N_D, means.H, strict=True)}
+    errors = {(str(model), int(size)): float(H) for model, size, H in zip(means.model, means.N_D, means.H, strict=True)}
     pure = set(rows.model[rows.family == DATA_DRIVEN])
-    learned = {size: H for (model, size), H in found.items() if model in pure}
+    learned = {size: H for (model, size), H in errors.items() if model in pure}
     place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
     spots = []
     for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=True):
         key = str(model), int(str(size))
-        H, floor = found.get(key, math.nan), learned.get(key[1], math.inf)
+        H, floor = errors.get(key, math.nan), learned.get(key[1], math.inf)
         worse = key[0] not in pure and floor <= H
         words = _words(cells, *key, float(accuracy[key[0]]), H, floor if worse else None)
         spots.append(Spot(key[0], place[key[0]], key[1], H, worse, words))
@@ -99,7 +99,7 @@ def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> l
 
 
 def _words(cells: pd.DataFrame, model: str, size: int, A: float, H: float, learned: float | None) -> str:
-    """Lines of the hover box of one model and N_D."""
+    """Return the lines of the hover box of one model and N_D."""
     good = cells[cells.status.eq("ok") & cells.H.notna()]
     lines = [f"<b>{label(model)}</b>, " + (f"A {metres(A)}, " if math.isfinite(A) else "") + f"N_D = {size}"]
     if good.empty:

@@ -92,7 +92,7 @@ def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
 
 
 def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
-    """Rows of the models in the close-up; physics and naive hold whatever N_D, so theirs is 0."""
+    """Return the rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
     kept = frame.model.isin(exemplars(content)) | frame.source.eq("naive")
@@ -101,7 +101,7 @@ def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
 
 
 def _drawn(content: ReportContent) -> str:
-    """Sentence that says which models are drawn, if not all are."""
+    """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), exemplars(content)
     return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
 

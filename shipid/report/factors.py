@@ -38,7 +38,7 @@ def factors(content: ReportContent) -> Figure | None:
         "rising A, with the mean absolute error along and across the heading at the instant of prediction where known."
         + (" A factor that is not positive lies at the left edge: 0 removes the term." if _crosses(frame) else "")
         + (f" Not perturbed: {listed(untouched, 6)}." if untouched else ""),
-        alternative=f"Dots at the factors of {counted(len(names), 'model')}; the table of models tells A.",
+        alternative=f"Dots at the factors of {counted(len(names), 'model')}; the table of models has A.",
         height=ROW * len(names) + 70,
         views={"": [Panel(_strips(content, frame, names, groups))]},
         chips=[
@@ -54,7 +54,7 @@ def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], group
     traces = []
     for i, group in enumerate(groups):
         mine = frame[frame.group.eq(group) & frame.model.isin(names)]
-        # A group lies a little below the one before: four dots at one factor stay four dots.
+        # Each group is drawn a little below the one before, so that equal factors do not hide each other.
         y = mine.model.map(rows).to_numpy(dtype=float) + 0.24 * i / max(1, len(groups) - 1)
         x = np.array([math.log(factor) if factor > 0 else edge for factor in mine.factor])
         marker = {"symbol": SYMBOLS[i % len(SYMBOLS)], "size": 8, "color": category(i), "opacity": 0.75}

@@ -1,4 +1,4 @@
-"""The skeleton every figure hangs on: a takeaway above, panels with controls, how it was computed below."""
+"""The parts of every figure: a takeaway above, panels with controls, and below how it was computed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class FixedWindow:
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours mean: a label with its unit, the smallest and largest value, the CSS variable of the gradient."""
+    """A colour scale: a label with its unit, the smallest and largest value, the CSS variable of the gradient."""
 
     label: str
     low: float

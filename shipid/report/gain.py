@@ -209,7 +209,7 @@ def _dot(name: str, value: float, row: int, key: str, symbol: str, colour: str, 
 
 
 def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
-    """Name and numbers of a row, written above it: long names need no margin then."""
+    """Return the name and numbers of a row as text; it is written above the row, so long names need no margin."""
     numbers = " → ".join(metres(value) for value in (old, new) if np.isfinite(value))
     if not np.isfinite(new):
         numbers += " → no result"
@@ -237,5 +237,5 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
     text = f"{best} predicts best, H = {metres(after[best])}; compensation improves {len(better)} of "
     text += f"{counted(len(before), 'physics model')}"
     if pure and pure in after.index:
-        text += f"; pure data-driven stands at {metres(after[pure])}"
+        text += f"; pure data-driven has H = {metres(after[pure])}"
     return f"{text}; the naive floor is {metres(content.naive['mean'])}."

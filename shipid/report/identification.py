@@ -1,4 +1,4 @@
-"""The page of an identification: what is known of each number, what it is worth on runs held out, what is left over."""
+"""The page of an identification: estimates with intervals, errors on runs held out, and residuals."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class IdentificationContent:
 
     @property
     def answer(self) -> list[Sentence]:
-        """How much is known, what it buys on runs held out, and what to be careful with."""
+        """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
         said = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
         said.append(Sentence(_bought(self), "free-runs"))
@@ -93,11 +93,11 @@ def _bought(content: IdentificationContent) -> str:
     rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")]
     rms = rows.set_index("model")[[*SIGNALS, "position"]].astype(float)
     runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
-    told = [
+    changes = [
         f"{name} from {number(factor * rms[name][BEFORE])} to {number(factor * rms[name][AFTER])} {unit}"
         for name, (_, unit, factor) in {**SIGNALS, "position": ("", "m", 1.0)}.items()
     ]
-    return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(told)}."
+    return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(changes)}."
 
 
 def _length(content: IdentificationContent) -> str:
@@ -142,7 +142,7 @@ def estimates(content: IdentificationContent) -> Figure:
         title="The estimates",
         takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
-        "an interval wider than ±100 % of the base value, or the estimate stands at a bound or was dropped."
+        "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,
@@ -159,7 +159,7 @@ def _key(known: bool) -> str:
 
 
 def _span(frame: pd.DataFrame) -> tuple[float, float]:
-    """Factors that are drawn: every estimate, and intervals as far as they let estimates be told apart."""
+    """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
     reach = FARTHEST * max(float(np.ptp(dots)), 0.25)
     ends = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
@@ -177,7 +177,7 @@ def _hover(row: Mapping[Any, Any]) -> str:
 
 
 def _broken(words: str, most: int = 70) -> list[str]:
-    """Words on lines of at most so many characters."""
+    """Break words into lines of at most `most` characters."""
     lines = [""]
     for word in words.split():
         if len(lines[-1]) + len(word) > most:
@@ -187,7 +187,7 @@ def _broken(words: str, most: int = 70) -> list[str]:
 
 
 def numbers(content: IdentificationContent) -> Table:
-    """Every estimate in its unit."""
+    """Return the table of all estimates in their units."""
     rows = [
         [
             text(row["path"] + (f" (with {row['with']})" if row["with"] else "")),
@@ -209,10 +209,10 @@ def _interval(low: float, high: float) -> Cell:
 
 
 def unseen(content: IdentificationContent) -> Table | None:
-    """What keeps parameters from being identified; None where nothing does."""
+    """Return the table of what is not identified, and why; None if everything is."""
     rows = [[text(f"{sentence[0].upper()}{sentence[1:]}")] for sentence in content.unseen]
-    takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that tell them apart."
-    return Table("unseen", "What is not seen", takeaway, ["why"], [False], rows) if rows else None
+    takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
+    return Table("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
 
 
 def _short(value: float) -> Cell:
@@ -240,11 +240,11 @@ def correlations(content: IdentificationContent) -> Figure | None:
     plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 8, "t": 8, "b": 8})
     return Figure(
         id="correlations",
-        title="What moves with what",
+        title="Correlated estimates",
         takeaway=f"Most correlated are {content.estimates['name'].iloc[i]} and {content.estimates['name'].iloc[j]}: "
         f"{number(float(matrix[i, j]))}.",
-        how="Correlations of the errors of the estimates: near 1 or −1, a change of one is made good by a change of "
-        "the other, and only their combination is known.",
+        how="Correlations of the errors of the estimates: near 1 or −1, a change of one is compensated by a change "
+        "of the other, and only their combination is known.",
         alternative="Heat map of the correlations of all pairs of estimates.",
         height=WIDTH * len(names) + SIDE,
         views={"": [Panel(go.Figure([heat], plot))]},
@@ -291,7 +291,7 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
 
 
 def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Spans that a map can have."""
+    """Return the spans (low, high) of a map; one without width gets 1 on each side."""
     return [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
 
 
@@ -300,7 +300,7 @@ def _ink(name: str) -> dict[str, Any]:
 
 
 def _joined(mine: pd.DataFrame) -> pd.DataFrame:
-    """Pieces one after the other, broken between them."""
+    """Join the pieces of a line, with a gap between them."""
     every = max(1, len(mine) // POINTS)
     parts = []
     for _, piece in mine.groupby("piece", sort=False):
@@ -370,13 +370,13 @@ def residuals(content: IdentificationContent) -> Figure | None:
     ]
     y = axis("autocorrelation [1]", nticks=6, zeroline=True, zerolinecolor=INK, range=[-0.55, 1.05])
     first = {name: float(mine["correlation"].iloc[1]) if len(mine) > 1 else 0.0 for name, mine in parts.items()}
-    told = [f"{name} {number(value)}" for name, value in first.items()]
+    correlated = [f"{name} {number(value)}" for name, value in first.items()]
     return Figure(
         id="residuals",
-        title="What the residuals remember",
-        takeaway=f"One sample later, residuals correlate by {listed(told)}.",
+        title="Autocorrelation of the residuals",
+        takeaway=f"One sample later, residuals correlate by {listed(correlated)}.",
         how="Autocorrelation of the weighted residuals, pooled over runs. White residuals fall to 0 at once; a long "
-        "tail is what the model, or the data on wind and current, lack, and standard errors count it by runs.",
+        "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,
         views={"": [Panel(go.Figure(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
@@ -385,10 +385,10 @@ def residuals(content: IdentificationContent) -> Figure | None:
 
 
 def profiles(content: IdentificationContent) -> Figure | None:
-    """Profile likelihoods that were asked for; None without."""
+    """Return the figure of the profile likelihoods; None if none was asked for."""
     if content.profiles.empty:
         return None
-    panels, told = [], []
+    panels, sentences = [], []
     for path, mine in content.profiles.groupby("path", sort=False):
         x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
         y = np.minimum(mine["rise"].to_numpy(dtype=float), 3 * limit)
@@ -399,11 +399,11 @@ def profiles(content: IdentificationContent) -> Figure | None:
             axis("worse by [variances]", nticks=6, rangemode="tozero"),
         )
         panels.append(Panel(go.Figure([end, curve], layout(*axes, hovermode="closest"))))
-        told.append(str(mine["sentence"].iloc[0]))
+        sentences.append(str(mine["sentence"].iloc[0]))
     return Figure(
         id="profiles",
         title="Profile likelihood",
-        takeaway="; ".join(told) + ".",
+        takeaway="; ".join(sentences) + ".",
         how="How much worse the best fit becomes when one factor is held away from its estimate and all others are "
         "fitted again; the 95 % interval is where the curve lies below the dotted line.",
         alternative="Curves of the profile likelihood.",
@@ -413,7 +413,7 @@ def profiles(content: IdentificationContent) -> Figure | None:
 
 
 def programme(content: IdentificationContent) -> Table | None:
-    """Manoeuvres to run next; None where nobody asked."""
+    """Return the table of manoeuvres to run next; None if it was not asked for."""
     if content.programme.empty:
         return None
     rows = [

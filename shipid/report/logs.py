@@ -1,4 +1,4 @@
-"""The data behind a study: where the ship went, and how far each set of manoeuvres reaches."""
+"""The data of a study: the tracks of the ship, and the range of the inputs in each set of manoeuvres."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PIXELS = 2000  # a track needs no more detail than extent / PIXELS
 
 
 def set_colour(name: str) -> str:
-    """Blue for what trains, green for what validates, vermillion for the test, whatever the sets are called."""
+    """Blue for what trains, green for what validates, vermillion for the test, for any names of the sets."""
     word = name.lower()
     return category(TEST if word.startswith("test") else VALIDATION if word.startswith("valid") else TRAIN)
 
@@ -102,7 +102,7 @@ def _ranges(mine: pd.DataFrame) -> go.Figure:
 
 
 def _open_bar(numbers: Sequence[float], row: int) -> tuple[go.Scatter, go.Scatter]:
-    """Outline of a bar and an open dot: a range that somebody else found."""
+    """Return the outline of a bar and an open dot: the published range and mean."""
     low, mean, high = numbers
     x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]
     bar = line(PUBLISHED, x, y, [], line={"color": MUTED, "width": 1.5})
@@ -111,7 +111,7 @@ def _open_bar(numbers: Sequence[float], row: int) -> tuple[go.Scatter, go.Scatte
 
 
 def _takeaway(frame: pd.DataFrame) -> str:
-    """Whether the test asks for anything outside what was trained on, and how near the paper's ranges are."""
+    """Return whether the test set leaves the range of the other sets, and how near the published ranges are."""
     ours, published = frame[frame["set"] != PUBLISHED], frame[frame["set"] == PUBLISHED]
     return " ".join(part for part in (_beyond(ours), _near(ours, published)) if part)
 
@@ -120,15 +120,17 @@ def _near(ours: pd.DataFrame, published: pd.DataFrame) -> str:
     """Count the ends of all sets together that lie within a fifth of the published range from the published end."""
     if ours.empty or published.empty:
         return ""
-    found, far = 0, []
+    num_known, far = 0, []
     for theirs in published.itertuples():
         mine = ours[ours.quantity == theirs.quantity]
         low, high = float(str(theirs.min)), float(str(theirs.max))
         for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
-            found += bool(pd.notna(value))
+            num_known += bool(pd.notna(value))
             if abs(float(value) - end) > NEAR * (high - low):
                 far.append(f"{word} of {theirs.quantity}")
-    text = f"{found - len(far)} of {found} published ends are met within {100 * NEAR:.0f} % of the published range"
+    text = (
+        f"{num_known - len(far)} of {num_known} published ends are met within {100 * NEAR:.0f} % of the published range"
+    )
     return f"{text}; not {listed(far, 6)}." if far else f"{text}."
 
 

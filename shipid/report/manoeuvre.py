@@ -1,4 +1,4 @@
-"""The page of one standard manoeuvre: what was measured, where the ship went, what she did over time."""
+"""The page of one standard manoeuvre: its measures, the track of the ship, and its motion over time."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class ManoeuvreContent:
     title, name : the manoeuvre in words, and the vessel.
     kind : as measures are named.
     log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
-    measures, criteria : as `shipid.measures.rows` makes them.
-    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order sailed; without rows there is no figure.
+    measures, criteria : rows from `shipid.measures.rows`.
+    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed; without rows there is no figure.
     outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
     """
 
@@ -62,7 +62,7 @@ class ManoeuvreContent:
 
     @property
     def answer(self) -> list[Sentence]:
-        """The measures that come first, and how the criteria stand."""
+        """Return sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(FIRST[self.kind])]
         said = [f"{row.measure}: {_amount(float(str(row.value)), str(row.unit))}" for row in known.itertuples()]
         sentences = [Sentence("; ".join(said).capitalize() + ".", "measures")]
@@ -82,7 +82,7 @@ def write_manoeuvre(content: ManoeuvreContent, file: Path) -> Path:
 
 
 def _amount(value: float, unit: str) -> str:
-    return f"{number(round(value, 2) + 0.0)} {unit}" if np.isfinite(value) else "not found"
+    return f"{number(round(value, 2) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
 
 
 def measures(content: ManoeuvreContent) -> Table:
@@ -102,7 +102,7 @@ def measures(content: ManoeuvreContent) -> Table:
 
 
 def _decimals(value: float, unit: str) -> int:
-    """Three digits, no more than three decimals; a count has none."""
+    """Return the number of decimals for three digits: at most three; none for a count."""
     if not np.isfinite(value) or abs(value) < 1e-3:
         return 2
     return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
@@ -125,7 +125,7 @@ def criteria(content: ManoeuvreContent) -> Table | None:
 
 
 def track(content: ManoeuvreContent) -> Figure:
-    """Path of the ship with her outline to scale, north up, equal axes."""
+    """Path of the ship with its outline to scale, north up, equal axes."""
     log = _thinned(content.log)
     places = np.linspace(0, len(log) - 1, OUTLINES).astype(int)
     hulls = [_outline(content.outline, *log.iloc[i][["north", "east", "psi"]]) for i in places]
@@ -217,8 +217,8 @@ def _panel(title: str, traces: list[go.Scatter], content: ManoeuvreContent | Non
 
 
 def _value(content: ManoeuvreContent, measure: str) -> float:
-    found = content.measures.loc[content.measures["measure"] == measure, "value"]
-    return float(found.iloc[0]) if len(found) else float("nan")
+    values = content.measures.loc[content.measures["measure"] == measure, "value"]
+    return float(values.iloc[0]) if len(values) else float("nan")
 
 
 def spiral(content: ManoeuvreContent) -> Figure | None:
@@ -235,7 +235,7 @@ def spiral(content: ManoeuvreContent) -> Figure | None:
         id="spiral",
         title="Yaw rate over helm",
         takeaway=f"The loop is {_amount(width, 'deg')} of helm wide.",
-        how="One point for each level that became steady, joined in the order sailed; > 0 is to starboard.",
+        how="One point for each level that became steady, joined in the order performed; > 0 is to starboard.",
         alternative="Steady yaw rate over helm angle.",
         height=420,
         views={"": [Panel(go.Figure([trace], layout(x, y, hovermode="closest")))]},

@@ -22,7 +22,7 @@ from shipid.report.wording import bound, number
 
 
 class Shown(Protocol):
-    """What every page says beside its sections."""
+    """The parts of every page beside its sections."""
 
     @property
     def title(self) -> str:

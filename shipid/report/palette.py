@@ -32,11 +32,11 @@ class Style:
 
 
 def variables(dark: bool) -> str:
-    """CSS declarations: viridis for lines, cut to what stands out from the page, and whole for areas; Okabe-Ito."""
+    """CSS declarations: viridis (for lines only its colours with contrast to the page) and the Okabe-Ito colours."""
     ends = (0.28, 1.0) if dark else (0.0, 0.72)
     scale = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
     lines = [f"--scale-{i}: {colour};" for i, colour in enumerate(scale)]
-    # The blue that stands out from white sinks into black; its place goes to the sky blue, and back.
+    # Dark blue has contrast to white but not to black: the dark page takes sky blue instead, and the reverse.
     named = (OKABE_ITO[-1], *OKABE_ITO[1:-1], OKABE_ITO[0]) if dark else OKABE_ITO
     lines += [f"--category-{i}: {colour};" for i, colour in enumerate(named)]
     lines.append(f"--scale: linear-gradient(90deg, {', '.join(scale)});")
@@ -47,12 +47,12 @@ def variables(dark: bool) -> str:
 
 
 def category(index: int) -> str:
-    """Give the index-th of a few named things its colour."""
+    """Return the CSS variable of the index-th category colour."""
     return f"var(--category-{index % len(OKABE_ITO)})"
 
 
 def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
-    """Smallest and largest A [m] if models are coloured by A; None if there are few and each has its own colour."""
+    """Smallest and largest A [m] if models are coloured by A; None if there are few and each has a separate colour."""
     frame = families(content)
     physics = frame.A[frame.A.notna() & (frame.family != DATA_DRIVEN)]
     if len(frame) <= FEW_MODELS or physics.empty:
@@ -81,6 +81,6 @@ def level(value: float, span: tuple[float, float]) -> int:
 
 
 def _by_accuracy(accuracy: float, span: tuple[float, float]) -> str:
-    if not np.isfinite(accuracy):  # A could not be found: its physics diverged
+    if not np.isfinite(accuracy):  # A is unknown: the physics diverged
         return MUTED
     return f"var(--scale-{level(accuracy, span)})"

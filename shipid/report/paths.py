@@ -1,4 +1,4 @@
-"""Look at predictions: a window browser, and three windows side by side.
+"""Figures of predictions: a window browser, and three windows side by side.
 
 The page holds every window once, as finely as a pixel can show, and draws it itself (page.js).
 """
@@ -132,7 +132,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`; `line` is an index into `lines`, `size` into the N_D offered or -1
-    for what holds at every N_D. Lengths are metres, angles radians.
+    for a path that does not depend on N_D. Lengths are metres, angles radians.
     """
     runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
     lines: dict[tuple[str, str], int] = {}
@@ -262,7 +262,7 @@ def _chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
 
 
 def _detail(windows: list[Snapshot]) -> float:
-    """Half of what a pixel shows of a usual window [m]: a ship, or what it covers over the horizon."""
+    """Return half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
     extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
     return float(np.median(extents)) / PIXELS if extents else 0.0
 

@@ -1,4 +1,4 @@
-"""The search: what was tried in the cells, what was stopped, what was chosen and what it cost."""
+"""The hyperparameter search: trials per cell, their states, the chosen values and the time they took."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def search(content: ReportContent) -> Figure | None:
     }
     return Figure(
         id="search",
-        title="What the search tried",
+        title="Trials of the search",
         takeaway=_takeaway(frame, names),
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
         f"{_thinned(frame)}diamonds are those whose networks the cell uses; those beyond {CEILING:g} times lie at the "
@@ -82,11 +82,11 @@ def spoken(name: str) -> str:
 
 def importance(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
-    found = []
+    correlations = []
     for _, mine in frame[frame.value.notna() & frame[name].notna()].groupby("cell"):
         if mine[name].nunique() > 1 and mine.value.nunique() > 1 and len(mine) > 2:
-            found.append(float(np.corrcoef(mine[name].rank(), mine.value.rank())[0, 1]))
-    return float(np.mean(found)) if found else math.nan
+            correlations.append(float(np.corrcoef(mine[name].rank(), mine.value.rank())[0, 1]))
+    return float(np.mean(correlations)) if correlations else math.nan
 
 
 def _relative(trials: pd.DataFrame) -> pd.DataFrame:
@@ -96,7 +96,7 @@ def _relative(trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def _chips(frame: pd.DataFrame) -> list[Chip]:
-    """What is drawn; no chip for what never happened."""
+    """Return the legend; states that no trial has are left out."""
     states = {
         "complete": Chip("state:complete", "trial", MUTED, "none", symbol="circle"),
         "stopped": Chip("state:stopped", "stopped early", category(4), "none", symbol="triangle-up"),
@@ -137,7 +137,7 @@ def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dic
 
 
 def _some(frame: pd.DataFrame, most: int) -> pd.DataFrame:
-    """At most so many trials, at even distances."""
+    """Return at most `most` trials, evenly spread over the rows."""
     return frame.iloc[np.linspace(0, len(frame) - 1, min(len(frame), most)).round().astype(int)]
 
 
@@ -152,8 +152,8 @@ def _medians(frame: pd.DataFrame, name: str) -> Floats:
     if frame.empty or values.nunique() < 2:
         return np.empty((0, 2))
     groups = values if values.nunique() <= BINS else values.rank(pct=True).mul(BINS).apply(np.ceil)
-    found = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
-    points: Floats = np.minimum(found.to_numpy(dtype=float), [np.inf, CEILING])
+    medians = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
+    points: Floats = np.minimum(medians.to_numpy(dtype=float), [np.inf, CEILING])
     return points
 
 
@@ -181,8 +181,12 @@ def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
 
 
 def _caption(frame: pd.DataFrame, name: str) -> str:
-    found = importance(frame, name)
-    return f"rank correlation {number(round(found, 2) + 0.0)}" if math.isfinite(found) else "no rank correlation"
+    correlation = importance(frame, name)
+    return (
+        f"rank correlation {number(round(correlation, 2) + 0.0)}"
+        if math.isfinite(correlation)
+        else "no rank correlation"
+    )
 
 
 def _yes_or_no(values: pd.Series[float]) -> bool:
@@ -196,7 +200,7 @@ def _counts(frame: pd.DataFrame) -> str:
 
 
 def _tried(frame: pd.DataFrame, names: list[str]) -> str:
-    """Say from where to where the search went."""
+    """Return the range of each hyperparameter over the trials, as text."""
     said = []
     for name in names:
         low, high = float(frame[name].min()), float(frame[name].max())
@@ -205,15 +209,15 @@ def _tried(frame: pd.DataFrame, names: list[str]) -> str:
 
 
 def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
-    """What a usual trial loses against the best, and which hyperparameter goes with it."""
+    """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
         return f"None of {counted(len(frame), 'trial')} ended with a value."
     text = f"The middle trial errs by {number(float(frame.ratio.median()))} times the best of its cell"
-    found = {name: importance(frame, name) for name in names}
-    found = {name: value for name, value in found.items() if math.isfinite(value)}
-    if found:
-        most = max(found, key=lambda name: abs(found[name]))
-        text += f"; {spoken(most)} goes with it most, rank correlation {number(found[most])}"
+    correlations = {name: importance(frame, name) for name in names}
+    correlations = {name: value for name, value in correlations.items() if math.isfinite(value)}
+    if correlations:
+        most = max(correlations, key=lambda name: abs(correlations[name]))
+        text += f"; {spoken(most)} is most correlated with it, rank correlation {number(correlations[most])}"
     return f"{text}."
 
 

@@ -1,4 +1,4 @@
-"""What a page is made of: sections, each with what it needs of the content and how it is drawn."""
+"""Sections of a page: the parts of the content that each needs, and how it is drawn."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def declared(sections: Mapping[str, Section]) -> set[str]:
 
 def part(content: object, name: str) -> Any:
     """Return a part of the content: the field of that name, else the entry of `frames`, else None."""
-    found = getattr(content, name, None)
-    return getattr(content, "frames", {}).get(name) if found is None else found
+    value = getattr(content, name, None)
+    return getattr(content, "frames", {}).get(name) if value is None else value
 
 
 def drawn(sections: Mapping[str, Section], content: object) -> list[Drawn]:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
-FEW_MODELS = 6  # up to here every model has a colour of its own and is drawn everywhere
+FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 FEW_RUNS = 12  # test runs in the error-over-time figure and the window browser
 
 
@@ -59,7 +59,7 @@ def sizes(values: pd.Series[int], count: int = 3) -> list[int]:
 
 
 def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:
-    """Mean over seeds (and over whatever else `by` does not name), NaN rows left out of the mean."""
+    """Mean over seeds (and over every other column that `by` does not name), NaN rows left out of the mean."""
     return frame.groupby(by, sort=True, as_index=False)[values].mean()
 
 

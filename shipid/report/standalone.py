@@ -1,4 +1,4 @@
-"""Figures of the report as plain plotly figures, for a notebook or a file of one's own."""
+"""Figures of the report as plain plotly figures, for a notebook or a file."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def painted(figure: go.Figure, dark: bool = False) -> go.Figure:
 
 
 def _colours(dark: bool) -> dict[str, str]:
-    """Name of a colour -> colour, as the style sheet and the palette of the page have them."""
+    """Name of a colour -> colour, from the style sheet and the palette of the page."""
     sheet = files("shipid.report").joinpath("style.css").read_text(encoding="utf-8")
     blocks = re.findall(r"\{([^{}]*--page:[^{}]*)\}", sheet)
     text = blocks[1 if dark else 0] + palette.variables(dark)
@@ -139,8 +139,8 @@ def _stacked(panels: Sequence[Panel], height: int) -> go.Figure:
             layout[f"xaxis{number}"]["scaleanchor"] = f"y{number}"
         tie = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
         data += [{**trace.to_plotly_json(), **tie} for trace in panel.figure.data]
-        for found, kind in ((shapes, "shapes"), (notes, "annotations")):
-            found += [_moved(item, number) for item in axes.get(kind, ())]
+        for items, kind in ((shapes, "shapes"), (notes, "annotations")):
+            items += [_moved(item, number) for item in axes.get(kind, ())]
         if panel.caption:
             place = {"x": 0, "xref": "paper", "xanchor": "left", "y": bottom + height / total, "yref": "paper"}
             notes.append({**place, "yanchor": "bottom", "text": label(panel.caption), "showarrow": False})

@@ -1,4 +1,4 @@
-"""The same results as Markdown, so that nobody has to scrape the page."""
+"""The results of a study as Markdown, to be read by programs and in a terminal."""
 
 from __future__ import annotations
 

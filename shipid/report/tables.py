@@ -14,7 +14,7 @@ from shipid.report.wording import counted, listed, number
 
 @dataclass(frozen=True)
 class Cell:
-    """What a table cell says and what it is sorted by; `bad` marks what gave no result."""
+    """Text of a table cell and the key it is sorted by; `bad` marks a cell without a result."""
 
     text: str
     key: float | str
@@ -85,7 +85,7 @@ REPAIRS = {
 
 
 def cells(content: ReportContent) -> Table:
-    """Every cell of the study; a failed one says so where its numbers would stand."""
+    """Every cell of the study; a failed one shows its status in place of numbers."""
     frame = content.cells
     bad = int((frame.status.ne("ok") | frame.H.isna()).sum())
     takeaway = f"{counted(len(frame), 'cell')} in {duration(float(frame.seconds.sum()))} of computing; "
@@ -117,7 +117,7 @@ def models(content: ReportContent) -> Table:
 
 
 def repairs(content: ReportContent) -> Table | None:
-    """List what the importer mended; None if nothing is recorded."""
+    """Return the table of repairs by the importer; None if nothing is recorded."""
     frame = content.repairs
     if frame.empty:
         return None
@@ -167,7 +167,7 @@ def _table(
 
 
 def duration(seconds: float) -> str:
-    """Write a time as a reader would say it."""
+    """Write a duration [s] as text in s, min or h."""
     return (
         f"{seconds:.0f} s"
         if seconds < 120

@@ -1,4 +1,4 @@
-"""Numbers and lists as a reader wants them in a sentence or a table."""
+"""Numbers and lists as text for a sentence or a table."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Simulated runs: manoeuvres, weather, sea and sensors, and the truth of a study."""
+"""Simulated runs: manoeuvres, wind, sea and sensors, and the simulated truth of a study."""

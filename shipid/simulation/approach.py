@@ -1,6 +1,6 @@
-"""Before a manoeuvre: which commands drive and turn a ship, its steady speed, and how azimuth units share a load.
+"""Approach of a manoeuvre: which commands drive and steer a ship, its steady speed, and thrust allocation.
 
-All is found by asking the equations, so that it holds for any vessel.
+All results come from numerical evaluation of the vessel's equations, so they hold for any vessel.
 """
 
 from __future__ import annotations
@@ -22,35 +22,39 @@ from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 
-PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = 1.0, 1.0, 0.1  # m/s, rev/s, rad: where commands are asked what they do
+PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = (
+    1.0,
+    1.0,
+    0.1,
+)  # m/s, rev/s, rad: values at which the effect of commands is tested
 NOTHING = 1e-12  # m/s^2, rad/s^2
-CHUNK, LONGEST = 30.0, 3600.0  # s: an approach is looked at so often, and given up
+CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
 @dataclass(frozen=True)
 class Controls:
-    """What the commands of a vessel do; the equations are asked when it is first needed.
+    """The effect of a vessel's commands; computed from the equations at first use.
 
-    drives : shaft speeds that push it ahead.
-    helm : angle command -> +1 or -1, its sign that turns the ship to starboard; those that turn nothing are left out.
+    drives : shaft speed commands that push the vessel ahead.
+    helm : angle command -> +1 or -1, the sign that turns the ship to starboard; angles without effect are left out.
 
-    Both raise DocumentError for a vessel that nothing drives ahead or turns.
+    Both raise DocumentError for a vessel without a command that drives it ahead or turns it.
     """
 
     vessel: Vessel
 
     @classmethod
     def of(cls, vessel: Vessel) -> Controls:
-        """Controls whose equations have been asked; DocumentError for a vessel that nothing drives ahead or turns."""
+        """Controls with their effects computed; DocumentError for a vessel that no command drives ahead or turns."""
         controls = cls(vessel)
         _ = controls.helm
         return controls
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """Every command of the vessel."""
+        """Names of all commands of the vessel."""
         return dynamics(self.vessel).commands
 
     @property
@@ -68,7 +72,7 @@ class Controls:
         vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
-        drives = tuple(name for name, found in ahead.items() if found[0] - idle[0] > NOTHING)
+        drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
         straight = acceleration(vessel, PROBE_SPEED, running)
         turned = {
@@ -92,7 +96,10 @@ class Controls:
 
 
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
-    """Surge, sway and yaw acceleration (3,) going straight ahead at u in calm water, orders reached, others neutral."""
+    """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
+
+    commands : command -> value [SI], reached by the actuators; other commands are neutral.
+    """
     model = dynamics(vessel)
     state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
     memory, orders = ([commands.get(name, neutral(name)) for name in names] for names in (model.memory, model.commands))
@@ -103,20 +110,20 @@ def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Arr
 
 def helm_effect(controls: Controls, n: float, u: float) -> float:
     """Yaw acceleration per helm angle [1/s^2] at shaft speed n [rev/s] and speed u [m/s]."""
-    found = [
+    yaw = [
         acceleration(controls.vessel, u, {name: float(order[0]) for name, order in controls.orders(*given).items()})[2]
         for given in ((np.full(1, n), np.full(1, angle)) for angle in (0.0, PROBE_HELM))
     ]
-    return float(found[1] - found[0]) / PROBE_HELM
+    return float(yaw[1] - yaw[0]) / PROBE_HELM
 
 
 def steady(
     controls: Controls, n: Array, *, step: float, method: Method, engine: str
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """States and memories (S,) of steady straight running in calm water at shaft speeds n (S,) [rev/s].
+    """States and actuator states (S,) of steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
-    From rest until no velocity changes by 0.001 m/s or rad/s in 30 s, each on its own; position and heading then begin
-    anew.
+    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s. Position and heading are
+    then set to 0.
 
     Raises
     ------
@@ -153,7 +160,7 @@ def steady(
             state[name][moving] = path[name][-1, 0]
         for name, values in memory.items():
             values[moving] = path[f"actual.{name}"][-1, 0]
-        moving = moving[changed >= SETTLED]  # who is steady stops here: no start may depend on its company
+        moving = moving[changed >= SETTLED]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
             _check_straight(vessel, n, state["r"])
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
@@ -178,7 +185,7 @@ def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:
 
 
 def thrust_sharing(vessel: Vessel) -> tuple[Unit, ...]:
-    """How the azimuth units share an acceleration asked for: least sum of n^4, exact at rest.
+    """Thrust allocation: shares of the azimuth units in a demanded acceleration; least sum of n^4, exact at rest.
 
     Raises
     ------
@@ -211,7 +218,7 @@ def _triple(row: Array) -> tuple[float, float, float]:
 
 
 def _against_each_other(vessel: Vessel, names: list[str], without_effect: Array) -> Array:
-    """Directions (units, 2) in which the units push inwards without moving the ship: their wash then goes outwards."""
+    """Directions (units, 2) of inward thrust with zero total force and moment: the propeller wash goes outwards."""
     blocks = vessel.document["thruster"]
     place = np.array([[blocks[name]["x"], blocks[name]["y"]] for name in names], dtype=float)
     pushed = (without_effect @ (place.mean(axis=0) - place).ravel()).reshape(-1, 2)

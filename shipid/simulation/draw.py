@@ -1,4 +1,4 @@
-"""Manoeuvres drawn from ranges: a block of a study's truth, and the manoeuvre that it gives a run."""
+"""Random manoeuvres: a `[[truth.manoeuvre]]` block with ranges, and the manoeuvre drawn from it for one run."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 At = Callable[[str], float]
 """Name of a quantity -> where in its range it lies, in [0, 1)."""
 
-SHARED = ("name", "duration")  # of a kind: given for all runs of a truth
+SHARED = ("name", "duration")  # keys of a kind that [truth] sets for all runs
 UNITS = ("_rpm", "_deg")
-SEEDS = 2**31  # as many seeds a manoeuvre may draw
+SEEDS = 2**31  # number of different seeds that may be drawn
 COURSE = "course_deg"
 
 
 class Draw(BaseModel):
     """`[[truth.manoeuvre]]`: a kind of manoeuvre, its share of the runs, and the keys of the kind.
 
-    A number is fixed. Where the kind takes a number, a pair [low, high] is a range, drawn uniformly once a run. A list
-    of texts is drawn with equal chances. `course_deg` and `seed` are drawn where they are absent. In kinds with
-    `orders`, every key that is none of the kind orders commands: `n_rpm`, `alpha_deg`, `bow.n_rpm`.
+    A number is a fixed value. A pair [low, high] in place of a number is a range; each run draws from it uniformly.
+    From a list of texts each run draws one with equal probability. `course_deg` and `seed` are drawn if absent. In
+    kinds with `orders`, every other key is an order to commands: `n_rpm`, `alpha_deg`, `bow.n_rpm`.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True)
@@ -36,7 +36,7 @@ class Draw(BaseModel):
     def _fits(self) -> Draw:
         if self.kind not in KINDS:
             raise ValueError(f"{self.kind!r} is no kind of manoeuvre: {choices(self.kind, KINDS)}")
-        for place in (0.0, 1.0):  # what holds at both ends of every range holds between
+        for place in (0.0, 1.0):  # valid at both ends of every range: valid between them
             self.manoeuvre(1.0, lambda _, place=place: place)  # type: ignore[misc]
         return self
 
@@ -45,12 +45,13 @@ class Draw(BaseModel):
 
         Parameters
         ----------
-        duration : of its log [s].
-        at : where in its range each quantity lies: a key without its unit (`n`, `angle`), `psi` for the course.
+        duration : length of the log [s].
+        at : quantity -> position in its range, in [0, 1). A quantity is a key without its unit (`n`, `angle`), or `psi`
+            for the course.
 
         Raises
         ------
-        ValueError : a key that the kind has not, or a value that it refuses.
+        ValueError : a key that the kind does not have, or an invalid value.
         """
         kind = KINDS[self.kind]
         fields = {name: field.annotation for name, field in kind.model_fields.items() if name not in SHARED}
@@ -81,17 +82,17 @@ class Draw(BaseModel):
 
 
 def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Keys and values, those of a table as `table.key`: `bow.n_rpm = 0` is a table in TOML."""
-    found: list[tuple[str, Any]] = []
+    """Pairs of key and value; a key in a table becomes `table.key`, because `bow.n_rpm = 0` is a table in TOML."""
+    result: list[tuple[str, Any]] = []
     for key, value in given.items():
-        found += (
+        result += (
             [(f"{key}.{inner}", one) for inner, one in value.items()] if isinstance(value, Mapping) else [(key, value)]
         )
-    return found
+    return result
 
 
 def _takes_many(annotation: Any) -> bool:
-    """Whether a field takes a list as it is: a tuple, list or table."""
+    """Whether the type of a field is a tuple, list or table, so that a list is its value and not a range."""
     if get_origin(annotation) is Annotated:
         return _takes_many(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):
@@ -100,7 +101,7 @@ def _takes_many(annotation: Any) -> bool:
 
 
 def _drawn(key: str, value: Any, at: At) -> Any:
-    """A value as it is, a number between the two of a pair, or one of several texts."""
+    """The value itself, a number from the range [low, high], or one of several texts."""
     if not isinstance(value, list | tuple):
         return value
     if value and all(isinstance(one, str) for one in value):
@@ -110,7 +111,7 @@ def _drawn(key: str, value: Any, at: At) -> Any:
 
 
 def _quantity(key: str) -> str:
-    """A key without its unit."""
+    """Key without its unit suffix (`_rpm`, `_deg`)."""
     return next((key.removesuffix(unit) for unit in UNITS if key.endswith(unit)), key)
 
 
@@ -119,11 +120,11 @@ def _between(low: float, high: float, place: float) -> float:
 
 
 def _range(key: str, value: Any) -> tuple[float, float]:
-    """Least and greatest of a pair, or a number as both; ValueError for anything else."""
+    """(low, high) of a pair; (x, x) of a number x; ValueError for anything else."""
     pair = value if isinstance(value, list | tuple) else [value, value]
     if len(pair) != 2 or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair):
-        raise ValueError(f"{key}: give a number or [low, high], found {value!r}")
+        raise ValueError(f"{key}: give a number or [low, high], not {value!r}")
     low, high = pair
     if low > high:
-        raise ValueError(f"{key} runs backwards: give [low, high], found [{low:g}, {high:g}]")
+        raise ValueError(f"{key} has low > high: give [low, high], not [{low:g}, {high:g}]")
     return low, high

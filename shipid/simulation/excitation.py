@@ -1,6 +1,6 @@
-"""Excitation: command series that move a ship in many ways, for identification.
+"""Excitation signals for identification: multisine and APRBS.
 
-Series are plain arrays about zero, or between limits, in the unit of the command; the caller adds the trim.
+Series are arrays about zero or between limits, in the unit of the command; the caller adds the mean value.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from shipid.vessel.perturb import uniform
 Array = NDArray[np.float64]
 Phases = Literal["schroeder", "optimised"]
 
-STARTS, ROUNDS = 24, 400  # of the search for phases: 0.1 s; eight times the starts gain 2 % at most
-SAMPLES = 32  # per period of the highest harmonic where a peak is sought
-STRATA = 8  # parts of the range of levels that are visited in turn
+STARTS, ROUNDS = 24, 400  # of the search for phases: 0.1 s; eight times as many starts improve it by 2 % at most
+SAMPLES = 32  # per period of the highest harmonic in the search for the peak
+STRATA = 8  # strata of the range of levels
 
 
 def multisine(
@@ -31,17 +31,17 @@ def multisine(
     phases: Phases = "optimised",
     key: tuple[object, ...] = (),
 ) -> Array:
-    """Sum of equally strong sines at harmonics / period [Hz], within +- amplitude at all times, 0 at t = 0: (T,).
+    """Sum (T,) of sines of equal amplitude at harmonics / period [Hz], within +- amplitude at all times, 0 at t = 0.
 
-    x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]; it repeats after `period` [s]. One amplitude
-    limit, more power: the lower the crest factor, the larger a (see `crest_factor`).
+    x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]; it repeats after `period` [s]. For a given
+    amplitude limit, a is the larger the lower the crest factor is (see `crest_factor`).
 
     schroeder : phi_k = -pi k (k - 1) / K, k = 1..K (Schroeder 1970, IEEE Trans. Inf. Theory 16); crest factor near 1.9
         for successive harmonics, up to 3 for sparse ones.
-    optimised : lower, and never higher: from Schroeder's and from random phases by `key`, clip the peaks, keep the
-        phases of what is left and restore the amplitudes, again and again (Van der Ouderaa, Schoukens and Renneboog
-        1988, IEEE Trans. Instrum. Meas. 37); the best is taken. Crest factor 1.4 for 10 to 40 harmonics of a wide
-        band; narrow (17..21) and sparse ones stay at 1.7 to 1.9.
+    optimised : never a higher crest factor than `schroeder`. From Schroeder's phases and from random phases by `key`,
+        repeat: clip the peaks, keep the phases of the clipped signal, restore the amplitudes (Van der Ouderaa,
+        Schoukens and Renneboog 1988, IEEE Trans. Instrum. Meas. 37). The best result is used. Crest factor 1.4 for 10
+        to 40 harmonics of a wide band; 1.7 to 1.9 for narrow (17..21) and sparse bands.
 
     Several commands at once get disjoint harmonics (`deal`), which makes them orthogonal over a period, and are shifted
     in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
@@ -60,28 +60,28 @@ def multisine(
 
 
 def deal(harmonics: Sequence[int], count: int) -> tuple[tuple[int, ...], ...]:
-    """Harmonics of `count` orthogonal multisines: dealt in turn, so that each command covers the whole band."""
+    """Distribute harmonics to `count` orthogonal multisines in turn, so that each covers the whole band."""
     if not 1 <= count <= len(harmonics):
-        raise DocumentError(f"{len(harmonics)} harmonics cannot be dealt to {count} commands", path="harmonics")
+        raise DocumentError(f"{len(harmonics)} harmonics cannot be shared by {count} commands", path="harmonics")
     return tuple(tuple(sorted(harmonics)[first::count]) for first in range(count))
 
 
 def aprbs(time: Array, *, hold: tuple[float, float], levels: tuple[float, float], key: tuple[object, ...]) -> Array:
-    """Amplitude-modulated pseudo-random binary sequence: levels held for random times, at times (T,) [s]: (T,).
+    """Amplitude-modulated pseudo-random binary sequence (T,) at times (T,) [s]: levels held for random times.
 
-    Hold times are uniform in `hold` [s], counted from time[0]; the end of `time` cuts the last. Of every eight
-    successive levels one lies, uniformly, in each eighth of `levels`, in random order, so that short series cover the
-    range too (Nelles 2001, Nonlinear System Identification, ch. 17). All by hash(key): a longer series begins with
-    the shorter one.
+    Hold times are uniform in `hold` [s], counted from time[0]; the last is cut at the end of `time`. Levels are
+    stratified: of every eight successive levels one lies in each eighth of `levels`, in random order, so that short
+    series cover the range too (Nelles 2001, Nonlinear System Identification, ch. 17). All draws are by hash(key): a
+    longer series begins with the shorter one.
 
     Raises
     ------
-    DocumentError : limits that run backwards, or hold times that are not positive.
+    DocumentError : limits with low > high, or hold times that are not positive.
     """
     _check_ordered("hold", hold, "s")
     _check_ordered("levels", levels, "")
     if hold[0] <= 0:
-        raise DocumentError(f"hold times must be positive, found {hold[0]:g} s", path="hold")
+        raise DocumentError(f"hold times must be positive, not {hold[0]:g} s", path="hold")
     most = int((time[-1] - time[0]) / hold[0]) + 1
     draws = np.array([uniform(*key, "hold", number) for number in range(most)])
     ends = time[0] + np.cumsum(hold[0] + (hold[1] - hold[0]) * draws)
@@ -91,13 +91,13 @@ def aprbs(time: Array, *, hold: tuple[float, float], levels: tuple[float, float]
 
 
 def limit_rate(series: Array, step: float, rate: float) -> Array:
-    """Nearest series (T,) or (T, S) to an ordered one that changes by no more than rate [1/s] * step [s] a sample.
+    """Rate-limited copy of a series (T,) or (T, S): it changes by at most rate [1/s] * step [s] per sample.
 
-    It follows the order at full rate until it has caught up, from the order's first value on, as an actuator with
-    a rate limit does. A multisine that it changes has more than its own harmonics.
+    It starts at the first value and follows the series at full rate until it reaches it, like an actuator with a rate
+    limit. A multisine that is limited contains additional harmonics.
     """
     if step <= 0 or rate <= 0:
-        raise DocumentError(f"step and rate must be positive, found {step:g} s and {rate:g} 1/s", path="rate")
+        raise DocumentError(f"step and rate must be positive, not {step:g} s and {rate:g} 1/s", path="rate")
     result = np.array(series, dtype=np.float64)
     for now in range(1, len(result)):
         result[now] = result[now - 1] + np.clip(result[now] - result[now - 1], -rate * step, rate * step)
@@ -105,20 +105,21 @@ def limit_rate(series: Array, step: float, rate: float) -> Array:
 
 
 def crest_factor(series: Array) -> Array:
-    """Greatest |x| over the root mean square of a series (T,) or of each column of (T, S): shape () or (S,).
+    """Crest factor: greatest |x| divided by the root mean square of a series (T,), or of each column of (T, S).
 
-    1 for a square wave, sqrt(2) for a sine; over sqrt(2) it is Morelli's relative peak factor, if peaks are symmetric.
+    1 for a square wave, sqrt(2) for a sine. Divided by sqrt(2) it is Morelli's relative peak factor, for symmetric
+    peaks.
     """
     return np.asarray(np.abs(series).max(axis=0) / np.sqrt(np.mean(np.square(series), axis=0)))
 
 
 def _check_multisine(time: Array, period: float, harmonics: Sequence[int], amplitude: float) -> None:
     if period <= 0 or amplitude < 0:
-        message = f"period must be positive and amplitude not negative, found {period:g} s and {amplitude:g}"
+        message = f"period must be positive and amplitude at least 0, not {period:g} s and {amplitude:g}"
         raise DocumentError(message, path="period")
     if not harmonics or min(harmonics) < 1 or len(set(harmonics)) < len(harmonics):
         raise DocumentError(
-            f"harmonics must be distinct whole numbers from 1 on, found {list(harmonics)}", path="harmonics"
+            f"harmonics must be distinct whole numbers from 1 on, not {list(harmonics)}", path="harmonics"
         )
     fastest, step = max(harmonics), float(np.diff(time).max()) if len(time) > 1 else 0.0
     if 2 * fastest * step >= period:
@@ -128,8 +129,8 @@ def _check_multisine(time: Array, period: float, harmonics: Sequence[int], ampli
 
 def _check_ordered(name: str, limits: tuple[float, float], unit: str) -> None:
     if limits[0] > limits[1]:
-        found = f"[{limits[0]:g}, {limits[1]:g}] {unit}".rstrip()
-        raise DocumentError(f"runs backwards: give [low, high], found {found}", path=name)
+        given = f"[{limits[0]:g}, {limits[1]:g}] {unit}".rstrip()
+        raise DocumentError(f"low > high: give [low, high], not {given}", path=name)
 
 
 def _wave(harmonics: NDArray[np.int64], phi: Array) -> Array:
@@ -141,12 +142,12 @@ def _wave(harmonics: NDArray[np.int64], phi: Array) -> Array:
 
 
 def _peak(harmonics: NDArray[np.int64], phi: Array) -> float:
-    """Bound on the greatest |x| between the samples too: theirs over cos(pi / SAMPLES) (Ehlich and Zeller 1964)."""
+    """Upper bound of |x| at all times: greatest sample divided by cos(pi / SAMPLES) (Ehlich and Zeller 1964)."""
     return float(np.abs(_wave(harmonics, phi)).max() / np.cos(np.pi / SAMPLES))
 
 
 def _optimise(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object, ...]) -> Array:
-    """Phases (K,) of the lowest peak met in STARTS searches of ROUNDS rounds."""
+    """Phases (K,) with the lowest peak of STARTS searches of ROUNDS iterations."""
     drawn = [[uniform(*key, "phase", start, int(harmonic)) for harmonic in harmonics] for start in range(1, STARTS)]
     phi = np.vstack([schroeder, 2 * np.pi * np.array(drawn).reshape(STARTS - 1, len(harmonics))])
     best, lowest = schroeder, np.inf
@@ -161,7 +162,7 @@ def _optimise(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object,
 
 
 def _begin_at_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
-    """Phases of the same wave shifted in time so that it rises through 0 at t = 0."""
+    """Phases (K,) of the wave shifted in time so that it rises through 0 at t = 0."""
 
     def at(angle: float) -> float:
         return float(np.sin(harmonics * angle + phi).sum())
@@ -176,7 +177,7 @@ def _begin_at_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
 
 
 def _spread(count: int, key: tuple[object, ...]) -> Array:
-    """Numbers (count,) in [0, 1): every STRATA of them hold one in each of as many equal parts, in random order."""
+    """Stratified random numbers (count,) in [0, 1): each block of STRATA numbers has one in each equal part."""
     blocks = range(-(-count // STRATA))
     order = np.array([[uniform(*key, "order", block, part) for part in range(STRATA)] for block in blocks])
     within = np.array([[uniform(*key, "level", block, part) for part in range(STRATA)] for block in blocks])

@@ -1,6 +1,6 @@
 """Wind gusts: a stationary Gaussian series with a given spectrum, to be added to the mean wind speed.
 
-One point, along the mean wind: the direction stays constant, and a ship that moves does not meet the gusts sooner.
+The series is that of one fixed point, along the mean wind direction: the ship's motion does not change its frequencies.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Gusts(BaseModel):
-    """A `gusts` block: which spectrum, at which height, over which frequencies.
+    """A `gusts` block: spectrum, height [m] and frequency band [Hz].
 
-    `npd` depends on wind speed and height alone; `kaimal` takes its turbulence intensity (sigma / mean speed) from here
-    and its length scale too, where that of IEC 61400-1 is not wanted.
+    `npd` depends only on wind speed and height. `kaimal` needs a turbulence intensity (sigma / mean speed) and takes
+    the length scale of IEC 61400-1 unless one is given.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -34,7 +34,7 @@ class Gusts(BaseModel):
     turbulence_intensity: Annotated[FiniteFloat, Field(gt=0, le=1, description="kaimal: sigma / mean")] | None = None
     length_scale: Annotated[Positive, Field(description="m, kaimal: 5.67 min(height, 60) if absent")] | None = None
     frequencies: Annotated[
-        tuple[Positive, Positive], Field(description="Hz; what is slower belongs to the mean, what is faster is lost")
+        tuple[Positive, Positive], Field(description="Hz, lowest and highest frequency of the gusts")
     ] = (1 / 600, 0.5)
     harmonics: Annotated[int, Field(ge=2, le=10000)] = 100
 
@@ -42,7 +42,7 @@ class Gusts(BaseModel):
     def _fits(self) -> Gusts:
         low, high = self.frequencies
         if low >= high:
-            raise ValueError(f"frequencies must be [low, high], found [{low:g}, {high:g}] Hz")
+            raise ValueError(f"frequencies must be [low, high], not [{low:g}, {high:g}] Hz")
         if self.kind == "kaimal" and self.turbulence_intensity is None:
             raise ValueError("kaimal needs turbulence_intensity, such as 0.1")
         if self.kind == "npd" and (self.turbulence_intensity, self.length_scale) != (None, None):
@@ -53,24 +53,24 @@ class Gusts(BaseModel):
 def series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:
     """Gust speed (T, S) [m/s] at times (T,) [s], for mean speeds (S,) [m/s]; mean + gust is never negative.
 
-    x(t) = sum_k a_k cos(2 pi f_k t + phi_k): the band is cut into bins of equal width in ln f, f_k is uniform in ln f
-    within its bin, so that nothing repeats, and a_k^2 / 2 is the spectrum's integral over the bin, so that the variance
-    is that of the band whatever is drawn. Where a gust would turn the wind round it is cut: total speed 0. That is
-    1 / intensity standard deviations from the mean, so it matters for intensities above 0.3 and never for `npd`.
+    x(t) = sum_k a_k cos(2 pi f_k t + phi_k). The band is divided into bins of equal width in ln f. f_k is uniform in
+    ln f within its bin, so that the series does not repeat. a_k^2 / 2 is the integral of the spectrum over the bin, so
+    that the variance is that of the band for every draw. A gust that would reverse the wind is cut to total speed 0.
+    That is 1 / intensity standard deviations from the mean: relevant for intensities above 0.3, never for `npd`.
 
     Parameters
     ----------
-    keys : for each of the S series what its draws depend on, such as (seed, "manoeuvre", number), and nothing else.
+    keys : for each of the S series the key of its random draws, such as (seed, "manoeuvre", number).
 
     Raises
     ------
     DocumentError : a mean speed is negative.
     """
     if np.any(mean_speed < 0):
-        raise DocumentError(f"mean wind speed must be at least 0 m/s, found {np.min(mean_speed):g}", path="gusts")
+        raise DocumentError(f"mean wind speed must be at least 0 m/s, not {np.min(mean_speed):g}", path="gusts")
     amplitudes = np.sqrt(2 * _bin_variances(gusts, mean_speed))
     result = np.empty((len(time), len(mean_speed)))
-    # one by one: no series may depend on its company, not even in the last bit
+    # one by one: no series may depend on the others, not even in the last bit
     for column, key, amplitude in zip(result.T, keys, amplitudes, strict=True):
         frequencies, phases = _draw(gusts, key)
         column[:] = np.cos(2 * np.pi * np.outer(time, frequencies) + phases) @ amplitude

@@ -1,4 +1,4 @@
-"""What a simulated ship logs: names of runs and columns, and velocities of the horizontal plane."""
+"""Columns of a simulated log: names of runs and columns, and velocities in the horizontal plane."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from shipid.engine.rollout import Trajectories
 
 ON_BOARD = ("V_w", "beta_w")
-"""What of the environment a ship logs: neither current nor waves."""
+"""Environment channels that are logged; current and waves are not."""
 
 
 def logged(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """States of the first variant as a log has them, column -> (R, S): u, v and r are those of the horizontal plane."""
+    """Log columns of the first variant, column -> (R, S); u, v [m/s] and r [rad/s] in the horizontal plane."""
     columns = {column_of(name): path[name][:, 0] for name in names}
     return columns | horizontal(columns)
 
 
 def column_of(state: str) -> str:
-    """Name of a state in a log."""
+    """Name of the log column of a state."""
     return "z" if state == "down" else state
 
 
 def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
-    """Horizontal u and v along and across the heading, r = d(psi)/dt (Fossen 2021, eqs. 2.31 and 2.40).
+    """Horizontal velocities u, v [m/s] along and across the heading, and r = d(psi)/dt [rad/s], from body-fixed ones.
 
-    maths : what has cos and sin for the columns; casadi for symbols.
+    Fossen 2021, eqs. 2.31 and 2.40. maths : module with cos and sin for the columns: numpy, or casadi for symbols.
     """
     zero = 0.0 * columns["u"]
     phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
@@ -39,7 +39,7 @@ def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
 
 
 def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
-    """Body-fixed u, v and r of a log's columns: the reverse of `horizontal`, whose w and q are body-fixed already."""
+    """Body-fixed u, v [m/s] and r [rad/s] from the columns of a log: inverse of `horizontal`; w, q are body-fixed."""
     zero = 0.0 * columns["u"]
     phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
     v = (columns["v"] + w * maths.sin(phi)) / maths.cos(phi)
@@ -49,5 +49,5 @@ def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
 
 
 def run_names(count: int) -> list[str]:
-    """`M001`, `M002`, ...: as many digits as sort well."""
+    """Names `M001`, `M002`, ... of `count` runs, with enough digits to sort by name."""
     return [f"M{number + 1:0{max(3, len(str(count)))}d}" for number in range(count)]

@@ -1,6 +1,6 @@
-"""Kinds of manoeuvres of any vessel: orders by the clock or by a helmsman, and how a run starts.
+"""Kinds of manoeuvres for any vessel: orders as functions of time or of the state (helmsman), and initial states.
 
-Helm angles are counted by what they do: helm > 0 turns the ship to starboard, whatever sign a command needs for it.
+Sign convention: helm > 0 turns the ship to starboard, whatever sign the command of the vessel has.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 @dataclass(frozen=True)
 class Start:
-    """How a ship is at t = 0: upright, and still but for its speed ahead.
+    """Initial state of the ship: upright, all velocities 0 except the speed ahead.
 
     Parameters
     ----------
-    shaft : [rev/s] of an approach straight ahead in calm water until steady; None: no approach.
-    speed : ahead [m/s] where there is no approach.
-    at_order : whether lagged actuators have reached their first orders; else they are at rest.
+    shaft : shaft speed [rev/s] of a steady straight approach in calm water; None: no approach.
+    speed : speed ahead [m/s] without an approach.
+    at_order : whether actuators with lag have reached their first orders; else they are at 0.
     """
 
     shaft: float | None = None
@@ -50,7 +50,7 @@ class Start:
 
 
 class Manoeuvre(BaseModel, ABC):
-    """What all kinds share: a name, a heading at the start, a start, and orders."""
+    """Base class of all kinds of manoeuvre: name, initial heading, initial state and orders."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     name: Annotated[str | None, Field(description="of the run; absent: M001, M002, ...")] = None
@@ -67,23 +67,26 @@ class Manoeuvre(BaseModel, ABC):
         """State of the ship at t = 0."""
 
     def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
-        """Who gives the orders; None where the clock does."""
+        """The helmsman that gives the orders from the state; None if orders depend on time only."""
         return None
 
     @abstractmethod
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """Commands in force from times (T,) [s] on, or the inputs of the helmsman; `speed` [m/s] is that at t = 0."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
+        """Name -> (T,): the commands [SI] at times t (T,) [s], or the inputs of the helmsman.
+
+        speed : speed ahead [m/s] at t = 0.
+        """
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError where this vessel cannot do it."""
+        """Raise DocumentError if the vessel with these controls cannot perform the manoeuvre."""
         self.helmsman(controls)
 
 
 class Ordered(Manoeuvre):
-    """Orders to the commands themselves, as the vessel takes them, from a speed ahead on, without an approach.
+    """Orders to the single commands of the vessel, from an initial speed ahead, without an approach.
 
-    A key of `orders` is a signal with its unit, for all commands that have it (`n_rpm`, `alpha_deg`, `delta_deg`), or
-    one command (`bow.n_rpm`), which goes before. Every command needs an order.
+    A key of `orders` is a signal with its unit, for all commands of that signal (`n_rpm`, `alpha_deg`, `delta_deg`), or
+    one command (`bow.n_rpm`), which has priority. Every command needs an order.
     """
 
     duration: Annotated[Positive, Field(description="s")]
@@ -111,8 +114,8 @@ class Ordered(Manoeuvre):
     def series(self, key: str, t: Array) -> Array:
         """Order of a key at times (T,) [s], in the unit of the key."""
 
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Commands [SI] from times (T,) on; DocumentError for a command without an order, or an order of none."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
+        """Command -> (T,) [SI] at times t (T,) [s]; DocumentError for a command without order, or an unknown key."""
         series = {key: self.series(key, t) for key in self.keys}
         chosen = {name: order_keys(name) for name in controls.commands}
         valid = [key for pair in chosen.values() for key in pair]
@@ -120,18 +123,18 @@ class Ordered(Manoeuvre):
         if unknown is not None:
             message = f"orders no command of {controls.vessel.name}: {choices(unknown, set(valid))}"
             raise DocumentError(message, path=f"manoeuvre.{unknown}")
-        found = {}
+        result = {}
         for name, (single, common) in chosen.items():
             key = single if single in series else common
             if key not in series:
-                message = f"missing: {controls.vessel.name} takes the command {name}, give {common} = [low, high]"
+                message = f"missing: {controls.vessel.name} has the command {name}, give {common} = [low, high]"
                 raise DocumentError(message, path=f"manoeuvre.{common}")
-            found[name] = series[key] * order_unit(name)
-        return found
+            result[name] = series[key] * order_unit(name)
+        return result
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError for a command without an order, or an order of no command."""
-        self.told(controls, np.zeros(1), 0.0)
+        """Raise DocumentError for a command without an order, or an order without a command."""
+        self.inputs(controls, np.zeros(1), 0.0)
 
 
 class Turning(Ordered):
@@ -173,7 +176,7 @@ class Steps(Ordered):
 
 
 class Approached(Manoeuvre):
-    """A manoeuvre by helm and shaft speed after an approach, at whose end the log begins with t = 0."""
+    """A manoeuvre by helm angle and shaft speed after an approach; the log begins with t = 0 at the end of it."""
 
     n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
     approach: Annotated[
@@ -182,17 +185,17 @@ class Approached(Manoeuvre):
 
     @property
     def start(self) -> Start:
-        """Steady straight ahead, or at rest."""
+        """Initial state: steady straight ahead, or at rest."""
         return Start(shaft=self.n_rpm * RPM) if self.approach == "steady" else Start()
 
     @property
     def greatest_helm(self) -> float:
-        """Greatest angle [deg] that it may order, to either side."""
+        """Largest helm angle [deg] that the manoeuvre may order, to either side."""
         return 0.0
 
     @property
     def greatest_shaft(self) -> float:
-        """Greatest shaft speed [rpm] that it may order, ahead or astern."""
+        """Largest shaft speed [rpm] that the manoeuvre may order, ahead or astern."""
         return abs(self.n_rpm)
 
     def shaft(self, t: Array) -> Array:
@@ -203,24 +206,24 @@ class Approached(Manoeuvre):
         """Ordered helm angle [rad] at times (T,) [s], > 0 to starboard; amidships by default."""
         return np.zeros(len(t))
 
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Commands from times (T,) on, or the inputs of the helmsman."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
+        """Name -> (T,): the commands [SI] at times t (T,) [s], or the inputs of the helmsman."""
         return controls.orders(self.shaft(t), self.helm(t))
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError for a vessel that nothing drives ahead or turns."""
+        """Raise DocumentError for a vessel that no command drives ahead or turns."""
         controls.orders(np.zeros(1), np.zeros(1))
         self.helmsman(controls)
 
 
 class Executed(Approached):
-    """A manoeuvre that goes straight ahead until its first order is executed."""
+    """A manoeuvre with straight motion until its first order is executed."""
 
     execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
 
 
 class Timed(Executed):
-    """A manoeuvre that ends by the clock."""
+    """A manoeuvre of a given duration."""
 
     duration: Annotated[Positive, Field(description="s")]
 
@@ -247,7 +250,7 @@ class HelmOver(Timed):
         return 1.0 if self.side == "starboard" else -1.0
 
     def helm(self, t: Array) -> Array:
-        """Helm angle [rad] at times (T,) as first executed."""
+        """Helm angle [rad] at times (T,) [s]: amidships, then the first helm angle."""
         return np.where(_from(self.execute_at, t), self.sense * self.angle_deg * DEGREE, 0.0)
 
 
@@ -280,14 +283,14 @@ class Zigzag(HelmOver):
         return self.angle_deg if self.execute_heading_deg is None else self.execute_heading_deg
 
     def helmsman(self, controls: Controls) -> Helmsman:
-        """He sees the heading."""
+        """The zigzag helmsman: reverses the helm at the execute heading."""
         return helm.zigzag(controls.commands)
 
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """The helm as first executed, the course and the execute heading."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
+        """Name -> (T,) [SI]: first helm angle, shaft speeds, course and execute heading (inputs of the helmsman)."""
         headings = {"course": self.course_deg, "execute_heading": self.sense * self.reversal_deg}
         more = {name: np.full(len(t), value * DEGREE) for name, value in headings.items()}
-        return super().told(controls, t, speed) | more
+        return super().inputs(controls, t, speed) | more
 
 
 class Spiral(Executed):
@@ -333,11 +336,14 @@ class ReverseSpiral(Executed):
         return self.execute_at + len(self.rates_deg) * self.hold
 
     def helmsman(self, controls: Controls) -> Helmsman:
-        """He sees the yaw rate."""
+        """The yaw-rate helmsman: a PI controller of the yaw rate by the helm."""
         return helm.yaw_rate(controls.commands)
 
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """The greatest helm, the yaw rate, and a PI law that places both poles of r' = b s at omega = 40 / hold."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
+        """Name -> (T,): largest helm angle, shaft speeds, ordered yaw rate, gain and reset time of the PI law.
+
+        The PI law places both poles of r' = b s (s in -1..1, share of the largest helm) at omega = 40 / hold [rad/s].
+        """
         greatest, omega = self.angle_deg * DEGREE, SETTLES / self.hold
         effect = greatest * helm_effect(controls, self.n_rpm * RPM, speed)
         if effect <= 0:
@@ -354,7 +360,7 @@ class CrashStop(Timed):
 
     @property
     def greatest_shaft(self) -> float:
-        """Ahead or astern [rpm]."""
+        """Largest shaft speed [rpm], ahead or astern."""
         return max(abs(self.n_rpm), self.astern_rpm)
 
     def shaft(self, t: Array) -> Array:
@@ -370,7 +376,8 @@ class Excitation(Timed):
     amplitude_rpm: Annotated[NotNegative, Field(description="rpm about n_rpm at most; 0: not moved")] = 0.0
     period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
     harmonics: Annotated[
-        tuple[int, int], Field(description="lowest and highest of the multisine; dealt in turn to helm and shaft")
+        tuple[int, int],
+        Field(description="lowest and highest of the multisine; assigned alternately to helm and shaft"),
     ] = (1, 20)
     hold: Annotated[tuple[Positive, Positive], Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)
     angle_rate_deg: Annotated[Positive | None, Field(description="deg/s, limit of the ordered helm")] = None
@@ -384,7 +391,7 @@ class Excitation(Timed):
 
     @property
     def greatest_shaft(self) -> float:
-        """About n_rpm [rpm]."""
+        """Largest shaft speed [rpm]: mean plus amplitude."""
         return abs(self.n_rpm) + self.amplitude_rpm
 
     def helm(self, t: Array) -> Array:
@@ -396,7 +403,7 @@ class Excitation(Timed):
         return np.asarray((self.n_rpm + self._series(t, 1, self.amplitude_rpm, self.shaft_rate_rpm)) * RPM)
 
     def _series(self, t: Array, channel: int, amplitude: float, rate: float | None) -> Array:
-        """One channel (helm 0, shaft 1) about zero."""
+        """Excitation (T,) of one channel (0: helm, 1: shaft) about zero, in the unit of `amplitude`."""
         after = _from(self.execute_at, t)
         series = np.zeros(len(t))
         if amplitude == 0 or not after.any():
@@ -407,8 +414,8 @@ class Excitation(Timed):
             series[after] = aprbs(time, hold=self.hold, levels=(-amplitude, amplitude), key=key)
         else:
             band = range(self.harmonics[0], self.harmonics[1] + 1)
-            own = deal(band, 2)[channel] if self.angle_deg and self.amplitude_rpm else band
-            series[after] = multisine(time, period=self.period, harmonics=own, amplitude=amplitude, key=key)
+            harmonics = deal(band, 2)[channel] if self.angle_deg and self.amplitude_rpm else band
+            series[after] = multisine(time, period=self.period, harmonics=harmonics, amplitude=amplitude, key=key)
         if rate is None or len(t) < 2:
             return series
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])
@@ -429,12 +436,12 @@ class StationKeeping(Approached):
 
     @property
     def greatest_helm(self) -> float:
-        """Units may push anywhere [deg]."""
+        """Largest azimuth angle [deg]: all directions."""
         return 180.0
 
     @property
     def greatest_shaft(self) -> float:
-        """Of a unit [rpm]."""
+        """Largest shaft speed of a unit [rpm]."""
         return max(abs(self.n_rpm), self.most_rpm)
 
     @property
@@ -443,17 +450,24 @@ class StationKeeping(Approached):
         return self.duration
 
     def helmsman(self, controls: Controls) -> Helmsman:
-        """He sees position and heading; DocumentError for a vessel without two azimuth units that can hold it."""
+        """The station-keeping controller of position and heading.
+
+        DocumentError for a vessel without two azimuth units that give surge, sway and yaw.
+        """
         units = thrust_sharing(controls.vessel)
         used = {f"{unit.name}.{signal}" for unit in units for signal in ("n", "alpha")}
         return helm.station_keeping(units, tuple(name for name in controls.commands if name not in used))
 
-    def told(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Where to be, how hard to try."""
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
+        """Name -> (T,): position and heading to hold, natural frequency, bias and limit of the shaft speeds [SI]."""
         heading = self.course_deg if self.heading_deg is None else self.heading_deg
-        told = {"north": self.north, "east": self.east, "heading": heading * DEGREE}
-        told |= {"omega": 2 * np.pi / self.natural_period, "n_bias": self.bias_rpm * RPM, "n_max": self.most_rpm * RPM}
-        return {name: np.full(len(t), value) for name, value in told.items()}
+        values = {"north": self.north, "east": self.east, "heading": heading * DEGREE}
+        values |= {
+            "omega": 2 * np.pi / self.natural_period,
+            "n_bias": self.bias_rpm * RPM,
+            "n_max": self.most_rpm * RPM,
+        }
+        return {name: np.full(len(t), value) for name, value in values.items()}
 
 
 KINDS: dict[str, type[Manoeuvre]] = {
@@ -485,11 +499,11 @@ def order_keys(command: str) -> tuple[str, str]:
 
 
 def _from(moment: float, t: Array) -> NDArray[np.bool_]:
-    """Whether the moment has come, to rounding."""
+    """Mask (T,): whether t >= moment [s], with a tolerance for rounding."""
     return np.asarray(t >= moment - 1e-9 * max(1.0, moment))
 
 
 def _levels(levels: Sequence[float], hold: float, execute: float, t: Array) -> Array:
-    """0 until execute, then each level for `hold` [s], the last to the end."""
+    """Series (T,): 0 until `execute` [s], then each level for `hold` [s], and the last to the end."""
     number = np.floor((t - execute) / hold + 1e-9).astype(int)
     return np.where(number < 0, 0.0, np.array(levels, dtype=float)[np.clip(number, 0, len(levels) - 1)])

@@ -1,4 +1,4 @@
-"""A standard manoeuvre, simulated and measured; what its page shows."""
+"""A standard manoeuvre simulated with its measures, and the content of its report page."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its st
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A standard manoeuvre that was simulated, with its measures.
+    """A simulated standard manoeuvre with its measures.
 
     Parameters
     ----------
-    vessel, standard : the ship, and what she was ordered to do.
+    vessel, standard : the ship and the manoeuvre.
     frame : the log, one row every `standard.interval` [s]: run, t, states and commands in SI units and radians.
-    record : the same as the measures read it.
-    measures, criteria : one dict per measure, and per criterion of IMO MSC.137(76) that applies.
+    record : the log as a `Record`, the input of the measures.
+    measures, criteria : one dict for each measure, and for each applicable criterion of IMO MSC.137(76).
     """
 
     vessel: Vessel
@@ -55,18 +55,18 @@ def measure_standard(
     duration: float | None = None,
     step: float | None = None,
 ) -> Measured:
-    """Simulate a standard manoeuvre of a vessel in calm deep water and measure it; arguments as those of `standard`."""
+    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`."""
     chosen = standard(vessel, name, angles, speed=speed, side=side, duration=duration, step=step)
     frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
     frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
     record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
-    found, length = MEASURES[chosen.kind](record), length_of(vessel)
-    judged = criterion_rows(criteria(chosen.kind, found, length))
-    return Measured(vessel, chosen, frame, record, measure_rows(found, length), judged)
+    measures, length = MEASURES[chosen.kind](record), length_of(vessel)
+    judged = criterion_rows(criteria(chosen.kind, measures, length))
+    return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
 
 
 def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:
-    """Assemble the page of a measured manoeuvre; `command` is the line that reproduces it."""
+    """Assemble the report page of a manoeuvre; `command` is the command line that reproduces it."""
     ship, chosen, record = measured.vessel, measured.standard, measured.record
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft

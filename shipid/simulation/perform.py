@@ -1,4 +1,4 @@
-"""Manoeuvres performed: batches of one helmsman each, logged in the columns of a dataset."""
+"""Simulates manoeuvres in batches, one for each kind of helmsman, and logs them in the columns of a dataset."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def perform(
     components: Mapping[str, Array] | None = None,
     engine: str = "auto",
 ) -> pd.DataFrame:
-    """Run manoeuvres and log them: all that one helmsman (or the clock) orders in one rollout.
+    """Simulate manoeuvres and log them; manoeuvres with equal helmsmen run in one rollout.
 
-    The vessel's actuators lag and limit what is ordered; a vessel without any follows at once. The approach is in
-    calm water, from t = 0 on environment and sea act.
+    Orders pass through the vessel's actuator models (lag, limits); without them commands act at once. The approach is
+    in calm water; environment and sea act from t = 0 on.
 
     Parameters
     ----------
@@ -47,17 +47,17 @@ def perform(
     duration : length of every log [s]; default: that of each manoeuvre.
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series
         (num_instants, num_manoeuvres) at t = 0, step, 2 step, ... to the end of the longest log; default 0.
-    components : a sea for each manoeuvre, as `rollout` takes it (`shipid.simulation.sea.wave_loads`); default: calm.
+    components : wave components for each manoeuvre, from `shipid.simulation.sea.wave_loads`; default: calm water.
 
     Returns
     -------
-    DataFrame : `run`, `t` [s], the states (u, v, r those of the horizontal plane), each command as ordered from that
-        row on, what lagged ones have reached (`actual.port.n`), wind where the vessel feels it, `flags` (0). Without
-        `actual.*`: the columns of a dataset.
+    DataFrame : `run`, `t` [s], the states (u, v, r in the horizontal plane), each command as ordered from that row on,
+        actuator states (`actual.port.n`), wind if the vessel has wind forces, `flags` (0). Without `actual.*` these
+        are the columns of a dataset. SI units and radians.
 
     Raises
     ------
-    DocumentError : a manoeuvre that this vessel cannot do.
+    DocumentError : a manoeuvre that this vessel cannot perform.
     ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step.
     """
     if not manoeuvres:
@@ -102,7 +102,7 @@ def perform(
 
 @dataclass(frozen=True)
 class _Batch:
-    """Manoeuvres that one helmsman orders, with the rows of the longest log, their weather and their seas."""
+    """Manoeuvres with equal helmsmen. rows : of the longest log. weather, seas : environment and wave components."""
 
     names: list[str]
     manoeuvres: list[Manoeuvre]
@@ -114,12 +114,12 @@ class _Batch:
 def _together(
     controls: Controls, helmsman: Helmsman | None, batch: _Batch, every: int, how: Mapping[str, Any]
 ) -> dict[str, Array]:
-    """Columns (rows, num_samples) of the logs of a batch, as one rollout of the longest."""
+    """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
     vessel, num_steps = controls.vessel, every * (batch.rows - 1)
     model, t = dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
     start, memory = _start(batch.manoeuvres, controls, how)
-    told = [one.told(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
-    commands = {name: np.stack([one[name] for one in told], axis=1) for name in told[0]}
+    inputs = [one.inputs(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
+    commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
     if helmsman is None:
         ready = [sample for sample, one in enumerate(batch.manoeuvres) if one.start.at_order]
         for name, values in memory.items():
@@ -151,24 +151,26 @@ def _together(
 
 
 def _held(commands: Mapping[str, Array]) -> dict[str, Array]:
-    """Commands (T, num_samples), as (num_samples,) where none of them changes: less for an engine to read."""
+    """Commands (T, num_samples); reduced to (num_samples,) if all are constant, which is faster in the engines."""
     if all((values == values[0]).all() for values in commands.values()):
         return {name: values[0] for name, values in commands.items()}
     return dict(commands)
 
 
 def _rows(length: float, interval: float) -> int:
-    """Rows of a log of a length [s], the start included; at least two."""
+    """Number of rows of a log of `length` [s] with rows every `interval` [s], first row included; at least 2."""
     return max(int(length / interval + 1e-9), 1) + 1
 
 
 def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int) -> dict[str, Array]:
-    """Each channel of the vessel's environment, (1 or num_instants, num_manoeuvres)."""
+    """Channel of the vessel's environment -> (1 or num_instants, num_manoeuvres)."""
     names = dynamics(vessel).environment
     unknown = next((name for name in environment if name not in names), None)
     if unknown is not None:
         raise DocumentError(
-            f"{vessel.name} feels no {unknown!r}: {choices(unknown, names)}", file=vessel.file, path="environment"
+            f"{vessel.name} has no environment channel {unknown!r}: {choices(unknown, names)}",
+            file=vessel.file,
+            path="environment",
         )
     given = {name: np.asarray(environment.get(name, 0.0), dtype=float) for name in names}
     for name, values in given.items():
@@ -184,7 +186,7 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
 def _start(
     manoeuvres: Sequence[Manoeuvre], controls: Controls, how: Mapping[str, Any]
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """States and memories at t = 0, name -> (num_manoeuvres,); actuators at rest where no approach has moved them."""
+    """States and actuator states at t = 0, name -> (num_manoeuvres,); actuators are at 0 without an approach."""
     model, count = dynamics(controls.vessel), len(manoeuvres)
     starts = [one.start for one in manoeuvres]
     start = {name: np.zeros(count) for name in (*model.state, *model.hidden)}
@@ -208,15 +210,15 @@ def _orders(
     weather: Mapping[str, Array],
     moments: NDArray[np.intp],
 ) -> dict[str, Array]:
-    """What is ordered from each record on, (num_records, num_samples); the last record repeats the last command.
+    """Command -> ordered values (num_records, num_samples) from each record on; the last record repeats the last order.
 
-    Commands are (num_steps, num_samples), those of `moments` (num_records,) are in force; weather is of the records.
+    commands : (num_steps, num_samples). moments : (num_records,) step of each record. weather : (num_records, ...).
     """
     model = dynamics(vessel, helmsman)
     records, samples = path.states.shape[0], path.states.shape[2]
     if helmsman is None:
         return {name: commands[name][moments] + 0.0 for name in model.ordered}
-    told = np.stack([commands[name][moments] for name in model.commands], axis=-1)
+    given = np.stack([commands[name][moments] for name in model.commands], axis=-1)
     felt = np.zeros((records, samples, len(model.environment)))
     for channel, name in enumerate(model.environment):
         felt[..., channel] = weather[name]
@@ -225,6 +227,6 @@ def _orders(
     values = np.array(list(vessel.parameters.values()))
     # record by record: a map of all is slow to build
     rows = model.orders.map("rows", "serial", samples, [model.orders.n_in() - 1], [])
-    inputs = (states, path.states[:, 0][..., memory], told, felt)  # (num_records, num_samples, channel)
-    ordered = np.array([np.array(rows(*(part[k].T for part in inputs), values)) for k in range(records)])
+    parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
+    ordered = np.array([np.array(rows(*(part[k].T for part in parts), values)) for k in range(records)])
     return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

@@ -1,4 +1,4 @@
-"""Irregular seas: a spectrum as wave components, drawn for each sample, and their loads from a vessel's tables."""
+"""Irregular seas: random wave components of a spectrum for each sample, and wave loads from a vessel's tables."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from shipid.vessel.perturb import uniform
 from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
-GRAVITY = 9.81  # m/s^2, where a vessel does not say: dispersion in deep water, k = omega^2 / g
+GRAVITY = 9.81  # m/s^2, default of constants.g: dispersion in deep water, k = omega^2 / g
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
-SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # even or odd in the relative heading
+SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # symmetry in the relative heading: 1 even, -1 odd
 
 
 class Sea(BaseModel):
@@ -35,7 +35,7 @@ class Sea(BaseModel):
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest frequency of the components [rad/s]."""
+        """Lowest and highest frequency [rad/s] of the components."""
         peak = 2 * np.pi / self.T_p
         return LOWEST * peak, HIGHEST * peak
 
@@ -55,14 +55,14 @@ def jonswap(omega: Array, sea: Sea) -> Array:
 
 
 def share_outside(sea: Sea, low: float, high: float) -> float:
-    """Share of the energy of the components that lies below or above two frequencies [rad/s]."""
+    """Share (0 to 1) of the energy of the components below `low` or above `high` [rad/s]."""
     omega = np.linspace(*sea.range, 2001)
     energy = jonswap(omega, sea.model_copy(update={"H_s": 1.0}))
     return float(energy[(omega < low) | (omega > high)].sum() / energy.sum())
 
 
 def table_range(vessel: Vessel) -> tuple[float, float]:
-    """Least and greatest frequency [rad/s] that all wave tables of a vessel hold."""
+    """Lowest and highest frequency [rad/s] that all wave tables of a vessel contain."""
     blocks = [block for _, key, block in term_blocks(vessel.document) if key.startswith("waves.")]
     columns = [block["table"]["omega"] for block in blocks]
     return max(min(column) for column in columns), min(max(column) for column in columns)
@@ -71,8 +71,9 @@ def table_range(vessel: Vessel) -> tuple[float, float]:
 def draw_components(sea: Sea, direction: Array, names: Sequence[Any]) -> dict[str, Array]:
     """Components of each sample, (S, num_components): omega [rad/s], amplitude [m], epsilon and chi [rad].
 
-    Equal bins of frequency, one component in each: its energy is that of the bin, its frequency drawn within it, so
-    that the sea does not repeat. `direction` (S,) [rad, towards]; a sample's draws depend on its own name alone.
+    Equal bins of frequency with one component in each. It has the energy of the bin, and its frequency is drawn within
+    the bin, so that the sea does not repeat. direction : (S,) [rad, towards]. names : (S,) keys of the random draws; a
+    sample does not depend on the others.
     """
     edges = np.linspace(*sea.range, sea.components + 1)
     fine = np.linspace(edges[:-1], edges[1:], 33)
@@ -97,15 +98,18 @@ def spread_angles(s: int, share: Array) -> Array:
 
 
 def wave_loads(vessel: Vessel, drawn: Mapping[str, Array]) -> dict[str, Array]:
-    """What a rollout takes as `components` of a vessel: path of each wave term -> (S, num_components, num_entries)."""
-    found = {}
+    """Wave loads for the argument `components` of a rollout: wave term -> (S, num_components, num_entries).
+
+    drawn : result of `draw_components`.
+    """
+    result = {}
     for path, key, block in term_blocks(vessel.document):
         if key == "waves.first_order":
             g = vessel.document.get("constants", {}).get("g", GRAVITY)
-            found[path] = _first_order(block, drawn, g)
+            result[path] = _first_order(block, drawn, g)
         elif key == "waves.drift":
-            found[path] = _drift(block, drawn)
-    return found
+            result[path] = _drift(block, drawn)
+    return result
 
 
 def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array], g: float) -> Array:
@@ -115,8 +119,8 @@ def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array], g: float)
         for axis in SIDE
     ]
     omega, grid = drawn["omega"], np.unique(columns["omega"])
-    own = [interpolate(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
-    coefficients = np.concatenate(own, axis=-1)
+    coefficients_by_axis = [interpolate(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
+    coefficients = np.concatenate(coefficients_by_axis, axis=-1)
     head = (omega, omega**2 / g, np.cos(drawn["chi"]), np.sin(drawn["chi"]), drawn["epsilon"])
     return np.concatenate([np.stack(head, axis=-1), coefficients.real, coefficients.imag], axis=-1)
 
@@ -125,11 +129,11 @@ def _drift(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
     """Mean drift: components of one direction are summed beforehand."""
     columns = {name: np.asarray(values) for name, values in block["table"].items()}
     grid = np.unique(columns["omega"])
-    own = [
+    coefficients_by_axis = [
         interpolate(drawn["omega"], grid, fourier(columns, columns[f"{axis}_drift"], SIDE[axis], block["harmonics"]))
         for axis in ("X", "Y", "N")
     ]
-    series = np.concatenate(own, axis=-1) * drawn["amplitude"][..., None] ** 2
+    series = np.concatenate(coefficients_by_axis, axis=-1) * drawn["amplitude"][..., None] ** 2
     chi = drawn["chi"]
     if np.ptp(chi, axis=1).max() == 0:
         series, chi = series.sum(axis=1, keepdims=True), chi[:, :1]

@@ -1,4 +1,4 @@
-"""Sensors: what a ship would have logged of a true record, with noise, bias, latency, sampling and quantisation."""
+"""Sensor models: a measured log from a true record, with noise, bias, latency, sampling and quantisation."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 UNMEASURED = ("run", "t", "flags")
 WRAPPING = ("psi", "beta_w")
-"""Columns that may jump by 2 pi; measured, they are continuous as in a dataset."""
+"""Angle columns; the measured series are unwrapped, as in a dataset."""
 
-SAME = 1e-6  # of a step of the record: instants that close are the same
+SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
 class Sensor(BaseModel):
@@ -29,7 +29,7 @@ class Sensor(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
     noise: Annotated[NotNegative, Field(description="standard deviation of the white noise on each sample")] = 0.0
     bias: Annotated[
-        NotNegative, Field(description="standard deviation, over runs, of an offset that a run keeps throughout")
+        NotNegative, Field(description="standard deviation over runs of an offset that is constant in a run")
     ] = 0.0
     latency: Annotated[NotNegative, Field(description="s by which a sample is old when it is taken")] = 0.0
     interval: Annotated[
@@ -39,12 +39,12 @@ class Sensor(BaseModel):
 
 
 def measure(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
-    """Log a true record every `interval` [s]: a frame with its columns, from the first row of each run on.
+    """Measured log of a true record: a frame with the columns of `fine` and a row every `interval` [s] of each run.
 
-    A sample is the true value `latency` ago (linear between rows; before the run's start, the value at its start), plus
-    bias and noise, rounded. It is taken every `Sensor.interval`, first with the first row, and held until the next.
-    Bias and noise are normal, drawn by hash(seed, run, column): no other run or column, and no more rows, change them.
-    A column without a sensor is logged as it stands in the row of that instant.
+    A sample is the true value at the time minus `latency` (linear between rows; the first value before the start), plus
+    bias and noise, rounded to `quantum`. Samples are taken every `Sensor.interval` from the first row on and held until
+    the next. Bias and noise are normal, drawn by hash(seed, run, column): other runs, other columns and more rows do
+    not change them. A column without a sensor is copied.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def _check_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
 
 
 def _log(run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
-    """Logged rows of one run."""
+    """Measured log of one run."""
     step = _step(run, rows["t"].to_numpy())
     stride = round(interval / step)
     if stride < 1 or abs(interval / step - stride) > SAME * stride:
@@ -90,11 +90,11 @@ def _step(run: str, t: Array) -> float:
 
 
 def _samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
-    """Sensor's output in every `stride`-th row of the true values (N,)."""
+    """Output of a sensor at every `stride`-th row of the true values (N,), which are `step` [s] apart."""
     logged = np.arange(0, len(truth), stride)  # all clocks below count rows of the record from the run's first
     period = stride if sensor.interval is None else sensor.interval / step
     latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
-    taken, which = np.unique(latest, return_inverse=True)  # the others leave no trace
+    taken, which = np.unique(latest, return_inverse=True)  # samples between logged rows are not needed
     values = _at(truth, taken * period - sensor.latency / step)
     values = values + sensor.bias * _normal(1, *key, "bias") + sensor.noise * _normal(len(taken), *key, "noise")
     if sensor.quantum > 0:
@@ -103,16 +103,16 @@ def _samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[
 
 
 def _at(truth: Array, place: Array) -> Array:
-    """Values (N,) at fractional row numbers, linear between rows, the first value before them; exact in a row."""
+    """Values (N,) at fractional row numbers: linear between rows, constant before the first, exact at a row."""
     nearest = np.rint(place)
     place = np.where(np.abs(place - nearest) < SAME, nearest, place)
     return np.interp(place, np.arange(len(truth)), truth)
 
 
 def _normal(count: int, *key: Any) -> Array:
-    """Standard normal draws (count,) that depend on the key alone; more of them begin with the same.
+    """Standard normal draws (count,) that depend only on the key; a longer series begins with the shorter one.
 
-    Box and Muller's transform of PCG64's raw output, which NumPy keeps from version to version; its normals it may not.
+    Box-Muller transform of PCG64's raw output: NumPy guarantees the raw output for all versions, but not its normals.
     """
     raw = np.random.PCG64(int(uniform(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
     first, second = ((raw >> np.uint64(11)) / 2.0**53).T

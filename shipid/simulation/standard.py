@@ -1,4 +1,4 @@
-"""Standard manoeuvres by name, with lengths, speeds and steps that suit the vessel."""
+"""Standard manoeuvres by name, with duration, approach speed and step scaled to the vessel."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from shipid.simulation.manoeuvre import (
 from shipid.units import RPM
 from shipid.vessel.load import Vessel
 
-FROUDE, GRAVITY = 0.2, 9.81  # speed where none is asked for: U = 0.2 sqrt(g L)
-ROWS, STEPS = 50, 10  # rows of the log in the time that the ship takes for her length, steps a row
+FROUDE, GRAVITY = 0.2, 9.81  # default speed: U = 0.2 sqrt(g L)
+ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 HALVINGS, MOST_RPM = 60, 6000.0
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
-# in ship lengths at the speed of the approach: the log ahead of the execute, and what each kind takes
+# in ship lengths at the approach speed: log before the execute, and duration of each kind
 LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
 
 
 @dataclass(frozen=True)
 class Standard:
-    """A manoeuvre to be performed.
+    """A standard manoeuvre, ready to simulate.
 
     Parameters
     ----------
-    kind, title : as measures are named, and in words.
-    speed, step, interval : of the approach [m/s], of the integration and between rows of the log [s].
+    kind, title : key in `shipid.measures.MEASURES`, and a title in words.
+    speed : approach speed [m/s]. step : of the integration [s]. interval : between rows of the log [s].
     """
 
     kind: str
@@ -60,16 +60,16 @@ def standard(
     duration: float | None = None,
     step: float | None = None,
 ) -> Standard:
-    """Declare a standard manoeuvre of a vessel.
+    """Define a standard manoeuvre for a vessel.
 
     Parameters
     ----------
     name : `zigzag`, `turning`, `pull-out`, `spiral`, `reverse-spiral`, `stop`.
     angles : [deg] of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate [deg/s].
-    speed : of the approach [m/s]; default: Froude number 0.2.
-    duration : [s]; of a spiral, that each level is held. Default: what the ship takes for 60 of her lengths at that
-        speed, 30 for a zigzag, 40 for a level of a spiral, 80 for a stop.
-    step : of the integration [s]; default: about 1/500 of the time for one length. Ten steps make a row.
+    speed : approach speed [m/s]; default: Froude number 0.2. side : first turn, `starboard` or `port`.
+    duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
+        for a zigzag, 40 for a level of a spiral, 80 for a stop.
+    step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def standard(
     if len(angles) > most:
         raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
-        raise ShipidError("angles are positive: --side says which way she turns first", path="ANGLES")
+        raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
     for option, value in (("--duration", duration), ("--step", step)):
         if value is not None and not value > 0:
             raise ShipidError(f"{value:g} s must be positive", path=option)
@@ -94,15 +94,15 @@ def standard(
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = float(np.ceil(LEAD * passing / interval) * interval)
-    course = 0.0 if name in ROUND else 90.0  # what goes straight is drawn from left to right
-    own = build(angles, side, duration, passing, {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course})
-    return Standard(name, _title(name, own), own, float(asked), interval / STEPS, interval)
+    course = 0.0 if name in ROUND else 90.0  # straight tracks are drawn from left to right
+    manoeuvre = build(angles, side, duration, passing, {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course})
+    return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
 
 
 def length_of(vessel: Vessel) -> float | None:
-    """Length between perpendiculars [m], None where the document does not say."""
-    found = vessel.document.get("particulars", {}).get("L_pp")
-    return None if found is None else float(found)
+    """Length between perpendiculars [m]; None if the document does not give it."""
+    length = vessel.document.get("particulars", {}).get("L_pp")
+    return None if length is None else float(length)
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:
@@ -130,20 +130,20 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     return high
 
 
-def _title(name: str, own: Approached) -> str:
-    """What is done, in words."""
+def _title(name: str, manoeuvre: Approached) -> str:
+    """Title of a manoeuvre with its angles and side."""
     words = name.replace("-", " ")
-    if isinstance(own, Zigzag):
-        return f"{words} {own.angle_deg:g}/{own.reversal_deg:g}, first to {own.side}"
-    if isinstance(own, (TurningCircle, PullOut)):
-        return f"{words}, {own.angle_deg:g} deg of helm to {own.side}"
-    if isinstance(own, Spiral):
-        return f"{words}, {max(own.angles_deg):g} deg of helm to either side"
+    if isinstance(manoeuvre, Zigzag):
+        return f"{words} {manoeuvre.angle_deg:g}/{manoeuvre.reversal_deg:g}, first to {manoeuvre.side}"
+    if isinstance(manoeuvre, (TurningCircle, PullOut)):
+        return f"{words}, {manoeuvre.angle_deg:g} deg of helm to {manoeuvre.side}"
+    if isinstance(manoeuvre, Spiral):
+        return f"{words}, {max(manoeuvre.angles_deg):g} deg of helm to either side"
     return words
 
 
 def _round(value: float) -> float:
-    """Nearest of 1, 2, 5 and their tens, by ratio."""
+    """The number 1, 2 or 5 times a power of ten with the smallest ratio to `value`."""
     decade = 10.0 ** np.floor(np.log10(value))
     steps = np.array([1, 2, 5, 10]) * decade
     return float(f"{steps[np.argmin(np.abs(np.log(steps / value)))]:.6g}")
@@ -215,4 +215,4 @@ KINDS: dict[str, tuple[Build, int]] = {
     "reverse-spiral": (_reverse_spiral, 1),
     "stop": (_stop, 0),
 }
-"""Name -> what builds it and how many angles it takes."""
+"""Name -> function that builds the manoeuvre, and its largest number of angles."""

@@ -1,4 +1,4 @@
-"""A simulated truth: seeded draws of manoeuvres, weather and sea, performed and logged like a sea trial."""
+"""Simulated truth of a study: random manoeuvres, weather and sea, simulated and logged like a sea trial."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from shipid.vessel.perturb import uniform
 
 Array = np.ndarray
 NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
-MOST_LOST = 0.05  # of the energy of a sea may lie beyond the frequencies of a vessel's tables
+MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 MOVED = ("n_rpm", "alpha_deg", "start_speed", "actuators_at")  # keys of a manoeuvre
 
 
 class Truth(BaseModel):
     """The `[truth]` block of a study: a vessel, its manoeuvres, weather, sea and sensors.
 
-    Every quantity is drawn uniformly from its range by hash(seed, manoeuvre, quantity), so that more manoeuvres never
-    change those that exist. Directions are in [0, 360) deg.
+    Every quantity is drawn uniformly from its range by hash(seed, manoeuvre, quantity), so that additional manoeuvres
+    do not change the others. Directions are in [0, 360) deg.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -72,7 +72,7 @@ class Truth(BaseModel):
         for name in ("wind_speed", "current_speed"):
             low, high = getattr(self, name)
             if low > high:
-                raise ValueError(f"{name} runs backwards: give [low, high], found [{low:g}, {high:g}]")
+                raise ValueError(f"{name} has low > high: give [low, high], not [{low:g}, {high:g}]")
         return self
 
     @property
@@ -82,7 +82,7 @@ class Truth(BaseModel):
 
 
 def check_truth(truth: Truth, vessel: Vessel) -> None:
-    """Refuse what this vessel cannot do: manoeuvres, weather that acts on no term, or a sea beyond its tables."""
+    """Raise DocumentError for manoeuvres, weather, sensors or a sea that this vessel cannot be simulated with."""
     model = dynamics(vessel)
     if truth.waves is not None:
         _check_sea(truth, truth.waves, vessel)
@@ -100,7 +100,7 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
         except DocumentError as error:
             raise DocumentError(error.message, path=_in_block(error.path, place)) from None
     if unknown is not None:
-        raise DocumentError(f"no column that is measured: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
+        raise DocumentError(f"no logged column: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
 
 
 def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
@@ -115,16 +115,16 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
 
 
 def _in_block(path: str | None, place: int) -> str:
-    """Path in the study of what a manoeuvre refuses: `manoeuvre.n_rpm` -> `truth.manoeuvre.0.n_rpm`."""
+    """Path in the study document of an error in a manoeuvre: `manoeuvre.n_rpm` -> `truth.manoeuvre.0.n_rpm`."""
     inside = f".{path.removeprefix('manoeuvre.')}" if path is not None and path.startswith("manoeuvre.") else ""
     return f"truth.manoeuvre.{place}{inside}"
 
 
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
-    """Perform all manoeuvres and log them: a frame with the columns of a dataset, runs `M001`, `M002`, ...
+    """Simulate and log all manoeuvres: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
-    Mean wind, current and the direction of the waves are constant. Every ship starts upright: the first ten seconds of
-    its roll are a transient. What is logged is that of the origin, the centre of gravity projected on the calm
+    Mean wind, current and wave direction are constant in a run. Every run starts upright, so the first ten seconds of
+    roll are a transient. Position and velocities are those of the origin, the centre of gravity projected on the calm
     waterline: u and v horizontal, along and across the heading, and r = d(psi)/dt. Raises DocumentError if a manoeuvre
     diverges.
     """
@@ -153,21 +153,21 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
 
 
 def draw_manoeuvres(truth: Truth) -> list[Manoeuvre]:
-    """Manoeuvre of every run: its block drawn by the shares, then the quantities of the block."""
+    """The manoeuvre of every run: its block is drawn by the shares, then the quantities of the block."""
     ends = np.cumsum([block.share for block in truth.manoeuvre])
-    found = []
+    result = []
     for number in range(truth.manoeuvres):
 
         def at(quantity: str, number: int = number) -> float:
             return uniform(truth.seed, "manoeuvre", number, quantity)
 
         place = int(np.searchsorted(ends, at("kind") * ends[-1], side="right"))
-        found.append(truth.manoeuvre[place].manoeuvre(truth.length, at))
-    return found
+        result.append(truth.manoeuvre[place].manoeuvre(truth.length, at))
+    return result
 
 
 def _weather(truth: Truth, names: tuple[str, ...]) -> tuple[dict[str, Array], Array]:
-    """Channels `names` of the environment of every manoeuvre, (manoeuvres,), and where its waves go [rad]; SI."""
+    """Channel -> (manoeuvres,) [SI] for the channels `names`, and the wave directions (manoeuvres,) [rad, towards]."""
 
     def between(quantity: str, limits: tuple[float, float], unit: float = 1.0) -> Array:
         low, high = limits

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.windows import Instants, from_frame, past_of
 from shipid.errors import DataError, ResultError, choices
@@ -14,6 +15,7 @@ from shipid.files import check_table, write_table
 from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.observer import Estimates, observe
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file
@@ -33,7 +35,12 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
-    parts = [_along(predictor, dataset, run, rows) for run, rows in pieces(dataset)]
+    if predictor.causal:
+        dataset = causal_columns(dataset, predictor.causal)
+    estimates = None
+    if predictor.vessel is not None and predictor.physics.observer is not None:
+        estimates = observe(predictor.vessel, dataset, predictor.physics.observer)
+    parts = [_along(predictor, dataset, run, rows, estimates) for run, rows in pieces(dataset)]
     frame = pd.concat(parts, ignore_index=True)
     if frame.empty:
         raise DataError(_too_short(predictor), file=log)
@@ -58,7 +65,9 @@ def _known_cell(folder: Path, cell: str) -> Path:
     return cell_file(folder, cell)
 
 
-def _along(predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame) -> pd.DataFrame:
+def _along(
+    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, estimates: Estimates | None
+) -> pd.DataFrame:
     """Predictions from every instant of one unbroken stretch that has the past and the plan that they need."""
     physics, t = predictor.physics, rows["t"].to_numpy()
     slack = clock_slack(t)
@@ -77,8 +86,12 @@ def _along(predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame)
     hidden = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
     hidden = hidden and {name: values[first:last] for name, values in hidden.items()}
     columns = {str(name): rows[name].to_numpy()[first:last] for name in rows.columns if name != "run"}
-    past = past_of(rows, t[first:last], predictor.past, physics.step, predictor.path)
-    instants = Instants(columns, past, planned, hidden)
+    past = past_of(rows, t[first:last], predictor.past, physics.step, physics.path)
+    known = {}
+    if estimates is not None:
+        places = rows.index.to_numpy()[first:last]
+        known = {name: values[places] for name, values in estimates.columns.items()}
+    instants = Instants(columns, past, planned, hidden, known)
     origin, steps = (columns["north"], columns["east"], columns["psi"]), physics.horizon
     result = {
         "run": np.full(steps * count, run),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +12,12 @@ from shipid.data.dataset import BREAK, Dataset
 from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
+from shipid.observer import Estimates
 from shipid.study.plan import Batch, Foundation, Plan
-from shipid.study.prepare import Prepared, paths_of
+from shipid.study.prepare import Prepared, estimates_of, paths_of
+
+if TYPE_CHECKING:
+    from shipid.identification.solve import Solution
 
 Array = np.ndarray
 
@@ -25,6 +29,7 @@ class Prediction:
     foundation : with the numbers that were identified, if any were.
     paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
     sentence : the message of the identification; empty where nothing was identified. seconds : that it took.
+    estimates : what the observer knows at every row of the runs; None without one.
     """
 
     foundation: Foundation
@@ -32,6 +37,7 @@ class Prediction:
     test_paths: Array
     sentence: str = ""
     seconds: float = 0.0
+    estimates: Estimates | None = None
 
     def accuracy(self, test: Windows) -> Mapping[str, Any]:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
@@ -44,13 +50,16 @@ def predictions(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> di
     windows = prepared.pool.select(mask)
     result = {}
     data: Dataset | None = None
+    known: dict[Any, Solution] = {}
     for one in prepared.foundations:
         if one.identify is None:
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
-            result[one.name] = Prediction(one, *paths)
+            result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
             data = apart(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _identified(plan, prepared, one, prepared.runs(plan, batch), data, windows, device)
+            result[one.name] = _identified(
+                plan, prepared, one, prepared.runs(plan, batch), data, windows, device, known
+            )
     return result
 
 
@@ -77,24 +86,30 @@ def _identified(
     data: Dataset,
     windows: Windows,
     device: str,
+    known: dict[Any, Solution],
 ) -> Prediction:
+    """One identified foundation; `known` keeps solutions for foundations that differ in the observer alone."""
     from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
 
     assert foundation.identify is not None
     assert foundation.variant is not None
     assert foundation.vessel is not None
     try:
-        solution = identify(foundation.vessel, data, runs, foundation.identify)
+        key = foundation.variant.name, foundation.identify.model_dump_json()
+        solution = known.get(key)
+        if solution is None:
+            solution = known[key] = identify(foundation.vessel, data, runs, foundation.identify)
         if solution.status != "ok":
             return _nothing(foundation, windows, prepared.test, solution.sentence)
         values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
         now = replace(foundation, variant=replace(foundation.variant, values=values))
-        pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device)
+        estimates = estimates_of(plan, now, prepared.data) if now.observer is not None else None
+        pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
         return _nothing(foundation, windows, prepared.test, error.message)
     if not np.isfinite(pair[0]).all():
         return _nothing(foundation, windows, prepared.test, "the identified model diverges on training windows")
-    return Prediction(now, *pair, sentence=solution.sentence, seconds=solution.seconds)
+    return Prediction(now, *pair, solution.sentence, solution.seconds, estimates)
 
 
 def _nothing(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> Prediction:

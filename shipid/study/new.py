@@ -49,6 +49,7 @@ GROWING = 1.2  # times as far apart after twice the time: less is jitter
 UNTRUE_PATHS = 0.25  # of the runs whose positions leave their velocities
 FEW_RUNS, FOLDS = 6, 3
 MANOEUVRES, TESTS, INSTANTS, MEMBERS = 60, 10, 50, {"moderate": 3, "high": 2}
+PAST, LAGS, LEAST_PAST = 11.6, (0.1, 0.2, 0.4, 0.5, 1.0), 10  # sqrt(L / g): 20 s of a ship of 29 m; shares; steps
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150
 STEERING = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed: products with u or scaled by U
 HIGHER = "hull.*[order >= 3]"
@@ -156,10 +157,11 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
     families = _families(vessels)
     some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
-    least = _planned([*fixed, *some], families[:1], out, vessels)
+    method = _method(length_of(first), step, float(runs["duration"].median()) - horizon)
+    least = _planned([*fixed, *some, method], families[:1], out, vessels)
     amounts = ladder(len(partition(least, dataset)[0].spans))
     fixed += [_folds(amounts[-1])]
-    tail = [*rest, *_grid(amounts)]
+    tail = [*rest, *_grid(amounts), method]
     warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
     return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
 
@@ -400,12 +402,14 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     step = step_of(horizon, 0.0)
     amounts = ladder(MANOEUVRES - TESTS)
     families = _degraded(named, vessel)
+    method = _method(length, step, np.inf)
+    past = max(method.value[0].get("memory", {}).get("turned", [0.0]))
     fixed = [
         Choice(
             "question", f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {horizon:g} s?"
         ),
         Choice("description", f"simulated: {vessel.name} as she is makes the truth, and degraded models predict her"),
-        *_truth(named, vessel, service, rpm, horizon, step),
+        *_truth(named, vessel, service, rpm, horizon, step, past),
         Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
     ]
@@ -418,16 +422,45 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("prediction.samples", INSTANTS, "instants a manoeuvre"),
         Choice("grid.N_D", amounts, f"from the fewest to all {amounts[-1]} that are not for the test"),
         Choice("grid.seeds", [0], "take [0, 1, 2, 3, 4] for verdicts: findings about scatter need five"),
+        method,
     ]
     return _first_that_runs(fixed, ahead, tail, [families], out, vessels)
 
 
-def _truth(named: str, vessel: Vessel, service: float, rpm: float, horizon: float, step: float) -> Iterator[Choice]:
+def _method(length: float | None, step: float, spare: float) -> Choice:
+    """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
+
+    spare : time [s] of the median run beyond the horizon; a third of it may be past.
+    """
+    plain = {"name": "drawn", "kind": "path-drawn"}
+    past = PAST * float(np.sqrt((length or 0.0) / GRAVITY))
+    lags = sorted({step * max(round(share * past / step), 1) for share in LAGS})
+    if not length or past < LEAST_PAST * step:
+        return Choice("method", [plain], "no memory: the step is too long for the past of a ship of this length")
+    if past > spare / 3:
+        why = (
+            f"no memory: of {past:.3g} s, a third of what the median run holds beyond the horizon is {spare / 3:.3g} s"
+        )
+        return Choice("method", [plain], why)
+    rounded = [float(f"{lag:.6g}") for lag in lags]
+    memory = {"history": rounded[:-2], "turned": rounded[-2:], "error": [rounded[-3]]}
+    why = (
+        f"inputs of the last {rounded[-1]:g} s ({PAST:g} sqrt(L / g)): what ship and orders did, and what the physics "
+        "got wrong; validation chooses how much of it is taken. The first instants of a run have no past: left out"
+    )
+    return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
+
+
+def _truth(
+    named: str, vessel: Vessel, service: float, rpm: float, horizon: float, step: float, past: float
+) -> Iterator[Choice]:
     length = length_of(vessel) or 0.0
     fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
     low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
     yield Choice("truth.vessel", named)
     yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")
+    if past:
+        yield Choice("truth.run_up", past, "s before the first instant of prediction: the past of the memory")
     yield Choice("truth.duration", float(f"{horizon + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
     yield Choice("truth.step", fine, f"s: she takes {length / service:.3g} s for her length")
     yield Choice("truth.interval", step, "s between logged rows")
@@ -495,6 +528,8 @@ def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warn
         document.add(tomlkit.comment(line))
     tables: dict[str, Table] = {}
     for choice in choices:
+        if choice.path == "method":
+            continue
         block, _, key = choice.path.rpartition(".")
         place: Any = document
         if block:
@@ -507,7 +542,17 @@ def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warn
             place.add(tomlkit.comment(line))
         place.add(key, choice.value)
     text = tomlkit.dumps(document).rstrip("\n")
-    return "\n".join([text, "", *_family_lines(families)]) + "\n"
+    methods = [choice for choice in choices if choice.path == "method"]
+    return "\n".join([text, "", *_method_lines(methods), *_family_lines(families)]) + "\n"
+
+
+def _method_lines(choices: Sequence[Choice]) -> Iterator[str]:
+    for choice in choices:
+        yield from (f"# {line}" for line in textwrap.wrap(choice.why, 110))
+        for method in choice.value:
+            yield "[[method]]"
+            yield from _pairs(method)
+            yield ""
 
 
 def _family_lines(families: Sequence[Mapping[str, Any]]) -> Iterator[str]:

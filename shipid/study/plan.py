@@ -20,6 +20,7 @@ from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, unknowns
 from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
+from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
 from shipid.simulation.truth import Truth, check_truth
 from shipid.vessel.load import Vessel, load_vessel
@@ -29,7 +30,7 @@ NO_MODEL = "none"
 WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 MOST_STEPS = 100_000
-IDENTIFIED = "identified from the runs of each cell"
+IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
@@ -55,6 +56,9 @@ class Data(Strict):
     log: str | None = Field(default=None, description="raw log, if not the public original")
     dataset: str | None = Field(default=None, description="Parquet file written by `shipid data import`")
     without: list[str] = Field(default=[], description="repairs of the mapping to leave out")
+    causal: list[str] = Field(
+        default=[], description="columns interpolated between fixes: inputs hold the last fix, such as u and v"
+    )
     path: Literal["position", "velocity"] = Field(
         default="position", description="true path: logged positions, or the integral of u, v, psi"
     )
@@ -217,6 +221,7 @@ class Foundation:
     variant : the numbers on the base; None is no physics at all.
     base : the vessel that the variant changes.
     identify : what is identified from the runs of each batch; None: nothing.
+    observer : what filters the start of the physics and adds slow forces; None: nothing.
     """
 
     name: str
@@ -226,6 +231,7 @@ class Foundation:
     base: Vessel | None
     description: str = ""
     identify: Identify | None = None
+    observer: Observer | None = None
 
     @property
     def vessel(self) -> Vessel | None:
@@ -322,6 +328,11 @@ class Plan:
         """Name of the method that findings and the answer speak of."""
         named = self.study.claims.method if self.study.claims else None
         return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
+
+    @property
+    def causal(self) -> tuple[str, ...]:
+        """Columns whose inputs hold the last fix."""
+        return tuple(self.study.data.causal) if self.study.data else ()
 
     @property
     def past(self) -> int:
@@ -495,15 +506,18 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
             raise DocumentError(message, file=file, path=f"family.{index}.name")
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
-        if family.identify is None:
+        if family.identify is None and family.observer is None:
             found += [Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
             continue
-        parent = _identified_parent(study.family[index], families, file, f"family.{index}")
-        settings = _identify(study, family, index, vessel, file)
-        described = words or ", ".join(filter(None, (parent.description, IDENTIFIED)))
+        root = _root(study.family, index, file)
+        parent = families[root]
+        settings = None if family.identify is None else _identify(study, family, index, vessel, file)
+        observer = None if family.observer is None else _observer(study, family, index, vessel, file)
+        ways = (IDENTIFIED if settings else "", OBSERVED if observer else "")
+        described = words or ", ".join(filter(None, (parent.description, *ways)))
         for variant in members(parent, vessel, file):
             name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
-            found.append(Foundation(name, family.name, variant.member, variant, vessel, described, settings))
+            found.append(Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer))
     names = [foundation.name for foundation in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -511,19 +525,37 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
     return (*found, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
 
 
-def _identified_parent(written: Family, families: Sequence[Family], file: Path, path: str) -> Family:
-    """The family whose members are identified; DocumentError unless the block only extends it."""
-    if written.extends is None or written.perturb or "members" in written.model_fields_set:
-        message = (
-            "an identified family is a family of its own: take the block out of this one and add [[family]] "
-            f'name = "{written.name}-identified", extends = "{written.name}" with the block [family.identify]'
-        )
-        raise DocumentError(message, file=file, path=f"{path}.identify")
-    parent = next(family for family in families if family.name == written.extends)
-    if parent.identify is not None:
-        message = f"{parent.name!r} is identified already: extend the family that it extends"
-        raise DocumentError(message, file=file, path=f"{path}.extends")
-    return parent
+def _root(families: Sequence[Family], index: int, file: Path) -> int:
+    """Place of the family whose members an identified or observed family takes, as far up as it extends.
+
+    DocumentError unless the families on the way only extend: no base, perturbations or members of their own.
+    """
+    by_name = {family.name: place for place, family in enumerate(families)}
+    while families[index].identify is not None or families[index].observer is not None:
+        one, block = families[index], "identify" if families[index].identify is not None else "observer"
+        if one.extends is None or one.perturb or "members" in one.model_fields_set:
+            message = (
+                "an identified or observed family is a family of its own: take the block out of this one and add "
+                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]'
+            )
+            raise DocumentError(message, file=file, path=f"family.{index}.{block}")
+        index = by_name[one.extends]
+    return index
+
+
+def _observer(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Observer:
+    """Settings of an observer of this vessel; DocumentError with the path of a wrong key or value.
+
+    Where velocities make the true path, positions are too coarse to be measurements; then no current can be seen.
+    """
+    coarse = study.data is not None and study.data.path == "velocity"
+    default: dict[str, Any] = {"measured": ["psi", "u", "v", "r"], "current": 0.0} if coarse else {}
+    settings: Observer = documents.parse(Observer, default | (family.observer or {}), file, f"family.{index}.observer")
+    try:
+        bank(vessel, settings)
+    except DocumentError as error:
+        raise DocumentError(error.message, file=file, path=f"family.{index}.observer") from None
+    return settings
 
 
 def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Identify:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
+from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
@@ -29,6 +30,7 @@ from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.metrics import Summary, position_error, summary
+from shipid.observer import Estimates, Observer, at_windows, observe
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.vessel.load import Vessel
@@ -47,6 +49,8 @@ class Prepared:
     pool, test : windows for training and validation, and windows of the untouched test runs.
     foundations : after redraws.
     pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics.
+    estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
+        depend on the batch.
     notes : what was assumed, redrawn or left out, in sentences.
     """
 
@@ -57,6 +61,7 @@ class Prepared:
     pool_paths: Mapping[str, Array]
     test_paths: Mapping[str, Array]
     notes: tuple[str, ...]
+    estimates: Mapping[str, Estimates] = field(default_factory=dict)
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -142,17 +147,21 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     """Every window of a study, test and training; DocumentError where no run is as long as the horizon."""
     prediction = plan.study.prediction
+    cut = partial(
+        cut_windows,
+        horizon=prediction.horizon,
+        step=prediction.step,
+        interval=prediction.interval,
+        path=path_of(plan),
+        past=plan.past,
+    )
     try:
-        windows = cut_windows(
-            dataset,
-            horizon=prediction.horizon,
-            step=prediction.step,
-            interval=prediction.interval,
-            path=plan.study.data.path if plan.study.data else "position",
-            past=plan.past,
-        )
+        windows = cut(dataset)
     except DataError as error:
         raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
+    if plan.causal:
+        known = cut(known_by_then(plan, dataset))  # the truth is that of the log, inputs are what was known
+        windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
         windows = windows.select(_place_in_run(windows) < prediction.samples)
     return windows
@@ -186,7 +195,8 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         if foundation.base is not None:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
-    foundations, paths = _roll_out(plan, dataset, both, notes, device)
+    estimates: dict[str, Estimates] = {}
+    foundations, paths = _roll_out(plan, dataset, both, notes, device, estimates)
     return Prepared(
         data=dataset,
         pool=rest,
@@ -195,6 +205,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         pool_paths={name: pair[0] for name, pair in paths.items()},
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
+        estimates=estimates,
     )
 
 
@@ -230,12 +241,17 @@ Pair = tuple[Array, Array]
 
 
 def _roll_out(
-    plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str], device: str
+    plan: Plan,
+    dataset: Dataset,
+    parts: Sequence[Windows],
+    notes: list[str],
+    device: str,
+    estimates: dict[str, Estimates],
 ) -> tuple[tuple[Foundation, ...], dict[str, Pair]]:
-    """Paths of every foundation on (pool, test), members that diverge on the pool redrawn."""
+    """Paths of every foundation on (pool, test), members that diverge on the pool redrawn; fills in the estimates."""
     families = {family.name: family for family in resolve(plan.study.family, plan.file)}
     finished: dict[str, tuple[Foundation, Pair]] = {}
-    waiting = [one for one in plan.foundations if one.base is not None and one.identify is None]
+    waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
     while waiting:
         again = []
         for foundation, paths, share in _one_round(plan, dataset, parts, waiting, device):
@@ -251,24 +267,60 @@ def _roll_out(
         waiting = again
     zeros = (np.zeros_like(parts[0].future), np.zeros_like(parts[1].future))
     for foundation in plan.foundations:
-        if foundation.identify is not None and foundation.variant is not None:  # the member before identification
+        if (foundation.identify or foundation.observer) and foundation.variant is not None:
             same, paths = finished[foundation.variant.name]
-            finished[foundation.name] = (replace(foundation, variant=same.variant), paths)
+            derived = replace(foundation, variant=same.variant)
+            if derived.observer is not None and derived.identify is None:
+                estimates[derived.name] = known = estimates_of(plan, derived, dataset)
+                paths = paths_of(plan, dataset, parts, derived, device, known)
+            finished[foundation.name] = (derived, paths)
         finished.setdefault(foundation.name, (foundation, zeros))
     foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
     return foundations, {one.name: finished[one.name][1] for one in foundations}
 
 
-def physics_of(plan: Plan, vessel: Vessel | None) -> Physics:
+def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
     """The physics of a study: a vessel, rolled out over the horizon of the study."""
     prediction = plan.study.prediction
-    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator)
+    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_of(plan))
 
 
-def instants_of(plan: Plan, vessel: Vessel | None, dataset: Dataset, windows: Windows) -> Instants:
-    """What a prediction of a study knows at each window, with the states of the vessel's actuators."""
+def known_by_then(plan: Plan, dataset: Dataset) -> Dataset:
+    """The runs as a predictor sees them: columns that the study calls `causal` hold their last fix."""
+    if not plan.causal:
+        return dataset
+    try:
+        return causal_columns(dataset, plan.causal)
+    except DataError as error:
+        raise DocumentError(error.message, file=plan.file, path="data.causal") from None
+
+
+def path_of(plan: Plan) -> Literal["position", "velocity"]:
+    """Where the true path of a study comes from."""
+    return plan.study.data.path if plan.study.data else "position"
+
+
+def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estimates:
+    """What the observer of a foundation knows at every row of the runs."""
+    assert foundation.vessel is not None
+    return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer)
+
+
+def instants_of(
+    plan: Plan, vessel: Vessel | None, dataset: Dataset, windows: Windows, estimates: Estimates | None = None
+) -> Instants:
+    """What a prediction of a study knows at each window, with the states of the actuators and of the observer."""
     hidden = None if vessel is None else window_memory(vessel, dataset, windows)
-    return windows.instants(known=plan.study.prediction.commands == "known", hidden=hidden)
+    known = plan.study.prediction.commands == "known"
+    return windows.instants(known=known, hidden=hidden, estimates=at_instants(dataset, windows, estimates))
+
+
+def at_instants(dataset: Dataset, windows: Windows, estimates: Estimates | None) -> dict[str, Array]:
+    """Estimates of an observer at the instants of windows, `observer.u`, ... -> (S,); none without an observer."""
+    if estimates is None:
+        return {}
+    columns = at_windows(dataset, estimates, windows)
+    return {name: columns[name] for name in estimates.columns}
 
 
 def _one_round(
@@ -297,10 +349,22 @@ def _one_round(
             yield foundation, paths, float(pool_bad[position].mean())
 
 
-def paths_of(plan: Plan, dataset: Dataset, parts: Sequence[Windows], foundation: Foundation, device: str) -> Pair:
+def paths_of(
+    plan: Plan,
+    dataset: Dataset,
+    parts: Sequence[Windows],
+    foundation: Foundation,
+    device: str,
+    estimates: Estimates | None = None,
+) -> Pair:
     """Paths of one foundation on (pool, test); where it diverges they are not numbers."""
-    _, paths, share = next(_one_round(plan, dataset, parts, [foundation], device))
-    return (np.full_like(paths[0], np.nan), paths[1]) if share else paths
+    vessel = foundation.vessel
+    physics = physics_of(plan, vessel, foundation.observer)
+    (pool, pool_bad), (test, test_bad) = (
+        physics.variant_paths(instants_of(plan, vessel, dataset, windows, estimates), None, device) for windows in parts
+    )
+    test[:, 0, test_bad[0]] = np.nan
+    return (np.full_like(pool[:, 0], np.nan), test[:, 0]) if pool_bad.any() else (pool[:, 0], test[:, 0])
 
 
 def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) -> Foundation:

@@ -16,12 +16,13 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
+from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
-from shipid.study.prepare import constant_motion, instants_of
+from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
 MOST_TEST_RUNS = 4  # shown over time and in the window browser
@@ -66,11 +67,14 @@ def read_results(folder: Path) -> Results:
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
     paths = {}
+    known: dict[str, Estimates] = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
             predictor = Predictor.load(store.cell_file(folder, row["cell"]))
-            instants = instants_of(plan, predictor.vessel, dataset, test)
             alone = physics.get(row["foundation"])  # None where its numbers depend on the cell
+            instants = instants_of(
+                plan, predictor.vessel, dataset, test, _observed(predictor, known_by_then(plan, dataset), known)
+            )
             paths[row["cell"]] = predictor.predict(instants, alone)
     return Results(
         folder=folder,
@@ -84,6 +88,16 @@ def read_results(folder: Path) -> Results:
         dataset=dataset,
         provenance=read_json(folder / store.PROVENANCE),
     )
+
+
+def _observed(predictor: Predictor, dataset: Dataset, known: dict[str, Estimates]) -> Estimates | None:
+    """What the observer of a predictor knows along the runs; `known` keeps it for predictors of one vessel."""
+    if predictor.vessel is None or predictor.physics.observer is None:
+        return None
+    key = f"{predictor.vessel.digest} {predictor.physics.observer.model_dump_json()}"
+    if key not in known:
+        known[key] = observe(predictor.vessel, dataset, predictor.physics.observer)
+    return known[key]
 
 
 def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:

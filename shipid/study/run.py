@@ -21,6 +21,7 @@ from shipid.data.windows import Windows, covered
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
+from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
@@ -30,6 +31,7 @@ from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Way
 from shipid.study.prepare import (
     Prepared,
+    at_instants,
     describe,
     instants_of,
     limits,
@@ -157,7 +159,7 @@ def _fitted(
 ) -> dict[str, Fitted]:
     """Results of one method for the foundations that it meets."""
     mine = {name: known[name] for name in way.foundations}
-    cases = {name: Case(physics_of(plan, one.foundation.vessel), one.paths) for name, one in mine.items()}
+    cases = {name: Case(_physics(plan, one.foundation), one.paths) for name, one in mine.items()}
     task = Task(
         cases=cases,
         windows=windows,
@@ -170,9 +172,14 @@ def _fitted(
             for name, case in cases.items()
             if case.physics.vessel is not None and way.method.compensates
         },
+        estimates={name: at_instants(prepared.data, windows, one.estimates) for name, one in mine.items()},
         device=device,
     )
     return way.method.fit(task)
+
+
+def _physics(plan: Plan, foundation: Foundation) -> Physics:
+    return physics_of(plan, foundation.vessel, foundation.observer)
 
 
 def _names(one: Prediction, way: Way, test: Windows) -> dict[str, Any]:
@@ -198,7 +205,8 @@ def _judged(plan: Plan, prepared: Prepared, one: Prediction, predictor: Predicto
         share = f"physics diverges on {failed.mean():.1%} of the test windows"
         sentence = share if np.isfinite(one.paths).all() else one.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}
-    paths = predictor.predict(instants_of(plan, predictor.vessel, prepared.data, test), one.test_paths)
+    instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
+    paths = predictor.predict(instants, one.test_paths)
     if not np.isfinite(paths).all():
         return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}
     error = summary(position_error(paths, test.future))
@@ -231,12 +239,12 @@ def _predictor(
     windows: Windows,
 ) -> Predictor:
     return Predictor(
-        physics=physics_of(plan, foundation.vessel),
+        physics=_physics(plan, foundation),
         method=way.kind,
         corrector=corrector,
         limits=limits(windows, prepared.commands),
         commands=plan.study.prediction.commands,
-        path=plan.study.data.path if plan.study.data else "position",
+        causal=plan.causal,
         provenance={
             "study": plan.name,
             "digest": plan.digest,

@@ -1,1 +1,1 @@
-"""From a document to equations: read a vessel, perturb it, assemble its dynamics."""
+"""Vessels: read a document, perturb it, assemble its equations of motion."""

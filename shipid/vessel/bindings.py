@@ -1,4 +1,4 @@
-"""Which number of a document feeds which keyword of the physics, and in what unit."""
+"""Bindings of the numbers of a vessel document to the keyword arguments of the physics functions, with units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ Binding = dict[str, str | list[str] | dict[str, str] | float]
 
 
 def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
-    """Keyword -> dotted path (or list, table of paths, or default value) for one physics function."""
+    """Keyword -> dotted path, list or table of paths, or default value, for one physics function.
+
+    path, block : of the document. declared : parameters of the function.
+    """
     result: Binding = {}
     for parameter in declared:
         name = parameter.name
@@ -40,15 +43,15 @@ def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -
 
 def bindings(document: Document) -> dict[str, Binding]:
     """Dotted path of every block that the equations use -> the binding of its function's keywords."""
-    found = {"inertia": bind("inertia", document["inertia"], parameters(rigid_body))}
-    found["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
+    result = {"inertia": bind("inertia", document["inertia"], parameters(rigid_body))}
+    result["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
     for path, key, block in term_blocks(document):
-        found[path] = bind(path, block, term_parameters(TERMS[key]))
+        result[path] = bind(path, block, term_parameters(TERMS[key]))
         for command, actuator in (block.get("actuator") or {}).items():
             if isinstance(actuator, Mapping):
                 where = f"{path}.actuator.{command}"
-                found[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
-    return found
+                result[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
+    return result
 
 
 def units(document: Document) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""From a vessel to equations: one short place where the terms are summed."""
+"""Equations of motion of a vessel as CasADi functions: the sum of its force terms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ INPUTS = ("state", "memory", "commands", "environment", "parameters")
 LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
 PLANE, HEAVE = (0, 1, 5), 2
 CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
-HELM = "helm"  # prefix of what a helmsman remembers
+HELM = "helm"  # prefix of the states of a helmsman
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
 
@@ -55,7 +55,7 @@ class Dynamics:
 
     rates : (state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt.
     advance : (state, memory, commands, environment, parameters, dt) -> memory after dt, exactly.
-    orders : (state, memory, commands, environment, parameters) -> what each actuator is ordered.
+    orders : (state, memory, commands, environment, parameters) -> order of each actuator.
     state, hidden : names of the entries of the state vector: eta and nu, then the states that terms keep.
     memory, commands, environment, parameters : names of the entries of each other input vector.
     ordered : names of the orders; they are the commands unless a helmsman gives them.
@@ -91,7 +91,7 @@ _compiled: dict[tuple[str, Helmsman | None], Dynamics] = {}
 def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
     """Equations of a vessel; vessels of one structure (all members of a family) share one object.
 
-    With a helmsman, what he is told takes the place of the commands; DocumentError if he orders what is not there.
+    With a helmsman, its inputs take the place of the commands; DocumentError if its orders do not fit the vessel.
     """
     key = (vessel.structure, helmsman)
     if key not in _compiled:
@@ -100,7 +100,7 @@ def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
 
 
 def _symbols(name: str, entries: Sequence[str]) -> tuple[SX, dict[str, SX]]:
-    """A vector and its entries by name."""
+    """A symbolic vector, and its entries by name."""
     vector = SX.sym(name, len(entries))
     return vector, dict(zip(entries, ca.vertsplit(vector) if entries else [], strict=True))
 
@@ -112,20 +112,20 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden(terms)
     ordered = _orders_taken(terms)
-    state, state_of = _symbols("state", [*names, *(name for own in hidden.values() for name in own)])
-    commands, told = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
+    state, state_of = _symbols("state", [*names, *(name for entries in hidden.values() for name in entries)])
+    commands, input_of = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
     environment, weather = _symbols("environment", _environment(vessel))
     parameters, value_of = _symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     bound = bindings(vessel.document)
 
     helm: dict[str, SX] = {name: SX.sym(name) for name in (helmsman.memory if helmsman else ())}
-    orders, helm_after = dict(told), list(helm.values())
+    orders, helm_after = dict(input_of), list(helm.values())
     if helmsman:
         seen = {name: state_of[name] for name in names}
-        orders = _ordered(helmsman, ordered, helmsman.orders(seen, told, helm), vessel)
+        orders = _ordered(helmsman, ordered, helmsman.orders(seen, input_of, helm), vessel)
         if helmsman.advance:
-            after = helmsman.advance(seen, told, helm, dt)
+            after = helmsman.advance(seen, input_of, helm, dt)
             helm_after = [after[name] for name in helm]
     lags, actual, lags_after = _actuators(terms, bound, orders, value_of, dt)
     memory = {**{f"{HELM}.{name}": symbol for name, symbol in helm.items()}, **lags}
@@ -137,7 +137,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     if "current" in vessel.document:
         nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"])
     nu_r = nu - nu_c
-    own = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
+    states_of = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
     available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
 
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
@@ -146,13 +146,13 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     force = _added_mass_force(M_A, nu_r, nu_c_dot, kept) - coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
-    summed, mapped = _sum_of_terms(terms, available, own, bound, value_of)
+    summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
-        _rates(TERMS[key], {**available, "state": own[path]}, _values(bound[path], value_of))
+        _rates(TERMS[key], {**available, "state": states_of[path]}, _values(bound[path], value_of))
         for path, key, _ in terms
-        if path in own
+        if path in states_of
     ]
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
 
@@ -171,7 +171,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         state=names,
         hidden=tuple(name for entries in hidden.values() for name in entries),
         memory={**dict.fromkeys(memory, "-"), **units(lags)},
-        commands=tuple(told),
+        commands=tuple(input_of),
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
         ordered=ordered,
@@ -180,7 +180,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
 
 
 def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[str, ...]:
-    """Commands that terms ask for, by the last name of their block: `port.n`."""
+    """Commands of the terms, named by the last part of the path of the block: `port.n`."""
     return tuple(
         f"{path.rsplit('.', 1)[-1]}.{signal}"
         for path, key, _ in terms
@@ -197,37 +197,37 @@ def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX, kept: tuple[int, ...]) ->
     """
     heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
     plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
-    own = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
-    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - own @ coriolis(plane @ M_A @ plane, plane @ nu_r)
+    turning = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
+    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - turning @ coriolis(plane @ M_A @ plane, plane @ nu_r)
 
 
 def _upright(eta: SX, nu: SX, m: SX) -> SX:
-    """Keep what moves a ship up and down from pushing her along: it acts upright, not along her tilted axis.
+    """Correction (6) of heave forces, which act vertically and not along the inclined body axis.
 
-    The momentum of heave m h turns with the body axes, -m q h in surge and m p h in sway; buoyancy and wave pressure,
-    which drive it, do not. Both cancel to first order. Without this, heave forces on a pitching and rolling ship have a
-    mean along her axes, which the table of mean drift holds already.
+    The momentum of heave m h rotates with the body axes: -m q h in surge and m p h in sway. Buoyancy and wave pressure,
+    which cause it, stay vertical. Both cancel to first order. Without this correction, heave forces on a pitching and
+    rolling ship have a mean along the body axes, which the table of mean drift already includes.
     """
     h = heave_rate(eta, nu)
     return vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)
 
 
 def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
-    """Path -> names of the states that a term keeps, `path.name`."""
+    """Path of each term with additional states -> their names, `path.name`."""
     kept = ((path, TERMS[key].states, block) for path, key, block in terms)
     return {path: [f"{path}.{name}" for name in states(block)] for path, states, block in kept if states}
 
 
 def _rates(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
-    """Rates of a term's own states."""
+    """d(state)/dt of the additional states of a term."""
     assert term.rates is not None
-    own = {parameter.name for parameter in declared(term.rates)}
-    kept = {keyword: value for keyword, value in keywords.items() if keyword in own}
+    taken = {parameter.name for parameter in declared(term.rates)}
+    kept = {keyword: value for keyword, value in keywords.items() if keyword in taken}
     return SX(term.rates(*(available[name] for name in signals(term.rates)), **kept))
 
 
 def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel) -> dict[str, SX]:
-    """Every order by name, from the helmsman's by name or by signal."""
+    """Order of each command, from the helmsman's orders by command or by signal."""
     names = {name for name in given if name in ordered or any(name == o.rsplit(".", 1)[-1] for o in ordered)}
     unknown = sorted(set(given) - names)
     result = {name: given.get(name, given.get(name.rsplit(".", 1)[-1])) for name in ordered}
@@ -241,19 +241,22 @@ def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any
 def _sum_of_terms(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
-    own_states: Mapping[str, SX],
+    states_of: Mapping[str, SX],
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
 ) -> tuple[SX, list[tuple[str, SX, SX, dict[str, int], np.ndarray | None]]]:
-    """Wrench (6) of all terms; and, of what is not written out, (path, component, its wrench, widths, arrays)."""
+    """Wrench (6) of all terms that are written out, and the sums over components that are to be mapped.
+
+    Each of the latter is (path, component symbol, wrench of one component, widths, arrays).
+    """
     total, mapped = SX(6, 1), []
     given = _given(terms, available, bound, value_of)
     for path, key, block in terms:
         term = TERMS[key]
-        own = _own_commands(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
-        if path in own_states:
-            own["state"] = own_states[path]
-        wrench = partial(_wrench, term, {**available, **own}, _values(bound[path], value_of))
+        extra = _commands_of(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
+        if path in states_of:
+            extra["state"] = states_of[path]
+        wrench = partial(_wrench, term, {**available, **extra}, _values(bound[path], value_of))
         widths, arrays = _components(term, block)
         if arrays is not None and len(arrays) <= UNROLL_UP_TO:
             for row in arrays:
@@ -265,8 +268,8 @@ def _sum_of_terms(
     return total, mapped
 
 
-def _own_commands(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
-    """Commands of one component by signal: what its actuators have reached."""
+def _commands_of(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
+    """Commands of one component by signal: the values that its actuators have reached."""
     component = path.rsplit(".", 1)[-1]
     return {name: available[f"{component}.{name}"] for name in named("command") if f"{component}.{name}" in available}
 
@@ -277,15 +280,15 @@ def _given(
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
 ) -> dict[str, SX]:
-    """Signals that components give to those behind them: `propeller.wash`."""
-    found = {}
+    """Signals from a component to the one behind it, by name: `propeller.wash`."""
+    result = {}
     for path, key, _ in terms:
         for name, function in TERMS[key].gives.items():
-            here = {**available, **_own_commands(path, available)}
+            here = {**available, **_commands_of(path, available)}
             taken = {parameter.name for parameter in declared(function)}
-            own = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
-            found[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **own)
-    return found
+            kept = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
+            result[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **kept)
+    return result
 
 
 def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
@@ -303,16 +306,16 @@ def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], n
 
 
 def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> Any:
-    """One term on its signals, found by name; `entries` are those of one component."""
+    """Wrench of one term for its signals, selected by name; `entries` are those of one component."""
     here = {**available, **entries}
     only = {parameter.name for parameter in declared(term.rates)} if term.rates else set()
     only -= {parameter.name for parameter in declared(term.function)}
-    own = {keyword: value for keyword, value in keywords.items() if keyword not in only}
-    return term.function(*(here[name] for name in signals(term.function)), **own)
+    kept = {keyword: value for keyword, value in keywords.items() if keyword not in only}
+    return term.function(*(here[name] for name in signals(term.function)), **kept)
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:
-    """Environment channels that the terms of a vessel ask for."""
+    """Environment channels that the terms of a vessel need."""
     wanted = {name for _, key, _ in term_blocks(vessel.document) for name in signals(TERMS[key].function)}
     if "current" in vessel.document:
         wanted |= {"V_c", "beta_c"}
@@ -326,7 +329,7 @@ def _actuators(
     value_of: Mapping[str, SX],
     dt: SX,
 ) -> tuple[dict[str, SX], dict[str, SX], list[SX]]:
-    """Memory states of lagged orders, the signals that the terms then see, and the states after dt."""
+    """Actuator states, the commands after the actuators (inputs of the terms), and the actuator states after dt."""
     memory: dict[str, SX] = {}
     actual = dict(orders)
     advanced = []
@@ -344,7 +347,7 @@ def _actuators(
 
 
 def _values(binding: Binding, value_of: Mapping[str, SX]) -> dict[str, Any]:
-    """Keywords of a physics function, paths replaced by the symbols that stand for their values."""
+    """Keyword arguments of a physics function, with paths replaced by their symbols."""
 
     def resolve(target: Any) -> Any:
         if isinstance(target, str):

@@ -1,4 +1,4 @@
-"""From a document to a vessel: every number checked and addressed by its dotted path."""
+"""Reads and checks vessel documents; every number has a dotted path."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Vessel:
         return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
-        """The same vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
+        """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
             try:
@@ -112,7 +112,7 @@ def _load(file: Path, above: tuple[Path, ...]) -> Vessel:
 
 
 def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
-    """A document with what it `extends` underneath and the tables that it names read in."""
+    """A document merged over the one that it `extends`, with its CSV tables read in."""
     document = _with_tables(document, file)
     if "extends" not in document:
         return document
@@ -123,16 +123,16 @@ def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
 
 
 def _with_tables(document: Document, file: Path) -> Document:
-    """Named tables as columns: what a document says does not change with a file that it names."""
-    found = {}
+    """The document with the CSV files of tables replaced by their columns, so that its digest covers their content."""
+    tables = {}
     for path, key, block in (*term_blocks(document), *term_blocks(document, off=True)):
         if key in TERMS and isinstance(block.get(TABLE), str):
-            found[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
-    return documents.replace(document, found) if found else dict(document)
+            tables[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
+    return documents.replace(document, tables) if tables else dict(document)
 
 
 def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
-    """Columns of a CSV file with a header; lines that begin with # are words."""
+    """Columns of a CSV file with a header; lines that begin with # are comments."""
     import pandas as pd  # most vessels have no table, and it takes its time
 
     try:
@@ -153,14 +153,14 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
 
 
 def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
-    """File of the vessel that a document stands on."""
+    """File of the vessel that a document extends or patches; DocumentError for a circular reference."""
     try:
-        found = documents.find(str(name), "models", file.parent)
+        other = documents.find(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-    if found.resolve() in (*above, file.resolve()):
-        raise DocumentError(f"{name!r} stands on this very document: name a vessel that does not", file=file, path=path)
-    return found
+    if other.resolve() in (*above, file.resolve()):
+        raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
+    return other
 
 
 class Patch(BaseModel):
@@ -191,7 +191,7 @@ def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
 
 
 def check_vessel(document: Document, file: str) -> Vessel:
-    """Check a whole document; the first fault raises DocumentError with file, dotted path and remedy."""
+    """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
     documents.parse(vessel_model(), document, file)
@@ -213,7 +213,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
 
 
 def _check_numbers(vessel: Vessel) -> None:
-    """What the values of numbers can break where all names are right."""
+    """Checks of the values of a document whose names are valid."""
     for path, _, block in term_blocks(vessel.document):
         _check_order(path, block, vessel.file)
     _check_inertia(vessel)
@@ -221,7 +221,7 @@ def _check_numbers(vessel: Vessel) -> None:
 
 
 def _check_behind(vessel: Vessel) -> None:
-    """Refuse a component behind another that is not there, is off or has nothing to give it."""
+    """DocumentError for a component behind one that is missing, off, or does not provide the needed signal."""
     terms = list(term_blocks(vessel.document))
     for path, key, block in terms:
         for name in behind(TERMS[key]):
@@ -232,7 +232,7 @@ def _check_behind(vessel: Vessel) -> None:
 
 
 def _check_sense(vessel: Vessel) -> None:
-    """Refuse what no ship can be: added mass of the wrong sign, a stern ahead of the bow, tonnes for kilograms."""
+    """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow, tonnes for kg."""
     values = vessel.parameters
     for path, value in values.items():
         group, _, name = path.rpartition(".")
@@ -251,7 +251,7 @@ def _check_sense(vessel: Vessel) -> None:
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:
-    """Check a block against its own kind, so that complaints carry the path and the names that it has in the file."""
+    """Check a block by the model of its kind, so that errors have the path and names of the file."""
     name = path.partition(".")[2]
     if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
         raise DocumentError(f"{name!r} is no name for a {group}: use letters, digits, _ and -", file=file, path=group)
@@ -273,12 +273,12 @@ def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
     lists = {key: value for key, value in block.items() if isinstance(value, list)}
     if len({len(value) for value in lists.values()}) > 1:
-        found = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
-        raise DocumentError(f"the columns of a table must be equally long, found {found}", file=file, path=path)
+        counts = ", ".join(f"{key} {len(value)}" for key, value in lists.items())
+        raise DocumentError(f"the columns of a table must be equally long, not {counts}", file=file, path=path)
 
 
 def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tuple[str, ...], file: str) -> None:
-    """Refuse a table that is no grid of frequencies and equally spaced headings over the half circle."""
+    """DocumentError for a table that is no grid of frequencies and equally spaced headings from 0 to 180 deg."""
     missing = next((name for name in columns if name not in table), None)
     if missing is not None:
         raise DocumentError(f"has no column {missing!r}: {choices(missing, table)}", file=file, path=path)
@@ -300,20 +300,20 @@ def _check_units(vessel: Vessel) -> None:
             documents.get(vessel.document, path)
         except KeyError:
             group, name = path.rsplit(".", 1)
-            message = f"missing: a term needs {name}, here or in its own block"
+            message = f"missing: a term needs {name}, here or in the block of the term"
             raise DocumentError(message, file=vessel.file, path=f"{group}.{name}") from None
 
 
 def _check_inertia(vessel: Vessel) -> None:
-    """Refuse mass plus added mass that is not positive definite in the vessel's own degrees of freedom."""
+    """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
     bound, value_of = bindings(vessel.document), vessel.parameters
     known: dict[str, dict[str, Any]] = {
         block: {key: value_of[target] if isinstance(target, str) else target for key, target in bound[block].items()}
         for block in ("inertia", "added_mass")
     }
     M = rigid_body(**known["inertia"]) + added_mass(**known["added_mass"])
-    own = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
-    if np.linalg.eigvalsh(own + own.T)[0] <= 0:
+    mass = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
+    if np.linalg.eigvalsh(mass + mass.T)[0] <= 0:
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )
@@ -321,7 +321,7 @@ def _check_inertia(vessel: Vessel) -> None:
 
 
 def _without_words(document: Document) -> Document:
-    """The document without names and sources, which change nothing in the equations."""
+    """The document without names and sources, which do not influence the equations."""
     return {
         key: _without_words(value) if isinstance(value, dict) else value
         for key, value in document.items()

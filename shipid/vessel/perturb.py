@@ -1,4 +1,4 @@
-"""Families of degraded vessels: a variant is a named patch on a digested base, never a copied file.
+"""Families of perturbed vessels: a variant is a named patch on a base vessel with a given digest.
 
 Each draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a family never
 changes another draw.
@@ -165,6 +165,9 @@ class Family(BaseModel):
     seed: int = 0
     description: str | None = None
     perturb: list[Perturbation] = []
+    observer: dict[str, Any] | None = Field(
+        default=None, description="an observer filters the start and adds slow forces: an [observer] block"
+    )
     identify: dict[str, Any] | None = Field(
         default=None, description="numbers identified from the training runs of each batch: an [identify] block"
     )
@@ -229,7 +232,7 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         where = f"family.{list(by_name).index(family.name)}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
-        base, perturb, identify = family.base, family.perturb, family.identify
+        base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = choices(family.extends, by_name)
@@ -237,9 +240,11 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
             parent = written_out(by_name[family.extends], (*above, family.name))
             base, perturb = base or parent.base, [*parent.perturb, *perturb]
             identify = parent.identify if identify is None else identify
+            observer = parent.observer if observer is None else observer
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        return family.model_copy(update={"base": base, "perturb": perturb, "identify": identify, "extends": None})
+        changes = {"base": base, "perturb": perturb, "identify": identify, "observer": observer, "extends": None}
+        return family.model_copy(update=changes)
 
     return [written_out(family, ()) for family in families]
 
@@ -275,20 +280,20 @@ class _Change:
 
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
-    original, times, found = base.parameters, dict[str, int](), []
+    original, times, result = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb):
         where = f"family {family.name!r}.perturb.{index}"
         for key, argument in block.given.items():
             rule = RULES[key]
             if rule.places is not None:
-                found.append(_Change(rule, rule.places(argument, base, file, f"{where}.{key}"), {}))
+                result.append(_Change(rule, rule.places(argument, base, file, f"{where}.{key}"), {}))
                 continue
             paths = select(block.parameters, original, file, f"{where}.parameters")
             keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
             times.update({name: times.get(name, -1) + 1 for name in keys.values()})
             counted = {path: (name, times[name]) for path, name in keys.items()}
-            found.append(_Change(rule, dict.fromkeys(paths, argument), counted))
-    return found
+            result.append(_Change(rule, dict.fromkeys(paths, argument), counted))
+    return result
 
 
 def _draw(
@@ -312,7 +317,7 @@ def _draw(
 
 
 def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float], file: str | Path | None) -> None:
-    """Refuse a member that is no vessel, such as one of negative mass."""
+    """DocumentError for a member that is no valid vessel, such as one of negative mass."""
     try:
         base.with_values(values)
     except DocumentError as error:
@@ -327,7 +332,7 @@ def uniform(*key: Any) -> float:
 
 
 def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
-    """Paths that the patterns select, each once, in the vessel's order; a pattern that selects nothing is an error."""
+    """Paths that the patterns select, each once, in the order of `paths`; DocumentError if a pattern has no match."""
     chosen: set[str] = set()
     for pattern in patterns:
         parsed = _CONDITION.fullmatch(pattern)
@@ -337,14 +342,14 @@ def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where
                 file=file,
                 path=where,
             )
-        found = documents.match(parsed["pattern"], list(paths))
+        matching = documents.match(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])
-            orders = {path: order_of(path) for path in found}
-            found = [path for path, order in orders.items() if order is not None and relation(order, limit)]
-        if not found:
+            orders = {path: order_of(path) for path in matching}
+            matching = [path for path, order in orders.items() if order is not None and relation(order, limit)]
+        if not matching:
             raise DocumentError(f"{pattern!r} selects nothing: {choices(pattern, paths)}", file=file, path=where)
-        chosen.update(found)
+        chosen.update(matching)
     return [path for path in paths if path in chosen]
 
 

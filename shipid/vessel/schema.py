@@ -1,4 +1,4 @@
-"""What a vessel document may say, read off the signatures of the physics: no second list to keep in step."""
+"""Schema of vessel documents, derived from the signatures of the physics functions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Parameter:
 def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     """Parameters of a physics function, in order, from its keyword-only arguments and `**` table."""
     hints = get_type_hints(function, include_extras=True)
-    found = []
+    result = []
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
             continue
@@ -61,17 +61,17 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
         elif isinstance(unit, Grammar):
             kind = "table"
         default = None if argument.default is argument.empty else float(argument.default)
-        found.append(Parameter(name, unit, kind, POSITIVE in marks, default))
-    return tuple(found)
+        result.append(Parameter(name, unit, kind, POSITIVE in marks, default))
+    return tuple(result)
 
 
 @cache
 def term_parameters(term: Term) -> tuple[Parameter, ...]:
     """Parameters of a term: of its function, then those that only its rates take."""
-    own = parameters(term.function)
-    names = {parameter.name for parameter in own}
+    declared = parameters(term.function)
+    names = {parameter.name for parameter in declared}
     more = parameters(term.rates) if term.rates else ()
-    return own + tuple(parameter for parameter in more if parameter.name not in names)
+    return declared + tuple(parameter for parameter in more if parameter.name not in names)
 
 
 @cache
@@ -102,7 +102,7 @@ TABLE = "table"  # the structural key that names a file of columns; every other 
 
 
 class Block(BaseModel):
-    """Part of a vessel document: nothing but what is declared, and a word on where the numbers come from."""
+    """Base model of a block of a vessel document: only declared keys, and `source`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
     source: str | None = Field(default=None, description="where the numbers come from")
@@ -190,7 +190,7 @@ def term_model(key: str) -> type[Block]:
         fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
     if behind(term):
-        extra[BEHIND] = (Annotated[str, Field(description="the thruster in whose wash it stands")], ...)
+        extra[BEHIND] = (Annotated[str, Field(description="the propeller in whose slipstream it is")], ...)
     return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 

@@ -1,6 +1,6 @@
-"""A first guess of a vessel from its main particulars, by regression formulae; every value says which one.
+"""First estimate of a vessel from its main particulars, by regression formulae; each value names its formula.
 
-The result is a document like any other, to be replaced value by value as better numbers come.
+The result is a normal vessel document. Replace its values when better ones are known.
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
     )
     head = [
         "# A FIRST GUESS from main particulars by regression formulae: nothing is measured. Replace what you know.",
-        f"# At {given.service:.3g} m/s she needs {60 * n:.4g} rpm and is {verdict}.",
+        f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
     return FirstGuess("\n".join([*head, body]), vessel, n, growth)
 
 
 def _check(given: Particulars) -> None:
-    """Refuse what lies outside the ships behind the formulae."""
+    """ShipidError for particulars outside the range of the formulae."""
     if given.propulsor not in PROPULSORS:
         raise ShipidError(f"propulsor {given.propulsor!r}: {choices(given.propulsor, PROPULSORS)}")
     if given.ship_type not in WIND:
@@ -122,7 +122,7 @@ def _check(given: Particulars) -> None:
 
 
 def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
-    """What, its value, least and most; sizes before what is worked out from them."""
+    """Name, value, lower and upper limit of each quantity; sizes before the ratios derived from them."""
     yield "length [m]", given.length, 1.0, 450.0
     yield "beam [m]", given.beam, 0.1, 80.0
     yield "draught [m]", given.draught, 0.02, 30.0
@@ -212,14 +212,14 @@ def wind(given: Particulars) -> Values:
     """Blendermann's coefficients of the type of ship; areas guessed where not given."""
     B, L_oa = given.beam, 1.05 * given.length
     names = ("C_Dt", "C_Dl_bow", "C_Dl_stern", "delta", "kappa")
-    found = {
+    coefficients = {
         name: Value(number, "-", f"Blendermann (1994), {given.ship_type}")
         for name, number in zip(names, WIND[given.ship_type], strict=True)
     }
     frontal, lateral = given.frontal_area, given.lateral_area
     A_F = Value(0.8 * B**2, "m^2", "0.8 B^2: a guess") if frontal is None else Value(frontal, "m^2", "given")
     A_L = Value(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess") if lateral is None else Value(lateral, "m^2", "given")
-    return found | {
+    return coefficients | {
         "A_FW": A_F,
         "A_LW": A_L,
         "L_oa": Value(L_oa, "m", "1.05 L: a guess"),
@@ -229,7 +229,7 @@ def wind(given: Particulars) -> Values:
 
 
 def waves() -> Values:
-    """Wave resistance: no formula here, but a place for what trials at speed tell."""
+    """Wave resistance: 0 by default; to be identified from trials at speed."""
     note = "wave resistance grows with about the sixth power of speed: 0 until it is measured or identified"
     return {"R_4": Value(0.0, "kg m^-5 s^4", note)}
 
@@ -288,7 +288,7 @@ def rudder(given: Particulars) -> Values:
 def azimuth(given: Particulars, side: int) -> Values:
     """One of two azimuth units at the stern; side -1 is port."""
     unit = get(read(bundled("models")["gunnerus-28.9"]), "thruster.port")
-    own = {
+    placed = {
         "x": Value(-0.46 * given.length, "m", "-0.46 L: a guess"),
         "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess"),
         "z": Value(0.75 * given.draught, "m", "0.75 T: a guess"),
@@ -296,12 +296,12 @@ def azimuth(given: Particulars, side: int) -> Values:
     }
     copied: Values = {}
     for name, number in unit.items():
-        if isinstance(number, float) and name not in own:
+        if isinstance(number, float) and name not in placed:
             copied[name] = Value(number, "-", "unit of R/V Gunnerus")
         elif isinstance(number, Mapping):
             copied |= {f'{name}."{key}"': Value(v, "-", "unit of R/V Gunnerus") for key, v in number.items()}
     return (
-        own
+        placed
         | copied
         | {
             "actuator.alpha.T": Value(0.5, "s", "a guess"),
@@ -322,7 +322,7 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
     }
     yield f"name = {_quoted(name)}"
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
-    yield 'source = "shipid vessel new: the formula of each number stands beside it"\ndof = 3\n'
+    yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
     yield from _block("particulars", main)
     yield from _block("constants", {"rho": Value(RHO, "kg m^-3", "sea"), "rho_a": Value(RHO_AIR, "kg m^-3", "air")})
     yield from _block("inertia", inertia(given))
@@ -359,13 +359,13 @@ def _accelerations(vessel: Vessel) -> Callable[[tuple[float, float, float], floa
     model = dynamics(vessel)
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
 
-    def found(nu: tuple[float, float, float], n: float) -> np.ndarray:
+    def accelerations(nu: tuple[float, float, float], n: float) -> np.ndarray:
         commands = [n if is_shaft(name) else neutral(name) for name in model.commands]
         memory = [n if is_shaft(name) else neutral(name) for name in model.memory]
         rates: Any = model.rates([0.0, 0.0, 0.0, *nu], memory, commands, calm, values, np.zeros(3))
         return np.array(rates).ravel()[3:]
 
-    return found
+    return accelerations
 
 
 def _shaft(vessel: Vessel, speed: float) -> float:

@@ -16,8 +16,8 @@ from shipid.engine.rollout import rollout
 from shipid.metrics import position_error
 from shipid.observer import MEASURED, Observer, at_windows, bank, observe, observed_paths
 from shipid.simulation.excitation import aprbs
+from shipid.simulation.log import logged
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import logged
 from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel

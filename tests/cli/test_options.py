@@ -14,9 +14,9 @@ def test_changes_are_toml_or_text() -> None:
     from shipid.cli.options import parsed
 
     assert parsed(None) == {}
-    assert parsed(["grid.N_D=[10, 30]", "recipe.kind=paper", "a=1e-3"]) == {
+    assert parsed(["grid.N_D=[10, 30]", "method.0.kind=alone", "a=1e-3"]) == {
         "grid.N_D": [10, 30],
-        "recipe.kind": "paper",
+        "method.0.kind": "alone",
         "a": 1e-3,
     }
     for wrong in ("grid.N_D", "=3"):

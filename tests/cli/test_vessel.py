@@ -48,7 +48,7 @@ def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
     assert "First guess, 33.9 m" in said("vessel", "show", file)
     written = file.read_text()
     again = shell(*order)
-    assert (again.returncode, again.stderr) == (1, f"error: {file}: is there already: choose another name\n")
+    assert (again.returncode, again.stderr) == (1, f"error: {file}: exists already: choose another name\n")
     assert file.read_text() == written
 
 

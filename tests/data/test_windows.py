@@ -17,12 +17,12 @@ from shipid.data.windows import (
     from_frame,
     nested_runs,
     part_folds,
-    planned_means,
     split_folds,
     split_runs,
     to_frame,
 )
 from shipid.errors import DataError
+from shipid.hybrid.features import planned_means
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 60.5, 0.5)
@@ -311,3 +311,48 @@ def test_parts_of_one_run_share_no_moment(length: int, horizon: int) -> None:
         span = float(seen.t.min()), float(seen.end.max())
         assert len(training)
         assert not windows.select(training).touching([span]).any()
+
+
+# Windows with a past.
+
+
+@pytest.mark.parametrize("path", ["position", "velocity"])
+def test_a_past_is_in_the_frame_of_the_instant(path: str) -> None:
+    """In a steady turn the past is the future with time reversed."""
+    u, v, r = 4.0, -0.5, 0.05
+    windows = cut_windows(as_dataset(turning(T)), horizon=15, path=path, past=6)  # type: ignore[arg-type]
+    assert windows.t[0] == T[0] + 6.0
+    assert windows.num_past == 6
+    assert {values.shape for values in windows.past.values()} == {(6, len(windows))}
+    turn = r * np.arange(-6, 0)[:, None]
+    x, y = (u * np.sin(turn) - v * (1 - np.cos(turn))) / r, (u * (1 - np.cos(turn)) + v * np.sin(turn)) / r
+    np.testing.assert_allclose(
+        windows.past["x"], np.broadcast_to(x, (6, len(windows))), atol=60 * (0.05 * 0.5) ** 2 / 12
+    )
+    np.testing.assert_allclose(
+        windows.past["y"], np.broadcast_to(y, (6, len(windows))), atol=60 * (0.05 * 0.5) ** 2 / 12
+    )
+    np.testing.assert_allclose(
+        windows.states["psi"] - windows.columns["psi"], r * np.arange(1, 16)[:, None] + 0 * windows.t
+    )
+    for name, value in (("u", u), ("v", v), ("r", r)):
+        np.testing.assert_allclose(windows.states[name], value)
+
+
+def test_spans_and_touching_count_the_past() -> None:
+    windows = cut_windows(as_dataset(turning(T)), horizon=10, past=5)
+    assert windows.spans == {"a": (0.0, 60.0)}
+    assert windows.t[windows.touching([(20.0, 25.0)])].tolist() == list(range(10, 31))
+    assert covered(windows.select([0])) == 15.0
+    for training, validation in part_folds(windows):
+        seen = windows.select(validation)
+        assert not windows.select(training).touching([(seen.begin.min(), seen.end.max())]).any()
+
+
+def test_folds_of_windows_with_a_past_share_no_moment() -> None:
+    frames = [turning(np.arange(start, start + 40.25, 0.5)) for start in (0.0, 30.0, 75.0)]
+    windows = cut_windows(as_dataset(*frames), horizon=10, past=8)
+    training, validation = fold_masks(windows, ["b"])
+    one, other = windows.select(training), windows.select(validation)
+    assert ((one.end[:, None] < other.begin) | (one.begin[:, None] > other.end)).all()
+    assert set(one.run) == {"a", "c"}

@@ -150,7 +150,7 @@ def test_auto_takes_the_compiled_sweep_and_else_pytorch(draw_inputs: Draw, monke
         ({"engine": "casadi"}, "no gradient: use 'native' or 'torch'"),
         ({"names": ("hull.learned.w_u.9",)}, r"has no parameter 'hull\.learned\.w_u\.9'.*hull\.learned\.w_u"),
         ({"keep": ("north", "depth")}, "no channel 'depth'"),
-        ({"loss": lambda path: (path.sum(), path)}, r"shapes \(5,\) and \(5, 5, 4\), found \(\) and"),
+        ({"loss": lambda path: (path.sum(), path)}, r"shapes \(5,\) and \(5, 5, 4\), not \(\) and"),
     ],
 )
 def test_what_cannot_be_is_refused(draw_inputs: Draw, changes: dict[str, Any], message: str) -> None:

@@ -9,11 +9,11 @@ from shipid.hybrid.compensator import (
     Compensator,
     Network,
     Normaliser,
-    choose_features,
-    feature_table,
     flatten,
     unflatten,
 )
+from shipid.hybrid.features import Inputs, choose_features, feature_table
+from tests.hybrid.tasks import compensation
 
 COMMANDS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
 
@@ -36,58 +36,13 @@ def compensator(columns):
         layers = tuple((rng.normal(size=(i, o)), rng.normal(size=o)) for i, o in ((7, 5), (5, 5), (5, 8)))
         seen = {name: values[fold::2] for name, values in table.items()}
         networks.append(Network(features, Normaliser.fit(seen, tuple(features)), rng.normal(size=(6, 4)), layers))
-    return Compensator(COMMANDS, tuple(networks), {"layers": 2, "units": 5, "learning_rate": 0.01})
-
-
-def test_columns_of_which_none_varies_are_refused():
-    with pytest.raises(DataError, match="none of u, v varies"):
-        choose_features({"u": np.full(9, 2.0), "v": np.zeros(9)})
-
-
-def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):
-    table = feature_table(columns, COMMANDS)
-    assert list(table) == ["u", "v", "r", *COMMANDS, "u_rw", "v_rw"]
-    chosen = choose_features(table)
-    assert list(chosen) == ["u", "v", "r", "port.n", "port.alpha", "u_rw", "v_rw"]
-    assert chosen["port.n"] == ("port.n", "starboard.n")
-
-
-def test_different_azimuths_leave_the_nine_inputs_of_12(columns):
-    columns["starboard.n"][3] += 0.01
-    columns["starboard.alpha"][7] -= 0.01
-    assert len(choose_features(feature_table(columns, COMMANDS))) == 9
-
-
-def test_constant_columns_are_dropped_and_motions_never_merged(columns):
-    columns["port.n"][:] = 2.4
-    columns["v"] = columns["u"].copy()
-    chosen = choose_features(feature_table(columns, COMMANDS[:2]))
-    assert list(chosen) == ["u", "v", "r", "port.alpha", "u_rw", "v_rw"]
-
-
-def test_wind_that_was_not_measured_is_no_input(columns):
-    del columns["beta_w"]
-    assert list(feature_table(columns, ())) == ["u", "v", "r"]
-
-
-def test_relative_wind_by_hand():
-    columns = {name: np.array([value]) for name, value in {"u": 4.0, "v": 0.5, "r": 0.0, "V_w": 6.0}.items()}
-    head = feature_table(columns | {"psi": np.zeros(1), "beta_w": np.array([np.pi])}, ())
-    assert (head["u_rw"][0], head["v_rw"][0]) == pytest.approx((10.0, 0.5))  # wind towards the stern
-    beam = feature_table(columns | {"psi": np.array([1.0]), "beta_w": np.array([1.0 + np.pi / 2])}, ())
-    assert (beam["u_rw"][0], beam["v_rw"][0]) == pytest.approx((4.0, -5.5))  # wind towards starboard
-
-
-def test_a_missing_column_is_named(columns):
-    del columns["starboard.n"]
-    with pytest.raises(DataError, match=r"starboard\.n"):
-        feature_table(columns, COMMANDS)
+    return Compensator(Inputs(COMMANDS), tuple(networks), {"layers": 2, "units": 5, "learning_rate": 0.01})
 
 
 def test_a_compensator_trained_with_wind_asks_for_wind(compensator, columns):
     del columns["V_w"]
     with pytest.raises(DataError, match="u_rw"):
-        compensator.predict(columns)
+        compensation(compensator, columns)
 
 
 def test_the_normaliser_centres_and_scales_by_name(columns):
@@ -109,12 +64,12 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
             h = h.tanh() if i < 2 else h
         x, y = h[:, :4].numpy().T, h[:, 4:].numpy().T  # (12): all dx, then all dy
         expected.append(np.stack([network.basis @ x, network.basis @ y], axis=-1))
-    np.testing.assert_allclose(compensator.predict(columns), np.mean(expected, axis=0), atol=1e-10)
+    np.testing.assert_allclose(compensation(compensator, columns), np.mean(expected, axis=0), atol=1e-10)
 
 
 def test_columns_are_matched_by_name(compensator, columns):
     shuffled = dict(reversed(columns.items()))
-    np.testing.assert_array_equal(compensator.predict(shuffled), compensator.predict(columns))
+    np.testing.assert_array_equal(compensation(compensator, shuffled), compensation(compensator, columns))
 
 
 def test_paths_survive_the_order_of_12():
@@ -129,7 +84,7 @@ def test_it_survives_json_and_arrays(compensator, columns, tmp_path):
     np.savez(tmp_path / "arrays.npz", **compensator.arrays())
     with np.load(tmp_path / "arrays.npz", allow_pickle=False) as stored:
         again = Compensator.from_arrays(header, dict(stored))
-    np.testing.assert_array_equal(again.predict(columns), compensator.predict(columns))
+    np.testing.assert_array_equal(compensation(again, columns), compensation(compensator, columns))
     assert again.header() == compensator.header()
 
 

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 import torch
 
-from shipid.hybrid.compensator import Compensator, choose_features
-from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.features import Inputs, choose_features
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import _blocks, _decompose, _left_out, _Part, _reflection, smooth_basis
-from shipid.hybrid.tuning import tune
+from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
 TWINS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
 RUDDER = ("engine.n", "rudder.delta")
-SMALL = Recipe.preset("fast", trials=6, units=24, terms=4)
+SMALL = PathDrawn(trials=6, units=24, terms=4)
 STEPS, LENGTHS = 9, (18, 25, 18, 30, 11, 18)  # windows of the runs
 ALL = np.arange(sum(LENGTHS))
 ENDS = np.cumsum(LENGTHS)
@@ -65,7 +66,7 @@ def tuned(columns, targets, setup, *, commands=TWINS, folds=FOLDS, seed=3):
 
 
 def predicted(found, columns):
-    return {key: one.compensator.predict(columns) for key, one in found.items()}
+    return {key: compensation(one.corrector, columns) for key, one in found.items()}
 
 
 # What is left out.
@@ -138,7 +139,7 @@ def wind(columns):
 def test_the_value_of_a_trial_is_the_error_on_windows_it_did_not_see(columns, targets, mirror, pairs):
     setup = recipe(trials=1, mirror=mirror, ridge=0.01)
     for key, one in tuned(columns, targets, setup, folds=pairs).items():
-        (row,), (network,) = one.trials, one.compensator.networks
+        (row,), (network,) = one.trials, one.corrector.networks
         assert row["params"]["mirror"] == mirror
         expected = refitted(network, mirror, 0.01, columns, targets[key], pairs)
         assert row["value"] == pytest.approx(expected, rel=1e-8)
@@ -156,17 +157,17 @@ def test_the_compensator_is_the_mean_of_the_best_trials(columns, targets):
     one = tuned(columns, targets, recipe(averaged=4))["rough"]
     assert [row["number"] for row in one.trials] == list(range(6))
     assert {row["state"] for row in one.trials} == {"complete"}
-    assert all(set(row["params"]) == {*SMALL.SEARCHED, "mirror"} for row in one.trials)
+    assert all(set(row["params"]) == set(SMALL.varied()) for row in one.trials)
     assert all(row["epochs"] == 0 and row["seconds"] > 0 for row in one.trials)
     best = sorted(one.trials, key=lambda row: row["value"])
-    assert one.compensator.hyperparameters == best[0]["params"]
-    assert len(one.compensator.networks) == 4
-    for network, row in zip(one.compensator.networks, best, strict=False):
+    assert one.corrector.hyperparameters == best[0]["params"]
+    assert len(one.corrector.networks) == 4
+    for network, row in zip(one.corrector.networks, best, strict=False):
         mirror, ridge = row["params"]["mirror"], row["params"]["ridge"]
         assert refitted(network, mirror, ridge, columns, targets["rough"], FOLDS) == pytest.approx(row["value"])
-    apart = [Compensator(TWINS, (network,), {}).predict(columns) for network in one.compensator.networks]
-    np.testing.assert_allclose(one.compensator.predict(columns), np.mean(apart, axis=0), atol=1e-12)
-    assert len(tuned(columns, targets, recipe(averaged=9))["rough"].compensator.networks) == 6
+    apart = [compensation(Compensator(Inputs(TWINS), (network,), {}), columns) for network in one.corrector.networks]
+    np.testing.assert_allclose(compensation(one.corrector, columns), np.mean(apart, axis=0), atol=1e-12)
+    assert len(tuned(columns, targets, recipe(averaged=9))["rough"].corrector.networks) == 6
 
 
 # Port and starboard.
@@ -178,11 +179,11 @@ def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     paths = np.random.default_rng(2).normal(size=(STEPS, len(ALL), 2))
     one = tuned(seen, {"any": paths}, recipe(mirror=1.0), commands=commands)["any"]
     assert {row["params"]["mirror"] for row in one.trials} == {1.0}
-    here, there = one.compensator.predict(new), one.compensator.predict(mirrored(new))
+    here, there = compensation(one.corrector, new), compensation(one.corrector, mirrored(new))
     assert np.abs(here).max() > 0.01
     np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-12)
-    plain = tuned(seen, {"any": paths}, recipe(mirror=0.0), commands=commands)["any"].compensator
-    assert np.abs(plain.predict(mirrored(new)) - plain.predict(new) * [1.0, -1.0]).max() > 0.01
+    plain = tuned(seen, {"any": paths}, recipe(mirror=0.0), commands=commands)["any"].corrector
+    assert np.abs(compensation(plain, mirrored(new)) - compensation(plain, new) * [1.0, -1.0]).max() > 0.01
 
 
 def as_one(columns):
@@ -206,10 +207,12 @@ def toe_in(columns):
 def test_inputs_that_were_merged_or_dropped_are_mirrored_too(columns, act):
     kept = act(columns)
     paths = np.random.default_rng(2).normal(size=(STEPS, len(ALL), 2))
-    one = tuned(columns, {"any": paths}, recipe(mirror=1.0))["any"].compensator
+    one = tuned(columns, {"any": paths}, recipe(mirror=1.0))["any"].corrector
     assert list(one.networks[0].features) == ["u", "v", "r", *kept, "u_rw", "v_rw"]
     assert one.hyperparameters["mirror"] == 1.0
-    np.testing.assert_allclose(one.predict(mirrored(columns)), one.predict(columns) * [1.0, -1.0], atol=1e-12)
+    np.testing.assert_allclose(
+        compensation(one, mirrored(columns)), compensation(one, columns) * [1.0, -1.0], atol=1e-12
+    )
 
 
 def test_a_mirrored_log_teaches_a_mirrored_trial_the_same(columns, targets):
@@ -243,7 +246,7 @@ def test_a_column_without_an_image_leaves_no_mirror(columns, targets, spoil):
     commands = spoil(columns)
     one = tuned(columns, targets, recipe(mirror=1.0), commands=commands)["rough"]
     assert {row["params"]["mirror"] for row in one.trials} == {0.0}
-    assert all(network.layers[0][0].shape[1] == 24 for network in one.compensator.networks)
+    assert all(network.layers[0][0].shape[1] == 24 for network in one.corrector.networks)
 
 
 def test_a_ship_that_is_alike_is_learned_from_one_side(columns):
@@ -256,8 +259,8 @@ def test_a_ship_that_is_alike_is_learned_from_one_side(columns):
     left = []
     for share in (0.0, 1.0):
         setup = recipe(mirror=share, units=64)
-        compensator = tuned(columns, {"any": paths}, setup, folds=folds)["any"].compensator
-        left.append(np.square(compensator.predict(other) - expected).mean())
+        compensator = tuned(columns, {"any": paths}, setup, folds=folds)["any"].corrector
+        left.append(np.square(compensation(compensator, other) - expected).mean())
     assert left[1] < 0.5 * left[0]
 
 
@@ -312,10 +315,10 @@ def test_what_can_be_solved_is_learned(columns):
     """A compensation of the same kind, of the same hidden units, is found again where nothing was seen."""
     new = drawn(seed=7)
     setup = recipe(mirror=0.0, trials=1, ridge=1e-9)
-    first = tuned(columns, {"any": missed(columns)}, setup)["any"].compensator
-    second = tuned(columns, {"any": first.predict(columns)}, setup)["any"]
+    first = tuned(columns, {"any": missed(columns)}, setup)["any"].corrector
+    second = tuned(columns, {"any": compensation(first, columns)}, setup)["any"]
     assert second.trials[0]["value"] < 1e-10 * np.square(missed(columns)).mean()
-    np.testing.assert_allclose(second.compensator.predict(new), first.predict(new), atol=1e-3)
+    np.testing.assert_allclose(compensation(second.corrector, new), compensation(first, new), atol=1e-3)
 
 
 def test_a_smooth_function_is_learned(columns, targets):
@@ -326,7 +329,7 @@ def test_a_smooth_function_is_learned(columns, targets):
 
 def test_a_model_that_misses_nothing_gets_nothing(columns, targets):
     one = tuned(columns, targets | {"exact": np.zeros_like(targets["rough"])}, SMALL)["exact"]
-    assert (one.compensator.predict(drawn(seed=7)) == 0.0).all()
+    assert (compensation(one.corrector, drawn(seed=7)) == 0.0).all()
     assert {row["value"] for row in one.trials} == {0.0}
 
 
@@ -334,7 +337,9 @@ def test_targets_in_other_units_scale_all(columns, targets):
     one = tuned(columns, {"any": targets["rough"]}, SMALL)["any"]
     ten = tuned(columns, {"any": 10.0 * targets["rough"]}, SMALL)["any"]
     assert [row["params"] for row in one.trials] == [row["params"] for row in ten.trials]
-    np.testing.assert_allclose(ten.compensator.predict(columns), 10.0 * one.compensator.predict(columns), rtol=1e-7)
+    np.testing.assert_allclose(
+        compensation(ten.corrector, columns), 10.0 * compensation(one.corrector, columns), rtol=1e-7
+    )
 
 
 def test_a_model_without_numbers_is_a_value_and_harms_nobody(columns, targets):
@@ -342,7 +347,7 @@ def test_a_model_without_numbers_is_a_value_and_harms_nobody(columns, targets):
     one = {**targets, "rough": targets["rough"].copy()}
     one["rough"][2, 40, 1] = np.nan
     bad = tuned(columns, one, SMALL)
-    assert bad["rough"].compensator is None
+    assert bad["rough"].corrector is None
     assert [row["state"] for row in bad["rough"].trials] == ["diverged"] * 6
     assert np.isnan([row["value"] for row in bad["rough"].trials]).all()
     np.testing.assert_allclose(
@@ -351,7 +356,7 @@ def test_a_model_without_numbers_is_a_value_and_harms_nobody(columns, targets):
     calls = []
     lost = {"any": np.full_like(targets["rough"], np.inf)}
     none = tune(columns, TWINS, lost, FOLDS, SMALL, 3, on_trial=lambda *done: calls.append(done))
-    assert none["any"].compensator is None
+    assert none["any"].corrector is None
     assert [set(row) for row in none["any"].trials] == [set(row) for row in good["rough"].trials]
     assert calls[-1] == (6, 6)
 
@@ -376,7 +381,7 @@ def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
 def test_two_steps_are_enough(columns, targets):
     two = {key: paths[[3, 8]] for key, paths in targets.items()}
     for key, one in tuned(columns, two, recipe(units=96)).items():
-        assert one.compensator.predict(columns).shape == (2, 120, 2)
+        assert compensation(one.corrector, columns).shape == (2, 120, 2)
         assert one.trials[0]["value"] < np.square(two[key]).mean()
 
 
@@ -389,10 +394,10 @@ def test_duplicates_constants_and_no_wind(columns, targets):
     columns["port.alpha"] = np.zeros(120)
     del columns["V_w"]
     one = tuned(columns, targets, recipe(mirror=1.0))["smooth"]
-    assert list(one.compensator.networks[0].features) == ["u", "v", "r", "port.n"]
-    assert one.compensator.networks[0].features["port.n"] == ("port.n", "starboard.n")
+    assert list(one.corrector.networks[0].features) == ["u", "v", "r", "port.n"]
+    assert one.corrector.networks[0].features["port.n"] == ("port.n", "starboard.n")
     assert {row["params"]["mirror"] for row in one.trials} == {1.0}
-    assert one.compensator.predict(columns).shape == (STEPS, 120, 2)
+    assert compensation(one.corrector, columns).shape == (STEPS, 120, 2)
 
 
 def test_two_runs_are_enough(columns, targets):
@@ -402,7 +407,7 @@ def test_two_runs_are_enough(columns, targets):
         assert np.isfinite(best)
         seen = np.concatenate(RUNS[1:3])
         assert best < 1.5 * np.square(targets[key][:, seen]).mean()
-        assert np.isfinite(one.compensator.predict(columns)).all()
+        assert np.isfinite(compensation(one.corrector, columns)).all()
 
 
 @pytest.mark.parametrize(

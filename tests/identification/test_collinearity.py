@@ -61,7 +61,7 @@ def test_columns_at_right_angles_have_no_set_and_silent_ones_their_own() -> None
     assert combinations(FREE, "abcdef") == ()
     silent = np.column_stack([FREE[:, :2], np.zeros(200)])
     (own,) = combinations(silent, "abc")
-    assert own.sentence() == "c has no effect on what these data hold"
+    assert own.sentence() == "c has no effect on these data"
     assert collinearity(silent, "abc").gamma == pytest.approx(1)
 
 
@@ -69,4 +69,4 @@ def test_names_are_as_short_as_is_clear() -> None:
     assert short(["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]) == ("Y_v", "port.D_p", "starboard.D_p")
     assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
     (own,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
-    assert own.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur is not seen by these data"
+    assert own.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"

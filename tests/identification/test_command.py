@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.test_cli import said, shell
 
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.vessel.load import load_vessel
+from tests.cli.running import said, shell
 from tests.identification.trials import trials
 from tests.report.test_page import Page
 
@@ -47,7 +47,7 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path) -> No
     assert found.parameters[ONE] == pytest.approx(0.8 * SHIP.parameters[ONE], rel=0.01)
     page = Page(Path("page.html").read_text())
     titles = " ".join(said for _, said in page.all("h3"))
-    for part in ("The estimates", "What moves with what", "Free runs", "Profile", "Candidates", "Standard manoeuvres"):
+    for part in ("The estimates", "Correlated estimates", "Free runs", "Profile", "Candidates", "Standard manoeuvres"):
         assert part in titles
     assert found.name == f"{SHIP.name}, identified"
 
@@ -104,7 +104,7 @@ def test_a_mistake_is_one_line_and_writes_nothing(name: str, file: Path) -> None
     ("vessel", "parameters", "message"),
     [
         ("gunnerus-33.9-template", "hull.mmg.X_vv", "is 0, which no factor changes"),
-        ("mariner", "hull.*", "takes this command; the data have"),
+        ("mariner", "hull.*", "needs this command; the data have"),
         ("gunnerus-29", "hull.*", "no vessel of this name"),
     ],
 )

@@ -188,7 +188,7 @@ def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> N
     mended = changed(log, v=log.frame["v"] + drift)
     own = run_identification(off(), mended, settings(horizon=20.0), ahead=30.0)
     told = " ".join(own.warnings)
-    assert "remember earlier ones" in told
+    assert "are correlated over" in told
     assert "the horizon of 20 s is short" in told
     assert "no run was held out" in told
 
@@ -202,7 +202,7 @@ def test_what_was_dropped_has_no_interval_and_says_so(log: Dataset) -> None:
     assert not rows["identified"][extra]
     assert "dropped" in rows["reason"][extra]
     assert rows["identified"][FEW].all()
-    with pytest.raises(ShipidError, match="nothing is left"):
+    with pytest.raises(ShipidError, match="no parameter is left"):
         run_identification(SHIP, log, settings(drop=5.0))
 
 

@@ -86,7 +86,7 @@ def test_a_bound_is_never_passed() -> None:
 
 def test_a_better_fit_on_the_way_is_told() -> None:
     own = profile("a", np.ones(1), 0, 6.25, refit_of(lambda f: (f - 1.5) / 0.2), half_width=0.4, freedom=1e6)
-    assert "the fit had not ended" in own.sentence
+    assert "the fit had not converged" in own.sentence
     assert own.high == pytest.approx(1.5 + 1.96 * 0.2, abs=0.03)
 
 

@@ -65,7 +65,7 @@ def test_wind_that_was_logged_is_felt() -> None:
 
 def test_a_command_that_was_not_logged_is_told() -> None:
     without = Dataset(DATA.frame.drop(columns="port.n"), DATA.metadata)
-    with pytest.raises(DataError, match=r"port\.n: .* takes this command; the data have port\.alpha"):
+    with pytest.raises(DataError, match=r"port\.n: .* needs this command; the data have port\.alpha"):
         cut_segments(SHIP, without, without.runs, 1.0, 0.0)
 
 

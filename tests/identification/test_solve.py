@@ -279,7 +279,7 @@ def test_values_that_the_vessel_refuses_are_told() -> None:
     path, dataset = "added_mass.X_udot", trials(SHIP, runs=2, steps=30)
     found = identify(SHIP, dataset, dataset.runs, settings(parameters=[path, FEW[0]], bounds={path: (-0.2, -0.1)}))
     assert found.status == "refused"
-    assert f"the vessel refuses the values found: {path}: " in found.sentence
+    assert f"the vessel refuses the estimates: {path}: " in found.sentence
     assert "\n" not in found.sentence
     with pytest.raises(ShipidError, match="X_udot is negative"):
         _ = found.identified

@@ -126,7 +126,7 @@ def test_a_pair_that_acts_as_one_is_named() -> None:
     jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
     found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
     assert found.identifiable.tolist() == [False, False, True, True, True, True]
-    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 is not seen" in found.sentences[0]
+    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 has no effect" in found.sentences[0]
 
 
 def test_what_has_no_effect_is_named() -> None:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.simulation import truth
+from shipid.simulation.log import logged as log_columns
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from tests.conftest import pace
@@ -68,7 +68,7 @@ def trials(
             engine="casadi",
         )
         assert not path.diverged.any()
-        columns = {key: values[:, 0] for key, values in truth.logged(path, model.state).items()}
+        columns = {key: values[:, 0] for key, values in log_columns(path, model.state).items()}
         frames.append(
             pd.DataFrame(
                 {

@@ -8,8 +8,8 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
-from shipid.simulation import truth
 from shipid.simulation.gusts import Gusts, series
+from shipid.simulation.log import logged
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import FirstGuess, Particulars, first_guess
@@ -54,7 +54,7 @@ def voyages(runs: int, shortest: float = 100.0, longest: float = 300.0, seed: in
     weather = {"V_w": V_w[:-1], "beta_w": np.tile(beta, (steps, 1))}
     path = rollout(vessel, start, orders, weather, step=STEP, num_steps=steps, method="rk4")
     assert not path.diverged.any()
-    columns = truth.logged(path, model.state) | {k: np.vstack([x, x[-1:]]) for k, x in orders.items()}
+    columns = logged(path, model.state) | {k: np.vstack([x, x[-1:]]) for k, x in orders.items()}
     columns |= {"V_w": V_w, "beta_w": np.tile(beta, (steps + 1, 1))}
     frames = []
     for run, length in enumerate(rng.uniform(shortest, longest, runs)):

@@ -122,7 +122,7 @@ def test_channels_that_share_no_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "path", "remedy"),
     [
-        (('from = "N"', 'from = "N"\nlatency = 1.0'), "clock.max_gap", "over how long a gap"),
+        (('from = "N"', 'from = "N"\nlatency = 1.0'), "clock.max_gap", "set the longest gap"),
         (('from = "N"', 'from = "N"\nfile = "gps"'), "columns.north.file", "nothing is defined there"),
         (('from = "N"', 'from = "N"\ninterpolation = "linear"'), "columns.north.interpolation", "set .clock. step"),
         (('from = "N"', 'from = "N"\nrelative = true'), "columns.north.relative", "only beta_w"),

@@ -87,7 +87,7 @@ def test_one_size_is_a_dumbbell(full_scale):
     assert after.marker.symbol == "circle"
     assert figure.takeaway == (
         "accurate (Gunnerus, 28.9 m) predicts best, H = 0.94 m; compensation improves 2 of 2 physics models; "
-        "pure data-driven stands at 4.30 m; the naive floor is 5.01 m."
+        "pure data-driven has H = 4.30 m; the naive floor is 5.01 m."
     )
 
 

@@ -83,7 +83,7 @@ def test_a_missing_measure_says_why_in_its_row() -> None:
     table = manoeuvre.measures(replace(shown, measures=spoiled))
     row = next(row for row in table.rows if row[0].text == "period")
     assert (row[1].text, row[4].text, row[4].bad) == ("–", "too short", True)
-    assert "period: not found" in replace(shown, measures=spoiled).answer[0].text
+    assert "period: not reached" in replace(shown, measures=spoiled).answer[0].text
 
 
 def test_ships_are_drawn_to_scale_where_they_were() -> None:

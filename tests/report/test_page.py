@@ -226,7 +226,7 @@ def test_a_section_added_at_run_time_is_on_the_page(simulation, monkeypatch):
     page = Page(render(replace(linked, frames={"tides": tides})))
     ids = [attributes.get("id") for _, attributes, _ in page.elements]
     assert ids.index("cells") < ids.index("tides") < ids.index("tide") < ids.index("provenance")
-    assert any("The tide rises by 1.25 m." in text for _, text in page.all("p"))
+    assert any("The tide rises by 1.25\u00a0m." in text for _, text in page.all("p"))
     hrefs = [a["href"] for a, _ in page.all("a")]
     assert {"#tides", "#tide"} <= set(hrefs)
     views = next(json.loads(text) for a, text in page.all("script") if '"tide"' in text and a.get("class") == "views")

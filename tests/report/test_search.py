@@ -65,7 +65,7 @@ def test_the_rank_correlation_is_within_cells():
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
     found = importance(simulation.trials, "learning_rate")
-    text = f"learning rate goes with it most, rank correlation {found:.2f}.".replace("-", "−")
+    text = f"learning rate is most correlated with it, rank correlation {found:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
 

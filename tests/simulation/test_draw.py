@@ -164,7 +164,7 @@ def test_seeds_are_drawn_unless_given() -> None:
     ("block", "said"),
     [
         ({"kind": "zigzags", **SHAFT}, "did you mean 'zigzag'"),
-        ({"kind": "zigzag", "n_rpm": [150.0, 80.0]}, "n_rpm runs backwards"),
+        ({"kind": "zigzag", "n_rpm": [150.0, 80.0]}, "n_rpm has low > high"),
         ({"kind": "zigzag", "n_rpm": [1.0, 2.0, 3.0]}, r"n_rpm: give a number or \[low, high\]"),
         ({"kind": "zigzag", **SHAFT, "angle_deg": [-5.0, 5.0]}, "angle_deg: Input should be greater than 0"),
         ({"kind": "zigzag", **SHAFT, "duration": 5.0}, r"duration: no key of zigzag: \[truth\] gives it"),

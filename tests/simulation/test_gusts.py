@@ -125,7 +125,7 @@ def test_wind_never_turns_round() -> None:
 
 
 def test_negative_mean_is_refused() -> None:
-    with pytest.raises(DocumentError, match="at least 0 m/s, found -1"):
+    with pytest.raises(DocumentError, match="at least 0 m/s, not -1"):
         series(KINDS["npd"], np.array([2.0, -1.0]), np.arange(3.0), keys(2))
 
 

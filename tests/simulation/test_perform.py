@@ -162,7 +162,7 @@ def test_variants_keep_to_their_own_numbers() -> None:
         ([CIRCLE], {"interval": 0.25}, "interval 0.25 s must be a multiple of step 0.1 s"),
         ([CIRCLE], {"interval": 0.01}, "must be a multiple"),
         ([CIRCLE.model_copy(update={"name": "a"})] * 2, {}, "two runs are named 'a'"),
-        ([CIRCLE], {"environment": {"V_c": 1.0}}, "feels no 'V_c'"),
+        ([CIRCLE], {"environment": {"V_c": 1.0}}, "has no environment channel 'V_c'"),
     ],
 )
 def test_what_cannot_be_performed_is_told(manoeuvres: list[Manoeuvre], how: dict[str, Any], said: str) -> None:

@@ -132,7 +132,7 @@ def test_diverging_truth_is_told() -> None:
     [
         ({"interval": 0.25}, "multiple of step"),
         ({"duration": 0.5}, "holds no interval"),
-        ({"n_rpm": (200.0, 50.0)}, "n_rpm runs backwards"),
+        ({"n_rpm": (200.0, 50.0)}, "n_rpm has low > high"),
         ({"manoeuvres": 1}, "greater than or equal to 2"),
         ({"wind": 3.0}, "Extra inputs"),
         ({"wind_speed": (-3.0, -1.0)}, "greater than or equal to 0"),

@@ -55,9 +55,11 @@ def by_hand(
     for (model, N_D, seed), H in cells.items():
         A = alone.get(model, np.nan)
         row = {
-            "cell": f"{model}-{N_D}-{seed}",
+            "cell": f"{model}+drawn-{N_D}-{seed}",
             "model": model,
-            "kind": model if family is None else model.partition("-")[0],
+            "foundation": model,
+            "method": "drawn",
+            "family": model if family is None else model.partition("-")[0],
             "member": 0,
             "N_D": N_D,
             "seed": seed,

@@ -12,6 +12,7 @@ import pytest
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
+from shipid.hybrid.compensator import Compensator
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -52,7 +53,7 @@ def test_where_no_command_changes_knowing_it_changes_nothing(tmp_path: Path, tin
 
 def test_right_physics_with_known_commands_misses_nothing(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     plans = {
-        kind: recorded(weaving(), split={"test": 2}, prediction={"horizon": 5, "commands": kind})
+        kind: recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": kind})
         for kind in ("held", "known")
     }
     A = {kind: prepare(plan, dataset).accuracy("right")["mean"] for kind, (plan, dataset) in plans.items()}
@@ -62,28 +63,28 @@ def test_right_physics_with_known_commands_misses_nothing(recorded: Callable[...
 
 def test_a_stored_predictor_takes_the_plan(tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     """What it predicts from the stored windows is the H of its cell; without a plan it says what it needs."""
-    plan, _ = recorded(weaving(), split={"test": 2}, prediction={"horizon": 5, "commands": "known"})
+    plan, _ = recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": "known"})
     run_here(plan, tmp_path / "run")
     test, _, _ = store.read_test(tmp_path / "run")
     rows = store.read_rows(tmp_path / "run")
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tmp_path / "run", str(row.cell)))
         assert predictor.commands == "known"
-        paths = predictor.predict(test.columns, planned=test.planned)
+        paths = predictor.predict(test.instants(known=True))
         assert summary(position_error(paths, test.future))["mean"] == pytest.approx(row.H, rel=1e-9)
         with pytest.raises(DataError, match="made for known commands"):
-            predictor.predict(test.columns)
-    pure = Predictor.load(store.cell_file(tmp_path / "run", str(rows[rows["model"] == "none"]["cell"].iloc[0])))
-    assert pure.compensator is not None
-    assert any(".planned-" in name for network in pure.compensator.networks for name in network.features)
+            predictor.predict(test.instants())
+    pure = Predictor.load(store.cell_file(tmp_path / "run", str(rows[rows["foundation"] == "none"]["cell"].iloc[0])))
+    assert isinstance(pure.corrector, Compensator)
+    assert any(".planned-" in name for network in pure.corrector.networks for name in network.features)
 
 
 def test_a_log_holds_the_plan(tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     """Along a log the later orders are the plan; the last instants have none and are left out."""
-    plan, dataset = recorded(weaving(), split={"test": 2}, prediction={"horizon": 5, "commands": "known"})
+    plan, dataset = recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": "known"})
     run_here(plan, tmp_path / "run")
     log = write_dataset(dataset, tmp_path / "log.parquet")
-    cell = f"right-{plan.batches[0].key}"
+    cell = plan.batches[0].cell("right", "drawn")
     frame, _ = predict_log(tmp_path / "run", cell, log, None, tmp_path / "paths.csv")
     assert frame.groupby("run")["t"].max().eq(36.0).all()  # orders are needed until the start of the last step
     run = frame[(frame["run"] == "a") & (frame["ahead"] == 4.0) & (frame["t"] == 10.0)].iloc[0]

@@ -39,7 +39,7 @@ def test_worlds_of_one_study(tiny_run: Path, other_world: Path) -> None:
         ("wrong", 0),
         *((f, N) for f in ("right", "wrong", "none") for N in (4, 6)),
     }
-    own = [results.cells.query("kind == 'wrong' and N_D == 4")["H"].mean() for results in (here, there)]
+    own = [results.cells.query("family == 'wrong' and N_D == 4")["H"].mean() for results in (here, there)]
     assert frame.loc[("wrong", 4), ["mean", "low", "high"]].tolist() == pytest.approx(
         [sum(own) / 2, min(own), max(own)]
     )
@@ -53,7 +53,7 @@ def test_what_is_not_one_study_is_refused(tmp_path: Path, tiny_run: Path, other_
         read_worlds([tiny_run])
     with pytest.raises(ShipidError, match="named twice"):
         read_worlds([tiny_run, other_world, tiny_run])
-    run_here(tiny_plan(tmp_path, {"seed": 2, "recipe.units": 9, "grid.N_D": [4]}), tmp_path / "run")
+    run_here(tiny_plan(tmp_path, {"seed": 2, "method.0.units": 9, "grid.N_D": [4]}), tmp_path / "run")
     with pytest.raises(ResultError, match=r"holds another study than .*: only `seed` may differ") as caught:
         read_worlds([tiny_run, tmp_path / "run"])
     assert caught.value.file == str(tmp_path / "run")

@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from shipid.hybrid.recipe import Recipe, RidgeRecipe
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_trained import PathTrained
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
@@ -17,21 +18,26 @@ from tests.study.tiny import tiny_plan
 
 
 @pytest.mark.parametrize(
-    ("name", "models", "batches"),
+    ("name", "foundations", "alone", "batches"),
     [
-        ("quick", 3 + 2 + 1, 3),
-        ("full-scale", 4 + 2 + 1, 8 * 3),
-        ("simulation", 10 + 8 + 1 + 1, 10),
-        ("simulation-small", 4 + 3 * 3 + 1 + 1, 3 * 2),
-        ("constant-orders", 4 + 3 * 3 + 1 + 1, 3 * 2),
-        ("changing-orders", 4 + 3 * 3 + 1 + 1, 3 * 2),
-        ("zigzags", 1 + 2 + 1, 3),
+        ("quick", 3 + 2 + 1, 0, 3),
+        ("full-scale", 4 + 1 + 1, 1, 8 * 3),
+        ("simulation", 10 + 8 + 1 + 1, 0, 10),
+        ("simulation-small", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
+        ("constant-orders", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
+        ("changing-orders", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
+        ("zigzags", 1 + 2 + 1, 0, 3),
     ],
 )
-def test_bundled_studies_expand(name: str, models: int, batches: int) -> None:
+def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches: int) -> None:
+    """`alone` counts the foundations that are also judged without a compensator: identified ones."""
     plan = read_plan(name)
-    assert (len(plan.models), len(plan.batches), plan.cells) == (models, batches, models * batches)
-    assert [model.name for model in plan.models if model.vessel is None] == [NO_MODEL]
+    assert (len(plan.foundations), len(plan.batches)) == (foundations, batches)
+    assert plan.cells == (foundations + alone) * batches
+    bare = [name for name, way in plan.pairs if not way.method.compensates]
+    assert len(bare) == alone
+    assert {one.family for one in plan.foundations if one.name in bare} == (plan.identified if alone else set())
+    assert [model.name for model in plan.foundations if model.vessel is None] == [NO_MODEL]
     assert plan.study.question.endswith("?")
 
 
@@ -62,7 +68,7 @@ def test_the_first_instant_comes_after_the_run_up() -> None:
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
     """The architecture document pins it: higher-order damping removed, N_ur, Y_ur, N_uv times 0.6, nothing else."""
-    models = {model.name: model for model in read_plan("full-scale").models}
+    models = {model.name: model for model in read_plan("full-scale").foundations}
     variant, base = models["inaccurate"].variant, load_vessel("gunnerus-28.9").parameters
     assert variant is not None
     wanted = dict(base)
@@ -84,16 +90,20 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     """19 models and the nominal one, N_D = 10, 20, ... 100, 50 trials per cell; the small one is a part of it."""
     full, small = read_plan("simulation"), read_plan("simulation-small")
     assert [batch.N_D for batch in full.batches] == list(range(100, 0, -10))
-    assert full.recipe == Recipe.preset("paper")
-    assert full.recipe.trials == small.recipe.trials == 50
-    assert read_plan("simulation", {"recipe.kind": "fast"}).recipe == small.recipe
+    assert [way.method for way in full.methods] == [PathTrained()]
+    assert full.methods[0].method.trials == small.methods[0].method.trials == 50  # type: ignore[attr-defined]
+    assert (
+        read_plan("simulation", {"method.0.kind": "path-drawn"}).methods[0].method
+        == small.methods[0].method
+        == PathDrawn()
+    )
     assert small.study.truth == full.study.truth
     assert small.study.split == full.study.split
     assert small.study.prediction == full.study.prediction
     assert small.study.published == full.study.published
-    wide = {model.name: model.variant for model in full.models}
+    wide = {model.name: model.variant for model in full.foundations}
     assert all(
-        model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.models
+        model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.foundations
     )
     nominal = wide["nominal"]
     assert nominal is not None
@@ -103,8 +113,8 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
 def test_seed_0_is_the_world_as_written(tmp_path: Path) -> None:
     plain, zero = tiny_plan(tmp_path), tiny_plan(tmp_path, {"seed": 0})
     assert zero.study == plain.study
-    assert [m.variant and m.variant.values for m in zero.models] == [
-        m.variant and m.variant.values for m in plain.models
+    assert [m.variant and m.variant.values for m in zero.foundations] == [
+        m.variant and m.variant.values for m in plain.foundations
     ]
     assert zero.batches == plain.batches
 
@@ -117,13 +127,13 @@ def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path:
     assert there.study.truth.seed == here.study.truth.seed + 3000
     assert there.study.split.seed == here.study.split.seed + 3000
     assert sorted({batch.seed for batch in there.batches}) == there.study.grid.seeds == [3000, 3002]
-    for one, other in zip(here.models, there.models, strict=True):
+    for one, other in zip(here.foundations, there.foundations, strict=True):
         assert one.name == other.name
         if one.variant and other.variant and one.variant.values:
             assert all(one.variant.values[path] != other.variant.values[path] for path in one.variant.values)
     assert there.digest != here.digest
     assert there.digest_in_any_world == here.digest_in_any_world
-    assert tiny_plan(tmp_path, {**changes, "recipe.units": 7}).digest_in_any_world != here.digest_in_any_world
+    assert tiny_plan(tmp_path, {**changes, "method.0.units": 7}).digest_in_any_world != here.digest_in_any_world
 
 
 def test_a_stored_world_is_the_same_world(tmp_path: Path) -> None:
@@ -143,10 +153,10 @@ def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
 
 
 def test_changes_reach_the_document(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "recipe.units": 7, "description": "new"})
-    assert [model.name for model in plan.models][1:6] == [f"wrong-{k}" for k in range(1, 6)]
-    assert isinstance(plan.recipe, RidgeRecipe)
-    assert (plan.batches[0].N_D, plan.recipe.units, plan.study.description) == (3, 7, "new")
+    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "method.0.units": 7, "description": "new"})
+    assert [model.name for model in plan.foundations][1:6] == [f"wrong-{k}" for k in range(1, 6)]
+    assert isinstance(plan.methods[0].method, PathDrawn)
+    assert (plan.batches[0].N_D, plan.methods[0].method.units, plan.study.description) == (3, 7, "new")
 
 
 @pytest.mark.parametrize(
@@ -157,7 +167,7 @@ def test_changes_reach_the_document(tmp_path: Path) -> None:
         ({"grid.N_D": [3], "question.x.y": 1}, "question.x.y"),
         ({"family.9.members": 3}, "family.9.members"),
         ({"family.first.members": 3}, "family.first.members"),
-        ({"recipe.kind.name": "fast"}, "recipe.kind.name"),
+        ({"method.0.kind.name": "alone"}, "method.0.kind.name"),
     ],
 )
 def test_changes_that_reach_nothing_are_told(tmp_path: Path, changes: dict[str, object], path: str) -> None:
@@ -199,12 +209,12 @@ def test_truth_takes_its_blocks(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"truth.set": {"thruster.port.actuator.n": lag}})
     assert plan.truth is not None
     assert plan.truth.parameters["thruster.port.actuator.n.T"] == 2.0
-    assert all("actuator" not in path for model in plan.models if model.vessel for path in model.vessel.parameters)
+    assert all("actuator" not in path for model in plan.foundations if model.vessel for path in model.vessel.parameters)
 
 
 def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
     """Draws hang on family and member; damping alone differs in `moderate`, mass and propellers too in `high`."""
-    models = {model.name: model.variant for model in read_plan("quick").models if model.variant}
+    models = {model.name: model.variant for model in read_plan("quick").foundations if model.variant}
     for name, variant in models.items():
         assert all(0.4 <= factor <= 1.6 for factor in variant.factors.values())
         others = [path for path in variant.factors if not path.startswith("hull.derivatives.")]
@@ -213,3 +223,20 @@ def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
     assert high["thruster.port.D_p"] == high["thruster.starboard.D_p"]
     assert 0.6 <= high["inertia.m"] <= 1.4
     assert models["moderate-1"].factors != models["moderate-2"].factors
+
+
+def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(tmp_path: Path) -> None:
+    block = {"parameters": ["hull.derivatives.N_ur"]}
+    families = [
+        {"name": "right", "base": "gunnerus-28.9"},
+        {"name": "fitted", "extends": "right", "identify": block},
+        {"name": "again", "extends": "fitted", "identify": {**block, "horizon": 9.0}},
+    ]
+    plan = tiny_plan(tmp_path, {"family": families})
+    assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
+    right, fitted, again, _ = plan.foundations
+    assert right.variant == fitted.variant == again.variant
+    assert plan.identified == {"fitted", "again"}
+    assert fitted.identify is not None
+    assert again.identify is not None
+    assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)

@@ -16,11 +16,12 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.recipe import Recipe
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import Prepared, constant_motion, limits, obtain, own_vessel, prepare, window_memory
+from shipid.study.prepare import Prepared, constant_motion, instants_of, limits, obtain, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import draw, resolve
@@ -56,10 +57,10 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
 def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
     plan, _, prepared = tiny
     split = plan.study.split.model_copy(update={"folds": folds})
-    plan = replace(plan, study=plan.study.model_copy(update={"split": split}), recipe=Recipe.preset("paper"))
+    plan = replace(plan, study=plan.study.model_copy(update={"split": split}))
     for batch in plan.batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        pairs = prepared.folds(plan, batch, windows)
+        pairs = prepared.folds(plan, batch, windows, "share")
         assert len(pairs) == min(folds, batch.N_D)
         validated: list[str] = []
         for train, validation in pairs:
@@ -72,11 +73,11 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
             assert sorted(validated) == sorted(prepared.runs(plan, batch))
 
 
-def test_a_recipe_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_a_method_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     plan, _, prepared = tiny
     for batch in plan.batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        pairs = prepared.folds(plan, batch, windows)
+        pairs = prepared.folds(plan, batch, windows, "runs")
         assert len(pairs) == batch.N_D
         for train, validation in pairs:
             assert len(set(windows.run[validation])) == 1
@@ -84,14 +85,14 @@ def test_a_recipe_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Data
         assert sorted(index for _, validation in pairs for index in validation) == list(range(len(windows)))
 
 
-@pytest.mark.parametrize("kind", ["fast", "paper"])
+@pytest.mark.parametrize("kind", ["path-drawn", "path-trained"])
 def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
     """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out, and told."""
     t = np.arange(21.0)
     runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
     dataset = logged(runs, t, clock="shared")
     changes = {"split": {"test": ["r3"], "folds": 2}, "grid": {"N_D": [7]}, "family": [ONE_FAMILY]}
-    plan, _ = recorded(dataset, **changes, recipe={"kind": kind})
+    plan, _ = recorded(dataset, **changes, method=[{"name": "one", "kind": kind}])
     prepared = prepare(plan, dataset)
     batch = plan.batches[0]
 
@@ -107,7 +108,7 @@ def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Da
     assert any(note.startswith(f"{left_out} windows that touch the test") for note in prepared.notes)
     assert shared(everything.select(everything.run != "r3"), prepared.test)
     assert not shared(prepared.pool, prepared.test)
-    for train, validation in prepared.folds(plan, batch, prepared.pool):
+    for train, validation in prepared.folds(plan, batch, prepared.pool, plan.methods[0].method.validation):
         assert not shared(prepared.pool.select(train), prepared.pool.select(validation))
 
 
@@ -147,7 +148,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
     prepared = prepare(plan, obtain(plan))
     rule = resolve(plan.study.family)[0]
     redrawn = 0
-    for planned, model in zip(plan.models[:-1], prepared.models[:-1], strict=True):
+    for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
         assert model.variant is not None
         counter = model.variant.counter
         assert model.variant == draw(rule, model.member, SHIP, counter)
@@ -158,7 +159,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
         assert np.isfinite(prepared.pool_paths[model.name]).all()
     assert 0 < redrawn < 6
     again = prepare(plan, obtain(plan))
-    assert [m.variant for m in again.models] == [m.variant for m in prepared.models]
+    assert [m.variant for m in again.foundations] == [m.variant for m in prepared.foundations]
 
 
 def test_what_cannot_be_drawn_is_told(tmp_path: Path) -> None:
@@ -186,13 +187,13 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     ]
     plan, dataset = recorded(logged(runs, t), split={"test": ["fast", "slow0"]}, family=[family])
     prepared = prepare(plan, dataset)
-    for model in prepared.models[:-1]:
+    for model in prepared.foundations[:-1]:
         assert model.variant is not None
         assert model.variant.counter == 0
     found = prepared.accuracy("brittle-1")
     assert (found["status"], found["failed_share"]) == ("diverged", 0.5)
     assert np.isnan(found["mean"])
-    rows = {row["model"]: row for row, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    rows = {row["foundation"]: row for row, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
     assert "50.0%" in rows["brittle-1"]["sentence"]
     assert np.isnan(rows["brittle-1"]["H"])
@@ -262,10 +263,11 @@ def test_perturbed_lags_have_hidden_states_of_their_own(
     plan, _ = recorded(dataset, split={"test": 1}, family=[family])
     prepared = prepare(plan, dataset)
     assert not np.allclose(prepared.test_paths["lagged-1"], prepared.test_paths["lagged-2"])
-    for model in prepared.models[:-1]:
-        vessel = own_vessel(model)
-        predictor = Predictor(vessel, None, horizon=5, step=1.0)
-        paths = predictor.predict(prepared.test.columns, window_memory(vessel, dataset, prepared.test))
+    for model in prepared.foundations[:-1]:
+        vessel = model.vessel
+        assert vessel is not None
+        predictor = Predictor(Physics(vessel, 5, 1.0), "alone", Unchanged({}))
+        paths = predictor.predict(instants_of(plan, vessel, dataset, prepared.test))
         np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
 
 
@@ -281,7 +283,7 @@ def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Datase
         ({"split": {"test": ["z"]}}, "split.test", "'z' is no run with windows: valid: a, b, c, d"),
         ({"split": {"test": 4}}, "split.test", "only 4 runs"),
         ({"split": {"test": 2}, "grid": {"N_D": [3]}}, "grid.N_D", "only 2 runs are left"),
-        ({"split": {"test": 1}, "prediction": {"horizon": 40}}, "prediction.horizon", "as long as the horizon of 40 s"),
+        ({"split": {"test": 1}, "prediction": {"ahead": 40.0}}, "prediction.ahead", "as long as the horizon of 40 s"),
     ],
 )
 def test_a_study_that_asks_too_much_of_its_log(
@@ -299,7 +301,7 @@ def test_a_log_without_the_ships_commands(recorded: Callable[..., tuple[Plan, Da
     dataset = logged({name: {"u": 2.0} for name in "abcd"}, t)
     fewer = Dataset(dataset.frame.drop(columns=["starboard.n"]), dataset.metadata)
     plan, _ = recorded(fewer, split={"test": 1})
-    with pytest.raises(DataError, match=r"takes this command; the data have port\.alpha, port\.n") as caught:
+    with pytest.raises(DataError, match=r"needs this command; the data have port\.alpha, port\.n") as caught:
         prepare(plan, fewer)
     assert caught.value.path == "starboard.n"
 
@@ -372,7 +374,7 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
     assert "V_w" not in prepared.pool.columns
     for batch in plan.batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        for train, validation in prepared.folds(plan, batch, windows):
+        for train, validation in prepared.folds(plan, batch, windows, plan.methods[0].method.validation):
             gaps = np.abs(windows.t[train][:, None] - windows.t[validation])
             assert gaps.min() > 15.0
     assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]

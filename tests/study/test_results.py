@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
-from shipid.hybrid.recipe import RidgeRecipe
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
 from shipid.study import store
 from shipid.study.plan import build_plan, read_plan
@@ -112,8 +112,8 @@ def test_the_command_reproduces_the_study(read: Results) -> None:
     plan = read_plan("quick")
     quick = replace(read, plan=plan, provenance={"file": plan.file})
     assert frames.reproducing_command(quick) == "shipid study run quick"
-    changed = replace(quick, provenance={"file": plan.file, "changes": {"grid.N_D": [10], "recipe.kind": "paper"}})
-    expected = "shipid study run quick --set 'grid.N_D=[10]' --set 'recipe.kind=\"paper\"'"
+    changed = replace(quick, provenance={"file": plan.file, "changes": {"grid.N_D": [10], "method.0.kind": "alone"}})
+    expected = "shipid study run quick --set 'grid.N_D=[10]' --set 'method.0.kind=\"alone\"'"
     assert frames.reproducing_command(changed) == expected
 
 
@@ -159,7 +159,7 @@ def test_factors_by_model_and_group(read: Results) -> None:
     assert set(frame["model"]) == {"wrong-1", "wrong-2"}
     assert set(frame["group"]) == {"hull"}
     assert frame["factor"].between(0.4, 1.6).all()
-    variant = next(model.variant for model in read.plan.models if model.name == "wrong-1")
+    variant = next(model.variant for model in read.plan.foundations if model.name == "wrong-1")
     assert variant is not None
     mine = frame[frame["model"] == "wrong-1"].set_index("path")["factor"]
     assert mine.to_dict() == pytest.approx(dict(variant.factors))
@@ -169,12 +169,13 @@ def test_trials_know_the_chosen_one(read: Results) -> None:
     frame = frames.trials_frame(read)
     assert len(frame) == 8
     assert frame["chosen"].all()
-    assert set(frame.columns[-6:]) == {*RidgeRecipe.SEARCHED, "mirror"}
+    assert frame.columns[10:].tolist() == [*PathDrawn().varied()]
     first = read.rows[0]
     two = [{**first["trials"][0], "number": k, "value": value} for k, value in enumerate((2.0, 1.0))]
     two.append({**two[0], "number": 2, "state": "diverged", "value": None})
     for averaged, chosen in ((1, [False, True, False]), (8, [True, True, False])):
-        plan = replace(read.plan, recipe=read.plan.recipe.model_copy(update={"averaged": averaged}))
+        (way,) = read.plan.methods
+        plan = replace(read.plan, methods=(replace(way, method=way.method.model_copy(update={"averaged": averaged})),))
         frame = frames.trials_frame(replace(read, plan=plan, cells=pd.DataFrame([{**first, "trials": two}])))
         assert frame["chosen"].tolist() == chosen
     assert frame["value"].tolist() == pytest.approx([2.0, 1.0, np.nan], nan_ok=True)

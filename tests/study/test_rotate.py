@@ -34,7 +34,15 @@ def by_hand() -> pd.DataFrame:
     A = {"good": [2.0, 3.0, 4.0], "bad": [4.0, 6.0, 8.0], "tuned": [1.0, 1.0, 1.0], "none": [np.nan] * 3}
     H = {"good": [1.0, 1.0, 1.0], "bad": [1.5, 2.5, 3.5], "tuned": [9.0, 9.0, 9.0], "none": [2.0, 4.0, 3.0]}
     rows = [
-        {"test": f"ZZ {turn}", "model": name, "kind": name, "N_D": 5, "seed": seed, "A": A[name][turn]}
+        {
+            "test": f"ZZ {turn}",
+            "foundation": name,
+            "family": name,
+            "method": "drawn",
+            "N_D": 5,
+            "seed": seed,
+            "A": A[name][turn],
+        }
         | {"H": H[name][turn] + 0.1 * (-1) ** seed, "H_90": 2.0, "naive": 5.0, "status": "ok"}
         for turn in range(3)
         for seed in (0, 1)
@@ -44,14 +52,14 @@ def by_hand() -> pd.DataFrame:
 
 
 def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
-    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"horizon": 5}, grid={"N_D": [5]})
+    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     found = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
     for test in ("a", "b"):
-        own, _ = recorded(weaving(), split={"test": [test]}, prediction={"horizon": 5}, grid={"N_D": [5]})
+        own, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(own, dataset)
         rows = [row for row, _ in run_batch(own, prepared, own.batches[0], "cpu")]
         turn = found[found["test"] == test]
-        assert list(turn["model"]) == [row["model"] for row in rows]
+        assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         assert (turn["N_D"] == 5).all()
         for name in ("A", "H"):
             np.testing.assert_allclose(turn[name], [row[name] for row in rows], rtol=1e-12)
@@ -67,7 +75,7 @@ def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) ->
 
 
 def test_spread_by_hand() -> None:
-    rows = spread(by_hand()).set_index("model")
+    rows = spread(by_hand()).set_index("foundation")
     assert rows.loc["bad", ["turns", "A", "H", "least", "greatest"]].tolist() == pytest.approx([3, 6.0, 2.5, 1.5, 3.5])
     assert rows["better"].tolist() == pytest.approx([3, 3, 0, np.nan], nan_ok=True)
 
@@ -87,19 +95,19 @@ def test_contrasts_by_hand(claimed: Plan, tmp_path: Path) -> None:
 
 def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
     frame = by_hand()
-    frame.loc[(frame["model"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
+    frame.loc[(frame["foundation"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
     rows = contrasts(frame, claimed).set_index("difference")
     assert rows.loc["good: A less H", "turns"] == 2
-    assert spread(frame).set_index("model").loc["good", "turns"] == 2
+    assert spread(frame).set_index("foundation").loc["good", "turns"] == 2
 
 
 def test_families_of_several_members_and_models_without_any_result(claimed: Plan) -> None:
     """Members are averaged; where a side of a difference has no result at all there is no number."""
     frame = by_hand()
-    two = frame.assign(model=frame["model"] + "-2", H=frame["H"] + 1.0)
+    two = frame.assign(foundation=frame["foundation"] + "-2", H=frame["H"] + 1.0)
     rows = contrasts(pd.concat([frame, two]), claimed).set_index("difference")
     assert rows.loc["bad: A less H", "mean"] == pytest.approx(3.0)
-    rows = contrasts(frame[frame["model"] != "good"], claimed).set_index("difference")
+    rows = contrasts(frame[frame["foundation"] != "good"], claimed).set_index("difference")
     assert np.isnan(rows.loc["good: A less H", "mean"])
     assert rows.loc["bad: A less H", "turns"] == 3
 
@@ -107,5 +115,5 @@ def test_families_of_several_members_and_models_without_any_result(claimed: Plan
 def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     dataset = weaving()
     short = dataset.frame[(dataset.frame["run"] != "c") | (dataset.frame["t"] < 3.0)].reset_index(drop=True)
-    plan, cut = recorded(Dataset(short, dataset.metadata), split={"test": 1}, prediction={"horizon": 5})
+    plan, cut = recorded(Dataset(short, dataset.metadata), split={"test": 1}, prediction={"ahead": 5.0})
     assert turns(plan, cut, ["*"]) == ["a", "b", "d", "e", "f"]

@@ -14,6 +14,8 @@ import pytest
 from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
 from shipid.files import read_json, write_json
+from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -92,8 +94,8 @@ def test_seeds_change_the_numbers(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"grid.seeds": [0, 1], "grid.N_D": [4]})
     run_here(plan, tmp_path / "run")
     rows = store.read_rows(tmp_path / "run")
-    assert (rows.groupby("model")["H"].nunique() == 2).all()
-    assert (rows.dropna(subset="A").groupby("model")["A"].nunique() == 1).all()  # A is of the test set alone
+    assert (rows.groupby("foundation")["H"].nunique() == 2).all()
+    assert (rows.dropna(subset="A").groupby("foundation")["A"].nunique() == 1).all()  # A is of the test set alone
 
 
 def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path, tiny_run: Path) -> None:
@@ -103,13 +105,13 @@ def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path,
     assert len(rows) == 8
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tiny_run, str(row.cell)))
-        paths = predictor.predict(prepared.test.columns)
+        paths = predictor.predict(prepared.test.instants())
         error = summary(position_error(paths, prepared.test.future))
         assert error["mean"] == pytest.approx(row.H, rel=1e-9)
         assert error["p90"] == pytest.approx(row.H_90, rel=1e-9)
         assert error["rms"] == pytest.approx(row.rms, rel=1e-9)
-        alone = summary(position_error(predictor.physics(prepared.test.columns), prepared.test.future))
-        assert np.isnan(row.A) if row.model == "none" else alone["mean"] == pytest.approx(row.A, rel=1e-9)
+        alone = summary(position_error(predictor.alone(prepared.test.instants()), prepared.test.future))
+        assert np.isnan(row.A) if row.foundation == "none" else alone["mean"] == pytest.approx(row.A, rel=1e-9)
         assert set(predictor.provenance["runs"]) == set(prepared.runs(tiny_plan(tmp_path), _batch(tmp_path, row.N_D)))
         assert not set(predictor.provenance["runs"]) & set(prepared.test.spans)
 
@@ -127,7 +129,7 @@ def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
         assert entry.value == pytest.approx(rows.loc[entry.cell, entry.metric], nan_ok=True)
         assert entry.unit == ("s" if entry.metric == "seconds" else "m")
     trials = pd.read_parquet(tiny_run / "trials.parquet")
-    assert list(trials["cell"].value_counts().unique()) == [1]  # the recipe of the tiny study has one trial
+    assert list(trials["cell"].value_counts().unique()) == [1]  # the method of the tiny study has one trial
     assert {"value", "motion_scale", "mirror", "state"} <= set(trials.columns)
 
 
@@ -135,10 +137,10 @@ def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Pa
     record = read_json(tiny_run / store.PROVENANCE)
     assert record["digest"] == tiny_plan(tmp_path).digest
     assert {"shipid", "torch", "casadi", "optuna"} <= record["machine"]["packages"].keys()
-    models = read_json(tiny_run / store.MODELS)
-    variant = next(m.variant for m in tiny_plan(tmp_path).models if m.name == "wrong-2")
+    models = read_json(tiny_run / store.FOUNDATIONS)
+    variant = next(m.variant for m in tiny_plan(tmp_path).foundations if m.name == "wrong-2")
     assert variant is not None
-    entry = next(row for row in models if row["model"] == "wrong-2")
+    entry = next(row for row in models if row["foundation"] == "wrong-2")
     assert entry["factors"] == pytest.approx(dict(variant.factors), rel=1e-15)
     assert entry["base_digest"] == load_vessel("gunnerus-28.9").digest
     assert not list(tiny_run.rglob(".*"))  # nothing temporary is left
@@ -157,15 +159,14 @@ def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Pat
 
 def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
-    from shipid.hybrid.tuning import Tuned, tune
-    from shipid.study import run
+    fit = PathDrawn.fit
 
-    def failing(*args: Any, **kwargs: Any) -> dict[str, Tuned]:
-        return tune(*args, **kwargs) | {"wrong-1": Tuned(None, [], 0.0)}
+    def failing(method: PathDrawn, task: Task) -> dict[str, Fitted]:
+        return fit(method, task) | {"wrong-1": Fitted(None, [], 0.0)}
 
-    monkeypatch.setattr(run, "tune", failing)
+    monkeypatch.setattr(PathDrawn, "fit", failing)
     run_here(tiny_plan(tmp_path), tmp_path / "run")
-    rows = store.read_rows(tmp_path / "run").set_index("model")
+    rows = store.read_rows(tmp_path / "run").set_index("foundation")
     assert set(rows.loc["wrong-1", "status"]) == {"failed"}
     assert rows.loc["wrong-1", "H"].isna().all()
     assert set(rows.drop("wrong-1")["status"]) == {"ok"}
@@ -248,7 +249,7 @@ DAMAGES = {
     "foreign test windows": (_damage(lambda _: b"hello", "test.npz"), "missing or damaged"),
     "no cell": (lambda folder: next((folder / "cells").glob("*.npz")).unlink(), "cannot be read"),
     "half a cell": (_damage(_half, "cells/*.npz"), "not a predictor"),
-    "no models": (lambda folder: (folder / "models.json").unlink(), "cannot be read"),
+    "no foundations": (lambda folder: (folder / "foundations.json").unlink(), "cannot be read"),
     "no dataset": (lambda folder: (folder / "dataset.parquet").unlink(), "dataset.parquet: cannot be read"),
 }
 
@@ -287,8 +288,8 @@ def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
     own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
     plan = tiny_plan(tmp_path, {"family.1.base": "./own.toml"})
-    assert store.write_patches(tmp_path / "far" / "away", plan.models) == 3
-    for model in plan.models[:-1]:
+    assert store.write_patches(tmp_path / "far" / "away", plan.foundations) == 3
+    for model in plan.foundations[:-1]:
         rebuilt = load_vessel(str(tmp_path / "far" / "away" / f"{model.name}.toml"))
         assert model.variant is not None
         assert list(rebuilt.parameters.values()) == model.variant.parameters

@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.engine import native, rollout
+from shipid.engine import engines, native
 from shipid.errors import DataError, DocumentError
 from shipid.files import write_table
+from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error, summary
-from shipid.predictor import physics_paths
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, prepare, window_memory
@@ -42,9 +42,9 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
     for variant in members(family.model_copy(update={"members": count}), base):
         vessel, errors = base.with_values(variant.values), []
         for windows in partition(plan, dataset)[:2]:
-            memory = window_memory(vessel, dataset, windows)
-            paths, _ = physics_paths(vessel, windows.columns, windows.horizon, 1.0, "euler", memory=memory)
-            errors.append(position_error(paths[:, 0], windows.future))
+            hidden = window_memory(vessel, dataset, windows)
+            paths = Physics(vessel, windows.horizon, 1.0).paths(windows.instants(hidden=hidden))
+            errors.append(position_error(paths, windows.future))
         whole = summary(np.concatenate(errors, axis=1))
         found.append({"member": variant.name, "factors": variant.factors, **whole})
     return found
@@ -54,7 +54,7 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
 def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a C compiler, where errors are summed on the way, and without one."""
     if not compiled:
-        for place in (native, rollout, module):
+        for place in (native, engines):
             monkeypatch.setattr(place, "compiler", lambda: None)
     frame, expected = screened(plan, 5), by_paths(plan, 5)
     assert list(frame["member"]) == [row["member"] for row in expected]
@@ -67,7 +67,9 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
 def test_members_are_those_of_the_study(plan: Plan) -> None:
     """A member keeps its number and draw whatever the size of the family."""
     prepared = prepare(plan, obtain(plan))
-    own = {model.name: model.variant.factors for model in prepared.models if model.family == "wrong" and model.variant}
+    own = {
+        model.name: model.variant.factors for model in prepared.foundations if model.family == "wrong" and model.variant
+    }
     frame = screened(plan, 7).set_index("member")
     assert len(own) == 2
     for name, factors in own.items():

@@ -1,4 +1,4 @@
-"""What a guess is made of: names that columns often have, suggestions, findings, and what is known so far."""
+"""Parts of a guess: the usual names of columns and units, suggestions, findings, and the state of the search."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ INPUT_NAMES: dict[str, str] = {
     "speed": r"sog|speed|spd|speed_?over_?ground",
     "course": r"cog|course|track|course_?over_?ground",
 }
-"""How logs call what a mapping turns into columns, in lower case, without its unit; for signals see their table."""
+"""Key of a mapping that becomes other columns -> pattern of its names in logs, lower case, without a unit.
+
+The patterns of all other columns are in `shipid.physics.signals.SIGNALS`.
+"""
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?",
     "m/s": r"mps|m/s|ms",
@@ -38,7 +41,12 @@ SIDES = r"(port|starboard|stbd|stern|bow|fore|aft|main)"
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A column of the dataset: where from, how sure (0 to 1), why; `extra` holds further keys of the mapping."""
+    """A guessed column of the dataset.
+
+    name : column of the dataset. source, unit : column of the log, and its unit.
+    confidence : 0 to 1. evidence : the reason, in words.
+    extra : further keys of the mapping, such as `sign`.
+    """
 
     name: str
     source: str
@@ -50,7 +58,12 @@ class Suggestion:
 
 @dataclass(frozen=True)
 class Finding:
-    """A defect or a trap: its kind, the columns that have it, how sure, a sentence, and a repair that would mend it."""
+    """A defect of the log, or a sign or unit that is easily mistaken.
+
+    kind : a few words, the same for all findings of this kind. columns : columns of the log that have it.
+    confidence : 0 to 1. sentence : what was seen, with numbers.
+    repair : keys of a [[repair]] that would correct it; None if there is none.
+    """
 
     kind: str
     columns: tuple[str, ...]
@@ -64,7 +77,7 @@ def _pattern(meaning: str) -> str:
 
 
 def stem(name: str) -> str:
-    """A name without brackets and without a unit at its end."""
+    """Return the name of a column in lower case, without brackets and without a unit at its end."""
     base = plain(name)
     head, underscore, tail = base.rpartition("_")
     is_unit = underscore and any(re.fullmatch(words, tail) for words in UNIT_WORDS.values())
@@ -72,7 +85,7 @@ def stem(name: str) -> str:
 
 
 def unit_said(name: str, si: str) -> str | None:
-    """Unit that a name says, if a column of this SI unit can have it."""
+    """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`."""
     inside = re.search(r"[\[(]([^\])]*)[\])]", name)
     *before, last = re.split("[_ ]", name)
     words = inside.group(1) if inside else last if before or si == "rev/s" else ""
@@ -84,7 +97,13 @@ def unit_said(name: str, si: str) -> str | None:
 
 @dataclass
 class State:
-    """What is known so far; each step adds to it."""
+    """What the guess knows so far; each step of `guess` adds to it.
+
+    t : time [s], (N,). clock_unit : unit of the log's clock. columns : name -> values as logged, (N,).
+    chosen : windows over which changes are compared. taken : columns of the log that already have a meaning.
+    position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
+    velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
+    """
 
     t: Array
     clock_unit: str
@@ -96,19 +115,19 @@ class State:
     position: Complex | None = None
     psi: Array | None = None
     r: Array | None = None
-    velocity: Complex | None = None  # in the earth's frame
+    velocity: Complex | None = None
     body: Complex | None = None
 
     def free(self) -> list[str]:
-        """Columns that nothing claims yet."""
+        """Return the columns that have no meaning yet."""
         return [name for name in self.columns if name not in self.taken]
 
     def called(self, meaning: str) -> list[str]:
-        """Free columns whose name says that they may be this."""
+        """Return the free columns whose name fits this meaning."""
         return [name for name in self.free() if re.fullmatch(_pattern(meaning), stem(name))]
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
-        """Claim a column."""
+        """Suggest column `source` of the log for column `name` of the dataset; it is then taken."""
         self.taken.add(source)
         self.suggestions.append(Suggestion(name, source, unit, round(confidence, 2), why, extra))
 
@@ -120,9 +139,9 @@ class State:
         sentence: str,
         repair: dict[str, Any] | None = None,
     ) -> None:
-        """Note a finding."""
+        """Add a finding."""
         self.findings.append(Finding(kind, columns, round(confidence, 2), sentence, repair))
 
     def all_called(self, meaning: str) -> list[str]:
-        """Columns whose name says that they may be this, claimed or not."""
+        """Return all columns whose name fits this meaning, taken or free."""
         return [name for name in self.columns if re.fullmatch(_pattern(meaning), stem(name))]

@@ -1,6 +1,7 @@
 """Guess what the columns of an unknown log are, how sure that is, and what is wrong with them.
 
-Names say what a column may be; kinematics decide. A guess is a draft for a person to read: it mends nothing.
+The name of a column gives candidates; kinematic tests decide between them. A guess is a draft for a person to read. It
+corrects nothing.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import SIGNALS, named, steers
 
 CLEAR, LIKELY = 1.5, 0.6
-AZIMUTH = "thruster"  # component of a command of an azimuth unit whose name says no side
+AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 
 
 @dataclass(frozen=True)
 class Guess:
-    """All that could be found out about a log."""
+    """The result of a guess.
+
+    sniffed : the log as numbers. columns, findings : suggested columns and defects. unused : columns without a meaning.
+    """
 
     file: Path
     sniffed: Sniffed
@@ -39,7 +43,7 @@ class Guess:
     unused: tuple[str, ...]
 
     def column(self, name: str) -> Suggestion | None:
-        """Give the suggestion for a column of the dataset."""
+        """Return the suggestion for a column of the dataset; None if there is none."""
         return next((column for column in self.columns if column.name == name), None)
 
     @property
@@ -68,7 +72,7 @@ def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
     ]:
         state.taken.add(name)  # numbers of rows
     if len(state.chosen.first) < 5:
-        raise DataError(f"{len(sniffed.t)} rows: too few to tell anything from", file=file)
+        raise DataError(f"{len(sniffed.t)} rows: too few for a guess", file=file)
     _pose(state, file)
     _velocities(state)
     _yaw_rate(state)
@@ -81,7 +85,10 @@ def guess(file: str | Path, names: tuple[str, ...] = ()) -> Guess:
 
 
 def _pose(state: State, file: str | Path) -> None:
-    """Position and heading: the pair and the angle whose course and heading agree best, names preferred."""
+    """Choose position and heading: the pair of columns and the angle whose course and heading agree best.
+
+    Columns with fitting names are tried first. Raises DataError if no column can be a position or a heading.
+    """
     pairs = [(n, e) for n in state.called("north") for e in state.called("east")]
     globe = [(n, e) for n in state.called("latitude") for e in state.called("longitude")]
     headings = state.called("psi")
@@ -115,15 +122,15 @@ def _pose(state: State, file: str | Path) -> None:
 
 
 def _differentiated(state: State) -> list[str]:
-    """Columns of which another one is the rate: what may be a heading in a log without names."""
-    found = []
+    """Return the columns whose rate is another column: the candidates for a heading in a log without names."""
+    integrated = []
     integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in state.free()}
     for name in state.free():
         change = state.chosen.change(state.columns[name])
         fits = [evidence.fit(change, integrals[other]) for other in integrals if other != name]
         if any(fit.left < 0.05 and abs(fit.scale - 1) < 0.05 for fit in fits):
-            found.append(name)
-    return found
+            integrated.append(name)
+    return integrated
 
 
 def _plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
@@ -169,7 +176,10 @@ def _take_pose(
 
 
 def _velocities(state: State) -> None:
-    """The pair of columns, its frame, order and sign whose integral is the track; names preferred if nearly as good."""
+    """Choose the two velocity columns: the pair, frame, order and sign whose integral fits the track best.
+
+    A pair with fitting names wins if it fits nearly as well.
+    """
     assert state.position is not None
     assert state.psi is not None
     seen = state.chosen.change(state.position)
@@ -197,7 +207,7 @@ Hypothesis = tuple[Fit, str, str, str, Complex]
 
 
 def _hypotheses(state: State, seen: Complex) -> Iterator[Hypothesis]:
-    """Every ordered pair of free columns as earth-fixed, body-fixed, and body-fixed with v to port."""
+    """Yield every ordered pair of free columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
     assert state.psi is not None
     numbered = all(name.isdecimal() for name in state.columns)
     free = [name for name in state.free() if np.ptp(state.columns[name]) > 0]
@@ -217,9 +227,9 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Hypothesis]:
             ):
                 change = state.chosen.change(path)
                 keep = evidence.robust(seen, change)
-                found = evidence.fit(seen[keep], change[keep])
-                if found.scale > 0:
-                    yield found, first, second, frame, path
+                result = evidence.fit(seen[keep], change[keep])
+                if result.scale > 0:
+                    yield result, first, second, frame, path
 
 
 def _take_velocities(state: State, best: Hypothesis, runner: Fit | None) -> None:
@@ -262,7 +272,7 @@ def _take_velocities(state: State, best: Hypothesis, runner: Fit | None) -> None
 
 
 def _speed_unit(fit: Fit, sources: tuple[str, str], state: State) -> tuple[str, bool]:
-    """Unit nearest to the scale, and whether a factor remains; a contradiction to what the name says is a finding."""
+    """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
     units = UNITS["m/s"]
     unit = min(units, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
     said = unit_said(sources[0], "m/s")
@@ -277,12 +287,12 @@ def _speed_unit(fit: Fit, sources: tuple[str, str], state: State) -> tuple[str, 
 
 
 def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], unit: str) -> None:
-    """A factor that the unit leaves: by the rounding of the values, or if it stands out of its own scatter."""
+    """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
     per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
     rounds = [evidence.lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
-    found = [entry for entry in rounds if entry[1] > 0.9]
-    if found and unit != "kn":
-        multiplier, _, count = max(found, key=lambda entry: entry[2])
+    near = [entry for entry in rounds if entry[1] > 0.9]
+    if near and unit != "kn":
+        multiplier, _, count = max(near, key=lambda entry: entry[2])
         factor = multiplier / per_knot
         if abs(factor - fit.scale) < max(0.03, 3 * fit.error) and abs(factor - 1.0) > 1e-3:
             sentence = (
@@ -323,23 +333,23 @@ def _speed_and_course(state: State, seen: Complex) -> bool:
 
 
 def _yaw_rate(state: State) -> None:
-    """The column whose integral is the heading; one that is named so is preferred if it is nearly as good."""
+    """Choose the yaw rate: the column whose integral fits the heading best; a fitting name wins if nearly as good."""
     assert state.psi is not None
     change = state.chosen.change(state.psi)
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
         return
-    found = []
+    candidates = []
     for name in state.free():
         fit = evidence.fit(change, state.chosen.change(evidence.integral(state.t, state.columns[name])))
         unit = min(UNITS["rad/s"], key=lambda entry: abs(np.log(max(abs(fit.scale), 1e-12) / UNITS["rad/s"][entry])))
         if fit.left < 0.5 and abs(abs(fit.scale) / UNITS["rad/s"][unit] - 1) < 0.25:
-            found.append((fit, name, unit))
-    found.sort(key=lambda entry: entry[0].left)
-    if not found:
+            candidates.append((fit, name, unit))
+    candidates.sort(key=lambda entry: entry[0].left)
+    if not candidates:
         return
-    best, called = found[0], state.all_called("r")
-    named = [entry for entry in found if entry[1] in called and entry[0].left < CLEAR * best[0].left + 0.1]
+    best, called = candidates[0], state.all_called("r")
+    named = [entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * best[0].left + 0.1]
     fit, name, unit = named[0] if named else best
     extra: dict[str, Any] = {}
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
@@ -360,11 +370,11 @@ def _yaw_rate(state: State) -> None:
 def _rate_by_name(state: State) -> None:
     for name in state.called("r")[:1]:
         unit = unit_said(name, "rad/s") or "deg/s"
-        state.suggest("r", name, unit, 0.4, "by its name; too straight a log to tell unit and sign")
+        state.suggest("r", name, unit, 0.4, "by its name; the ship turns too little to see unit and sign")
 
 
 def _orders(state: State) -> None:
-    """Rudder, azimuth and shaft by name; their sign by what they do to the yaw rate."""
+    """Choose rudder, azimuth and shaft columns by name, and their sign by their effect on the yaw rate."""
     numbered = all(name.isdecimal() for name in state.columns)
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
     angles = [(name, signal) for signal in named("command") if steers(signal) for name in state.called(signal)]
@@ -374,7 +384,7 @@ def _orders(state: State) -> None:
             for name in state.free()
             if 0 < np.abs(state.columns[name]).max() < 95 and np.ptp(state.columns[name]) > 0
         ]
-        # an order stands out among what merely answers, such as roll, by reaching where it was held
+        # an order is held at its largest value; a response such as roll is not
         strength = {
             name: evidence.effect(state.t, r, state.columns[name]) * _held(state.columns[name]) for name in small
         }
@@ -393,7 +403,7 @@ def _orders(state: State) -> None:
             confidence = 0.95
             sides = (
                 ("port", "starboard") if power > 0 else ("starboard", "port")
-            )  # where it does not turn her, and does
+            )  # side to which it does not turn the ship, side to which it does
             why = f"positive turns the ship to {sides[1]} (t value {abs(power):.0f})"
             if (power > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1
@@ -411,7 +421,7 @@ def _orders(state: State) -> None:
 
 
 def _unit_of(state: State, name: str, signal: str) -> str:
-    """Unit of a column that may be this signal: what its name says, else what its magnitude makes likely."""
+    """Return the unit of a column taken as this signal: the unit in its name, else the likely one by its magnitude."""
     row = SIGNALS[signal]
     large = row.read_as_SI is not None and float(np.abs(state.columns[name]).max()) > row.read_as_SI
     return unit_said(name, row.unit) or (
@@ -420,7 +430,7 @@ def _unit_of(state: State, name: str, signal: str) -> str:
 
 
 def _held(values: Array) -> float:
-    """Share of rows that repeat the value before, to a thousandth of the range, floored: orders are held."""
+    """Return the share of rows that repeat the value before (to 1/1000 of the range), floored: orders are held."""
     return 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-3 * np.ptp(values)))
 
 
@@ -436,11 +446,11 @@ def _unique(name: str, used: dict[str, int]) -> str:
 
 
 def _others(state: State) -> None:
-    """Roll, pitch and wind, by name alone."""
+    """Choose roll, pitch and wind columns by their names alone."""
     for meaning in ("phi", "theta"):
         for name in state.called(meaning)[:1]:
             unit = _unit_of(state, name, meaning)
-            state.suggest(meaning, name, unit, 0.5, "by its name; its sign cannot be told from the log")
+            state.suggest(meaning, name, unit, 0.5, "by its name; the log does not show its sign")
     if {"apparent_angle", "apparent_speed"} <= set(state.free()):
         why = "the sentence says that it is relative to the bow"
         state.suggest("V_w", "apparent_speed", "m/s", 0.9, why)
@@ -448,8 +458,8 @@ def _others(state: State) -> None:
     speeds, angles = state.called("V_w"), state.called("beta_w")
     if speeds and angles:
         unit = unit_said(speeds[0], "m/s") or "m/s"
-        state.suggest("V_w", speeds[0], unit, 0.5, "by its name; true or apparent cannot be told from the log")
+        state.suggest("V_w", speeds[0], unit, 0.5, "by its name; the log does not show whether it is true or apparent")
         said = "from" if "towards" not in angles[0].lower() else "towards"
-        why = f"by its name; taken as {said!r}, as sailors say it"
+        why = f"by its name; taken as {said!r}, as is usual at sea"
         turn = _unit_of(state, angles[0], "beta_w")
         state.suggest("beta_w", angles[0], turn, 0.5, why, direction=said, wrap=True)

@@ -1,4 +1,4 @@
-"""Defects of a log whose columns are known: of its rows, and of what position, heading and velocities say together."""
+"""Defects of a log whose columns are known: defects of rows, and contradictions of position, heading and velocity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no fi
 
 
 def defects_of_rows(state: State, sniffed: Sniffed) -> None:
-    """Rows that repeat, values that stop at a limit, and logs that were interpolated."""
+    """Report repeated rows, values that stop at a limit, holes, missing values, and a log that was interpolated."""
     sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
     moving = [name for name in sources if np.ptp(state.columns[name]) > 0]
     if moving:
@@ -54,14 +54,16 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
 
 
 def defects_of_motion(state: State) -> None:
-    """What position, heading, velocity and yaw rate say about each other."""
+    """Report contradictions between position, heading, velocity and yaw rate."""
     if state.psi is None:
         return
     if state.r is not None:
         delay, explained = _delay(state, state.psi, evidence.integral(state.t, state.r))
         if delay:
             _find_late(state, "heading", "yaw rate", delay, explained)
-            state.psi = np.interp(state.t + delay, state.t, state.psi)  # else what follows finds it once more
+            state.psi = np.interp(
+                state.t + delay, state.t, state.psi
+            )  # or the tests below would report the same delay again
             if state.body is not None and not _is_earth_fixed(state):
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
     if state.velocity is None or state.position is None or state.body is None:
@@ -78,9 +80,9 @@ def _is_earth_fixed(state: State) -> bool:
 
 
 def _arm_or_delay(state: State, path: Complex) -> Complex:
-    """A position ahead of its velocities: of another point of the ship, or of another time, whichever explains more.
+    """Report a position of another point of the ship than its velocities, or of another time: what explains more.
 
-    Returns the path of the velocities with that put right, so that nothing is found twice.
+    Returns the integrated velocities with this corrected, (N,), so that later tests do not report it again.
     """
     assert state.position is not None
     assert state.psi is not None
@@ -111,7 +113,7 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
 
 
 def _delay(state: State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:
-    """Seconds by which one comes later than the other, 0 if that explains little; and the share that it explains."""
+    """Report a delay; return it [s], 0 if it explains little, and the share of the misfit that it explains."""
     usual = float(np.median(np.diff(state.t)))
     delay, explained = evidence.shift(state.t, seen, integrated, max(3.0, 3 * usual))
     return (delay, explained) if abs(delay) > max(0.3, 0.75 * usual) and explained > 0.35 else (0.0, 0.0)
@@ -141,7 +143,7 @@ def _jumps(state: State, path: Complex) -> None:
 
 
 def _heading_offset(state: State) -> None:
-    """Drift in the straightest runs, where a ship makes none: median of arg(u + i v)."""
+    """Report a heading offset: the median of arg(u + i v) in the straightest runs, where a ship has no drift angle."""
     assert state.body is not None
     assert state.psi is not None
     r = state.r if state.r is not None else np.gradient(state.psi, state.t)

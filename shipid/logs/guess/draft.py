@@ -23,14 +23,14 @@ ORDER = ("wrap_interpolation", "break", "despike", "scale", "heading_offset", "l
 NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
 QUESTIONS = (
     "Which point of the ship do positions and velocities belong to? If not the vessel's origin: a lever_arm.",
-    "Are the commands orders or feedback? Do their names before the dot stand in the vessel document?",
+    "Are the commands orders or feedback? Are their names before the dot those of the vessel document?",
     "Is the wind true or apparent (relative = true), 'from' or 'towards'?",
 )
 
 
-def draft_mapping(found: Guess) -> str:
-    """Text of a mapping: columns with how sure they are, repairs, and the manoeuvres if it can be imported as it is."""
-    parts = [*_head(found), *_columns(found), *_estimate(found), *_repairs(found)]
+def draft_mapping(guess: Guess) -> str:
+    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
+    parts = [*_head(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
     text = (
         "\n".join(
             "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
@@ -39,21 +39,21 @@ def draft_mapping(found: Guess) -> str:
         + "\n"
     )
     try:
-        segments = segment_log(_read(text), found.file)
+        segments = segment_log(_read(text), guess.file)
     except ShipidError as error:
-        return text + f"\n# Cannot be imported as it stands: {error.path or ''}: {error.message}\n"
-    return text + segments_text(segments, found.sniffed.clock.get("unit", "s"))
+        return text + f"\n# Cannot be imported as it is: {error.path or ''}: {error.message}\n"
+    return text + segments_text(segments, guess.sniffed.clock.get("unit", "s"))
 
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
-    """Manoeuvres of the whole log of a mapping, whatever segments it has."""
+    """Return the manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
     whole = mapping.model_copy(update={"segment": (), "resample": None})
     return manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
 
 
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
-    """Segments as TOML, to be corrected by hand; `unit` is that of the log's clock."""
-    blocks = ["\n# Found by helm and heading: correct names, starts and ends, and remove what is no run."]
+    """Return segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
+    blocks = ["\n# Segmented by helm and heading: correct names, starts and ends, and remove what is no run."]
     if unit == "date":
         blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
     for segment in segments:
@@ -65,7 +65,7 @@ def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
 
 
 def moment(value: float, unit: str) -> str:
-    """A moment on the log's clock as people read it: the date in UTC, or the number."""
+    """Return a moment on the log's clock as text: a date in UTC, or the number."""
     if unit == "date":
         return datetime.fromtimestamp(value, UTC).strftime("%Y-%m-%d %H:%M:%S")
     return f"{value:.10g}"
@@ -83,35 +83,35 @@ def _lines(values: dict[str, Any]) -> Iterator[str]:
         yield f"{key} = {tomlkit.item(value).as_string()}"
 
 
-def _head(found: Guess) -> Iterator[str]:
-    yield f"# Drafted from {found.file.name}. Check every line: a percentage says how sure it is, the rest why."
+def _head(guess: Guess) -> Iterator[str]:
+    yield f"# Drafted from {guess.file.name}. Check every line: a percentage says how sure it is, the rest why."
     yield from (f"# ? {question}" for question in QUESTIONS)
-    yield from _lines({"name": found.file.stem})
+    yield from _lines({"name": guess.file.stem})
     yield "\n[source]"
-    yield from _lines({"sha256": sha256_of(found.file)})
+    yield from _lines({"sha256": sha256_of(guess.file)})
     yield "\n[format]"
-    yield from _lines(found.sniffed.form)
+    yield from _lines(guess.sniffed.form)
     yield "\n[clock]"
-    yield from _lines(found.sniffed.clock)
-    scattered = found.sniffed.scattered
-    source = found.columns[0].source
-    steps = np.diff(found.sniffed.t[np.isfinite(found.sniffed.columns[source])] if scattered else found.sniffed.t)
+    yield from _lines(guess.sniffed.clock)
+    scattered = guess.sniffed.scattered
+    source = guess.columns[0].source
+    steps = np.diff(guess.sniffed.t[np.isfinite(guess.sniffed.columns[source])] if scattered else guess.sniffed.t)
     usual = float(np.median(steps))
     if scattered:
-        yield f"step = {usual:g}    # s: every sentence has its own instants; that of the position"
-    if scattered or found.kinds & {"holes in time", "missing values"}:
+        yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"
+    if scattered or guess.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {max(3.0, 5 * usual):g}    # s: shorter gaps are interpolated, longer ones break the run"
 
 
-def _columns(found: Guess) -> Iterator[str]:
-    findings = [finding for finding in found.findings if finding.repair is None]
+def _columns(guess: Guess) -> Iterator[str]:
+    findings = [finding for finding in guess.findings if finding.repair is None]
     if findings:
         yield ""
         yield from (f"# ! {finding.kind} ({_percent(finding.confidence)}): {finding.sentence}" for finding in findings)
-    for column in found.columns:
+    for column in guess.columns:
         yield f"\n[columns.{_key(column.name)}]    # {_percent(column.confidence)}{_mark(column)}: {column.evidence}"
         yield from _lines({"from": column.source, "unit": column.unit, **column.extra})
-    unused = [*(f"column {name!r} is not used" for name in found.unused), *found.sniffed.notes]
+    unused = [*(f"column {name!r} is not used" for name in guess.unused), *guess.sniffed.notes]
     if unused:
         yield ""
         yield from (f"# {words}" for words in unused)
@@ -129,19 +129,19 @@ def _key(name: str) -> str:
     return f'"{name}"' if "." in name else name
 
 
-def _estimate(found: Guess) -> Iterator[str]:
-    """A block for what is not in the log, if only velocities are not."""
-    named = {column.name for column in found.columns}
+def _estimate(guess: Guess) -> Iterator[str]:
+    """Yield the [estimate] block if only velocities are missing in the log."""
+    named = {column.name for column in guess.columns}
     lacking = [name for name in ("u", "v", "r") if name not in named]
     if "speed" in named:
         lacking = [name for name in lacking if name == "r"]
     if lacking:
-        yield f"\n[estimate]    # {', '.join(lacking)} not found; noise is assumed: the import says whether it fits"
+        yield f"\n[estimate]    # {', '.join(lacking)} not logged; noise is assumed: the import shows whether it fits"
         yield from _lines(NOISE)
 
 
-def _repairs(found: Guess) -> Iterator[str]:
-    mendable = [(finding, finding.repair) for finding in found.findings if finding.repair is not None]
+def _repairs(guess: Guess) -> Iterator[str]:
+    mendable = [(finding, finding.repair) for finding in guess.findings if finding.repair is not None]
     for finding, repair in sorted(mendable, key=lambda entry: ORDER.index(entry[1]["kind"])):
         yield "\n[[repair]]"
         yield from _lines(repair)

@@ -1,4 +1,4 @@
-"""Kinematic tests on columns of unknown meaning: which of them fit together, in which unit, frame and sign.
+"""Kinematic tests on columns of unknown meaning: which columns fit together, in which unit, frame and sign.
 
 All tests compare changes over windows of a few seconds with integrals over the same windows, so that noise and
 resampling matter little. The plane is complex: north + i east, and a body vector turns by exp(i psi).
@@ -32,14 +32,14 @@ class Windows:
     last: NDArray[np.intp]
 
     def change(self, values: NDArray[np.generic]) -> Complex:
-        """Value at the end less value at the start."""
+        """Return the change of a signal (N,) over each window, end minus start, (W,)."""
         plane = np.asarray(values, dtype=np.complex128)
         return np.asarray(plane[self.last] - plane[self.first])
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Seen changes explained by a scale times integrated ones: scale, its standard error, share left unexplained."""
+    """A fit of observed changes = scale * integrated changes: scale, its standard error, unexplained share (0 to 1)."""
 
     scale: float
     error: float
@@ -47,7 +47,7 @@ class Fit:
 
 
 def windows(t: Array, duration: float = WINDOW) -> Windows:
-    """Windows of about `duration` [s] without a hole in them: at least `STEPS` rows, at most a fifth of the log."""
+    """Return windows of about `duration` [s] without a hole: at least `STEPS` rows, at most a fifth of the log."""
     usual = float(np.median(np.diff(t)))
     duration = max(STEPS * usual, min(duration, (t[-1] - t[0]) / 5))
     first = np.arange(len(t))
@@ -62,12 +62,12 @@ def windows(t: Array, duration: float = WINDOW) -> Windows:
 
 
 def integral(t: Array, rate: NDArray[np.generic]) -> Complex:
-    """Integral of a real or complex rate (N,) from t[0] on."""
+    """Return the integral of a real or complex rate (N,) from t[0] to each t [s], (N,)."""
     return cumulative_integral(t, np.real(rate)) + 1j * cumulative_integral(t, np.imag(rate))
 
 
 def fit(seen: Complex, integrated: Complex) -> Fit:
-    """Least squares with one real scale; the error from the scatter of the scale between twenty parts of the log."""
+    """Fit one real scale by least squares; its error is the scatter of the scale between twenty parts of the log."""
     power = float(np.sum(np.abs(integrated) ** 2))
     total = float(np.sum(np.abs(seen) ** 2))
     if power <= 0.0 or total <= 0.0:
@@ -87,24 +87,24 @@ def fit(seen: Complex, integrated: Complex) -> Fit:
 
 
 def robust(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
-    """Windows whose unexplained change is no outlier: spikes and jumps of a position are told apart from all else."""
+    """Return which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out."""
     scale = fit(seen, integrated).scale
     miss = np.abs(seen - scale * integrated)
     return np.asarray(miss <= 6.0 * np.median(miss) + 1e-9)
 
 
 def agreement(track: Complex, psi: Array) -> complex:
-    """Mean of exp(i (course - psi)) over windows, those with little way weighing less."""
+    """Return the mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
     turned = track * np.exp(-1j * psi)
     size = float(np.sum(np.abs(turned)))
     return complex(np.sum(turned)) / size if size > 0 else 0j
 
 
 def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Unwrap an angle that jumps at a whole turn; false samples between, if any, are replaced and told.
+    """Unwrap an angle that jumps at a whole turn; replace false samples within a jump.
 
-    Returns the angle in its own unit, and where a step of more than 20 deg is no jump of a whole turn; one over a hole
-    in time t (N,) [s] says nothing.
+    Returns the angle in the unit of the log, (N,), and a mask of the steps of more than 20 deg that are no jump of a
+    whole turn. Steps over a hole in time t (N,) [s] are not in the mask.
     """
     signed = np.diff(values) / turn
     steps = np.abs(signed)
@@ -124,7 +124,7 @@ def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]
 
 
 def shift(t: Array, seen: NDArray[np.generic], integrated: NDArray[np.generic], longest: float) -> tuple[float, float]:
-    """Seconds by which `seen` comes later than what it integrates, and the share of the misfit that this explains."""
+    """Return the delay [s] of `seen` behind its integral, and the share of the misfit that the delay explains."""
     usual = float(np.median(np.diff(t)))
     chosen = windows(t)
     inside = (t[chosen.first] > t[0] + longest) & (t[chosen.last] < t[-1] - longest)
@@ -148,7 +148,9 @@ def _at(t: Array, values: NDArray[np.generic], instants: Array) -> Complex:
 
 
 def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
-    """Arm x + i y [m] of the position's point off that of the velocities, its error, and the share of misfit explained.
+    """Return the arm x + i y [m] from the point of the velocities to that of the positions.
+
+    Also its standard error [m], and the share of the misfit that it explains.
 
     Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
     """
@@ -157,18 +159,18 @@ def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, f
         return 0j, np.inf, 0.0
     parts = np.array_split(np.arange(len(seen)), 10)
     whole = np.vdot(turned, seen - integrated) / power
-    found = [
+    shifts = [
         np.vdot(turned[part], (seen - integrated)[part]) / np.sum(np.abs(turned[part]) ** 2)
         for part in parts
         if np.sum(np.abs(turned[part]) ** 2) > 0.02 * power / 10
     ]
-    error = 1.25 * float(np.std(found)) / np.sqrt(len(found)) if len(found) > 3 else np.inf
+    error = 1.25 * float(np.std(shifts)) / np.sqrt(len(shifts)) if len(shifts) > 3 else np.inf
     explained = abs(whole) ** 2 * power / max(float(np.sum(np.abs(seen - integrated) ** 2)), 1e-30)
     return complex(whole), error, float(explained)
 
 
 def effect(t: Array, r: Array, order: Array) -> float:
-    """How surely an order turns the ship to starboard: t value of a in r' = a order + b r + c."""
+    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard."""
     chosen = windows(t, 4.0)
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
@@ -188,7 +190,7 @@ def effect(t: Array, r: Array, order: Array) -> float:
 
 
 def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
-    """Where a position leaves its integrated velocity at once: (start, end [s], how far it stays away [m])."""
+    """Return where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m])."""
     usual = float(np.median(np.diff(t)))
     reach = max(1, round(2.0 / usual))
     if len(t) < 20 * reach:
@@ -202,14 +204,14 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
         return []
     edges = np.flatnonzero(wild)
     groups = np.split(edges, np.flatnonzero(np.diff(edges) > 2 * reach) + 1)
-    found = []
+    leaps = []
     for group in groups:
         start, end = max(0, group[0] - 1), min(len(t) - 1, group[-1] + reach + 1)
         around = 3 * reach
         before, after = drift[max(0, start - around) : start + 1], drift[end : end + around + 1]
         stays = abs(_middle(after) - _middle(before))
-        found.append((float(t[start]), float(t[end]), float(stays)))
-    return found
+        leaps.append((float(t[start]), float(t[end]), float(stays)))
+    return leaps
 
 
 def _middle(points: Complex) -> complex:
@@ -217,7 +219,7 @@ def _middle(points: Complex) -> complex:
 
 
 def straight(r: Array, t: Array) -> NDArray[np.bool_]:
-    """Rows in the straightest runs: hardly any turn for half a minute."""
+    """Return the rows of the straightest parts, where the ship hardly turns for half a minute."""
     usual = float(np.median(np.diff(t)))
     width = max(3, round(30.0 / usual))
     calm = pd.Series(np.abs(r)).rolling(width, center=True, min_periods=width // 2).max().to_numpy()
@@ -225,13 +227,13 @@ def straight(r: Array, t: Array) -> NDArray[np.bool_]:
 
 
 def visits(values: Array) -> int:
-    """How often a signal comes to its largest value."""
+    """Return how often a signal reaches its largest value."""
     top = values == values.max()
     return int(np.sum(np.diff(top.astype(int)) == 1))
 
 
 def between_rows(values: Array) -> float:
-    """Share of rows that lie exactly on the line between their neighbours, of those where anything changes."""
+    """Return the share of rows exactly on the line between their neighbours, among rows where a value changes."""
     first, second = np.diff(values), np.diff(values, 2)
     moving = (first[1:] != 0.0) & (first[:-1] != 0.0)
     quantum = np.min(np.abs(first[first != 0.0])) if np.any(first != 0.0) else 0.0
@@ -242,15 +244,15 @@ def between_rows(values: Array) -> float:
 
 
 def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
-    """Multiplier in [low, high] that makes values round: (it, how well from 0 to 1, from how many values).
+    """Return the multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
 
     Instruments round, and the rounding survives a conversion: R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x
-    are whole multiples of the quantum, and about N^-1/2 else. Only values that stand still for two rows are asked,
-    which no later interpolation has made; if there are few, all.
+    are whole multiples of the quantum, and about N^-1/2 else. Only values that are equal in two rows are used,
+    because interpolation has not changed them; if they are few, all values are used.
     """
     still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
     asked = still if len(still) >= FEW else np.unique(values)[:400]
-    if len(asked) < FEW or _roundness(asked, np.ones(1), 1e-4)[0] > 0.8:  # round as they stand: nothing was converted
+    if len(asked) < FEW or _roundness(asked, np.ones(1), 1e-4)[0] > 0.8:  # round already: nothing was converted
         return 0.0, 0.0, len(asked)
     for quantum in (0.1, 0.01):
         if low * float(np.ptp(asked)) < 20 * quantum:
@@ -266,13 +268,13 @@ def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
 
 
 def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
-    """R for every multiplier, (K,)."""
+    """Return R, the roundness from 0 to 1, for every multiplier, (K,)."""
     phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
     return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
 
 
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
-    """Columns with missing values interpolated; good enough for tests."""
+    """Return the columns with missing values interpolated in time; good enough for these tests, not for a dataset."""
     result = {}
     for name, values in columns:
         known = np.isfinite(values)

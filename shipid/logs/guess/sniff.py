@@ -1,4 +1,4 @@
-"""How an unknown log is written: its format, and its columns as numbers."""
+"""Read an unknown log: recognise its format, and return its columns as numbers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ _WORDS_FOR_NOTHING = ("", "nan", "null", "none", "n/a", "na", "-", "--")
 class Sniffed:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
-    `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` say what was passed over.
+    `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
+    that were left out.
     """
 
     form: dict[str, Any]
@@ -39,16 +40,16 @@ class Sniffed:
 
     @property
     def scattered(self) -> bool:
-        """Whether a row is one sentence, which does not say everything."""
+        """Whether a row is a single sentence, so that empty cells are no defect."""
         return READERS[self.form.get("kind", "text")].scattered
 
 
 def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
-    """Find out how a log is written and read it; `names` name the columns of a text log without a header.
+    """Recognise the format of a log and read it; `names` are the columns of a text log without a header.
 
     Raises
     ------
-    DataError : if it is no log that can be read, or has no column that could be its clock.
+    DataError : the file cannot be read as a log, or no column can be its clock.
     """
     try:
         head = file.read_bytes()[:200_000]
@@ -81,7 +82,7 @@ def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     if b"\0" in head:
-        raise DataError("binary, and no format that is known: export it as text, Parquet, .mat or NMEA", file=file)
+        raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
         try:
             # the last character may be cut
@@ -93,7 +94,7 @@ def _encoding(head: bytes, file: Path) -> str:
 
 
 def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
-    """Separator and decimal sign that make most cells numbers in lines of equal length; the header stands above."""
+    """Return the separator and decimal sign that give most numbers in lines of equal length; the header is above."""
     best: tuple[float, str, str] = (0.0, "", "")
     for separator in SEPARATORS:
         rows = [cells(line, separator) for line in lines if line.strip()]
@@ -105,7 +106,7 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
                 best = (score, separator, decimal)
     score, separator, decimal = best
     if score < NUMERIC / 2:
-        raise DataError("no table of numbers, whichever separator: export it as CSV", file=file)
+        raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if row != [""]).most_common(1)[0][0]
     data = next(i for i, row in enumerate(rows) if len(row) == width and _number_share(row, decimal) >= NUMERIC / 2)
@@ -123,12 +124,12 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
 
 
 def cells(line: str, separator: str) -> list[str]:
-    """Cells of a line of text."""
+    """Split a line of text into cells."""
     return line.split() if separator == "whitespace" else [cell.strip().strip('"') for cell in line.split(separator)]
 
 
 def _number_share(row: list[str], decimal: str) -> float:
-    """Share of cells that are numbers; an empty one is neither."""
+    """Return the share of cells that are numbers; empty cells are not counted."""
     said = [
         cell.replace(",", ".") if decimal == "," else cell for cell in row if cell.lower() not in _WORDS_FOR_NOTHING
     ]
@@ -144,7 +145,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[str]]:
-    """Columns that are mostly numbers, and the names of those that are words."""
+    """Return the columns that are mostly numbers, and the names of the columns of words."""
     columns: dict[str, Array] = {}
     words = []
     for index, name in enumerate(map(str, table.columns)):
@@ -163,7 +164,7 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
 
 
 def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
-    """Column of time: one that rises, by its name if several do; dates are tried where no number rises."""
+    """Return the clock, a column that rises: by its name if several do; a column of dates if no number rises."""
     rising = [name for name, values in columns.items() if np.isfinite(values).all() and np.all(np.diff(values) > 0)]
     called = [name for name in columns if CLOCK_WORDS.match(plain(name))]
     for name in [name for name in map(str, table.columns) if CLOCK_WORDS.match(plain(name)) and name not in columns]:
@@ -171,17 +172,17 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if np.isfinite(since).all() and np.all(np.diff(since) > 0):
             return {"from": name, "unit": "date"}, since
         called.append(name)
-    found = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
-    found = found or rising
-    if not found:
+    candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
+    candidates = candidates or rising
+    if not candidates:
         said = (
             f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
         )
         raise DataError(f"no column can be the clock: {said}", file=file)
-    t: Array = columns[found[0]]
-    name = plain(found[0])
+    t: Array = columns[candidates[0]]
+    name = plain(candidates[0])
     milliseconds = name.endswith("ms") or (np.median(np.diff(t)) >= 20 and not np.any(t % 1))
-    return {"from": found[0], "unit": "ms" if milliseconds else "s"}, np.asarray(
+    return {"from": candidates[0], "unit": "ms" if milliseconds else "s"}, np.asarray(
         t * (1e-3 if milliseconds else 1.0), dtype=np.float64
     )
 
@@ -197,9 +198,9 @@ def _fault(values: Array) -> str:
     if not np.isfinite(values).all():
         return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
     row = int(np.argmax(np.diff(values) <= 0)) + 1
-    return f"{'stands still' if values[row] == values[row - 1] else 'goes back'} in row {row + 1}"
+    return f"{'repeats' if values[row] == values[row - 1] else 'goes back'} in row {row + 1}"
 
 
 def plain(name: str) -> str:
-    """A name in lower case without its unit in brackets."""
+    """Return a name in lower case without its unit in brackets."""
     return re.sub(r"[\[(].*", "", name).strip().lower().replace(" ", "_").replace("-", "_")

@@ -1,0 +1,46 @@
+"""The PyTorch engine: width of blocks, entries of series, sums over components, agreement with CasADi."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from shipid.engine import torch as engine  # noqa: E402
+from shipid.engine.rollout import rollout  # noqa: E402
+from shipid.vessel.dynamics import dynamics  # noqa: E402
+from shipid.vessel.load import load_vessel  # noqa: E402
+
+
+@pytest.mark.parametrize("num_samples", [1, 255, 256, 8193, 20000])
+@pytest.mark.parametrize("compiled", [False, True])
+def test_blocks_cover_all_samples_with_little_padding(num_samples: int, compiled: bool) -> None:
+    width = engine._width(num_samples, 1, 1, compiled, "cpu")
+    padded = -(-num_samples // width) * width
+    assert width <= (engine.COMPILED_BLOCK if compiled else engine.EAGER_BLOCK)
+    assert padded - num_samples < (engine.GRAIN if compiled else 1) * (padded // width)
+    assert not compiled or width % engine.GRAIN == 0
+
+
+def test_a_constant_series_repeats_its_entry() -> None:
+    series = torch.tensor([[1.0], [2.0]])
+    assert engine._at(series, 1).item() == 2.0
+    assert engine._at(series[:1], 7).item() == 1.0
+
+
+def test_a_value_that_all_components_share_counts_for_each() -> None:
+    assert engine._sum(2.0, 3) == 6.0
+    assert engine._sum(torch.tensor([[2.0]]), 3).tolist() == [6.0]
+    assert engine._sum(torch.tensor([[1.0, 2.0, 4.0]]), 3).tolist() == [7.0]
+
+
+def test_a_rollout_agrees_with_casadi() -> None:
+    ship = load_vessel("gunnerus-28.9")
+    model = dynamics(ship)
+    start = {name: np.array([4.0, 3.0]) if name == "u" else np.zeros(2) for name in model.state}
+    commands = {name: np.array([2.0, 1.5]) if name.endswith(".n") else np.array([0.1, -0.2]) for name in model.commands}
+    calm = {name: np.zeros(2) for name in model.environment}
+    paths = [rollout(ship, start, commands, calm, step=0.5, num_steps=4, engine=name) for name in ("torch", "casadi")]
+    assert np.abs(paths[0]["east"][-1]).max() > 0
+    assert np.allclose(paths[0].states, paths[1].states, rtol=1e-12, atol=1e-12)

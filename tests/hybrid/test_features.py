@@ -1,0 +1,128 @@
+"""Inputs by hand: what is measured at the instant, and what the past says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.data.windows import Instants, cut_windows
+from shipid.errors import DataError
+from shipid.hybrid.features import Inputs, Memory, choose_features, feature_table, group_of, past_error
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import load_vessel
+from tests.study.test_commands import weaving
+
+COMMANDS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
+SHIP = load_vessel("gunnerus-28.9")
+
+
+@pytest.fixture
+def columns():
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=50) for name in ("north", "east", "psi", "u", "v", "r", "V_w", "beta_w")}
+    columns["port.n"], columns["port.alpha"] = rng.uniform(1, 3, 50), rng.uniform(-1, 1, 50)
+    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.alpha": columns["port.alpha"].copy()}
+
+
+def test_columns_of_which_none_varies_are_refused():
+    with pytest.raises(DataError, match="none of u, v varies"):
+        choose_features({"u": np.full(9, 2.0), "v": np.zeros(9)})
+
+
+def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):
+    table = feature_table(columns, COMMANDS)
+    assert list(table) == ["u", "v", "r", *COMMANDS, "u_rw", "v_rw"]
+    chosen = choose_features(table)
+    assert list(chosen) == ["u", "v", "r", "port.n", "port.alpha", "u_rw", "v_rw"]
+    assert chosen["port.n"] == ("port.n", "starboard.n")
+
+
+def test_different_azimuths_leave_the_nine_inputs_of_12(columns):
+    columns["starboard.n"][3] += 0.01
+    columns["starboard.alpha"][7] -= 0.01
+    assert len(choose_features(feature_table(columns, COMMANDS))) == 9
+
+
+def test_constant_columns_are_dropped_and_motions_never_merged(columns):
+    columns["port.n"][:] = 2.4
+    columns["v"] = columns["u"].copy()
+    chosen = choose_features(feature_table(columns, COMMANDS[:2]))
+    assert list(chosen) == ["u", "v", "r", "port.alpha", "u_rw", "v_rw"]
+
+
+def test_wind_that_was_not_measured_is_no_input(columns):
+    del columns["beta_w"]
+    assert list(feature_table(columns, ())) == ["u", "v", "r"]
+
+
+def test_relative_wind_by_hand():
+    columns = {name: np.array([value]) for name, value in {"u": 4.0, "v": 0.5, "r": 0.0, "V_w": 6.0}.items()}
+    head = feature_table(columns | {"psi": np.zeros(1), "beta_w": np.array([np.pi])}, ())
+    assert (head["u_rw"][0], head["v_rw"][0]) == pytest.approx((10.0, 0.5))  # wind towards the stern
+    beam = feature_table(columns | {"psi": np.array([1.0]), "beta_w": np.array([1.0 + np.pi / 2])}, ())
+    assert (beam["u_rw"][0], beam["v_rw"][0]) == pytest.approx((4.0, -5.5))  # wind towards starboard
+
+
+def test_a_missing_column_is_named(columns):
+    del columns["starboard.n"]
+    with pytest.raises(DataError, match=r"starboard\.n"):
+        feature_table(columns, COMMANDS)
+
+
+# Memory.
+
+
+@pytest.fixture(scope="module")
+def past():
+    """Windows of the ship's own Euler runs with 8 s of past."""
+    return cut_windows(weaving("ab"), horizon=5, past=8)
+
+
+def test_history_and_turned_by_hand(past):
+    memory = Memory(history=(4.0,), turned=(8.0,))
+    table = Inputs(COMMANDS, memory).table(Physics(None, 5, 1.0), past.instants())
+    for name, label in (("u", "past-4.u"), ("port.alpha", "port.past-4.alpha")):
+        np.testing.assert_array_equal(table[label], past.past[name][-4] - past.columns[name])
+    np.testing.assert_array_equal(table["turned-8.psi"], past.columns["psi"] - past.past["psi"][0])
+    assert memory.past == 8.0
+
+
+def test_exact_physics_has_no_past_error(past):
+    found = past_error(Physics(SHIP, 5, 1.0), past.instants(), 8.0)
+    assert set(found) == {"x", "y", "u", "v", "r"}
+    for values in found.values():
+        np.testing.assert_allclose(values, 0.0, atol=1e-9)
+
+
+def test_past_error_of_wrong_physics_grows_and_is_the_rollout_by_hand(past):
+    wrong = Physics(SHIP.with_values({"hull.derivatives.X_u|u|": -9000.0}), 5, 1.0)
+    errors = {seconds: past_error(wrong, past.instants(), seconds) for seconds in (2.0, 8.0)}
+    assert np.abs(errors[8.0]["x"]).mean() > 3 * np.abs(errors[2.0]["x"]).mean() > 0
+    then = {name: values[0] for name, values in past.past.items()}
+    given = {name: past.past[name] for name in COMMANDS}
+    states = replace(wrong, horizon=8).states(Instants(then, planned=given))
+    turned = past.columns["psi"] - then["psi"]
+    # predicted position, from the frame of the start to the one of now: turned, then moved to where the ship began
+    x = np.cos(turned) * states["x"][-1] + np.sin(turned) * states["y"][-1] + then["x"]
+    y = np.cos(turned) * states["y"][-1] - np.sin(turned) * states["x"][-1] + then["y"]
+    np.testing.assert_allclose(errors[8.0]["x"], -x, atol=1e-9)
+    np.testing.assert_allclose(errors[8.0]["y"], -y, atol=1e-9)
+    np.testing.assert_allclose(errors[8.0]["u"], past.columns["u"] - states["u"][-1], atol=1e-12)
+
+
+def test_a_past_that_is_missing_is_one_line(past):
+    for memory in (Memory(history=(9.0,)), Memory(error=9.0)):
+        with pytest.raises(DataError, match="needs 9 s of the past") as caught:
+            Inputs(COMMANDS, memory).table(Physics(SHIP, 5, 1.0), past.instants())
+        assert "\n" not in str(caught.value)
+
+
+def test_groups_follow_from_names():
+    names = {"u": "motion", "v_rw": "wind", "port.n": "command", "port.planned-1.n": "command"}
+    names |= {"past-4.u": "history", "port.past-4.n": "history", "turned-8.psi": "history", "error-8.x": "error"}
+    assert {name: group_of(name) for name in names} == names
+
+
+def test_inputs_survive_their_header():
+    inputs = Inputs(COMMANDS, Memory(history=(2.0, 4.0), error=8.0))
+    assert Inputs.from_header(inputs.header()) == inputs

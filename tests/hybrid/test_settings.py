@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.hybrid.methods import method_of
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.settings import spread
+
+
+def test_the_trained_path_is_what_the_method_pins():
+    assert PathTrained().model_dump() == {
+        "trials": 50,
+        "layers": (1, 3),
+        "units": (10, 500),
+        "input_dropout": (0.0, 1.0),
+        "hidden_dropout": (0.0, 1.0),
+        "learning_rate": (1e-5, 1e-1),
+        "weight_decay": 0.0,  # Adam
+        "epochs": 3000,
+        "batch": 0,  # full
+        "patience": 200,
+        "memory": {"history": (), "turned": (), "error": (), "observer": False},
+    }
+
+
+def test_a_field_can_be_changed_in_either_method():
+    assert PathTrained(trials=4, learning_rate=[1e-3, 1e-2]).ranges()["learning_rate"] == (1e-3, 1e-2)
+    assert PathTrained(trials=3, units=20).units == 20
+    assert PathDrawn(ridge=[1e-3, 1]).ranges()["ridge"] == (1e-3, 1.0)
+    assert "offset" not in PathDrawn(offset=1).ranges()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "message"),
+    [
+        ("path-drawn", {"trails": 4}, r"method\.trails: unknown key: did you mean 'trials'"),
+        ("path-drawn", {"trials": 0}, r"method\.trials"),
+        ("path-drawn", {"mirror": 1.5}, r"method\.mirror"),
+        ("path-drawn", {"ridge": [1.0, 0.1]}, "ridge: a range goes from low to high"),
+        ("path-drawn", {"motion_scale": [0.0, 1.0]}, r"method\.motion_scale"),  # searched by its logarithm
+        ("path-drawn", {"epochs": 3}, r"method\.epochs: unknown key"),  # of the other method
+        ("path-trained", {"hidden_dropout": 1.5}, r"method\.hidden_dropout"),
+        ("path-trained", {"units": [64, 32]}, "units: a range goes from low to high"),
+        ("path-trained", {"weight_decay": [0.0, 1.0]}, r"method\.weight_decay"),  # searched by its logarithm
+        ("path-trained", {"ridge": 1.0}, r"method\.ridge: unknown key"),
+    ],
+)
+def test_a_method_that_cannot_be_meant_is_refused_in_one_line(name, changes, message):
+    with pytest.raises(DocumentError, match=message) as caught:
+        method_of(name, changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_kind_is_told_the_names():
+    with pytest.raises(DocumentError, match="did you mean 'path-trained'"):
+        method_of("path-traind", {})
+
+
+def test_points_spread_evenly_and_keep_their_start():
+    points = np.array(spread(3, 64))
+    np.testing.assert_array_equal(spread(3, 5), points[:5])
+    np.testing.assert_array_equal(points[0], 0.5)
+    for quarter in range(4):  # each quarter of a range gets a quarter of the trials, give or take four
+        share = (points >= quarter / 4) & (points < (quarter + 1) / 4)
+        assert (abs(share.sum(axis=0) - 16) <= 4).all()
+
+
+def test_one_dimension_is_the_golden_ratio():
+    assert np.ravel(spread(1, 3)) == pytest.approx([0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1])
+
+
+def test_trials_fill_their_ranges_by_the_logarithm():
+    method = PathDrawn(trials=64, offset=1.5)
+    points = method.points()
+    assert len(points) == 64
+    for name, (low, high) in method.ranges().items():
+        if name == "ridge":
+            continue
+        found = np.array([point[name] for point in points])
+        assert ((found >= low) & (found <= high)).all()
+        assert np.log(found).mean() == pytest.approx(np.log([low, high]).mean(), abs=0.1)
+        assert found.min() < low * (high / low) ** 0.1
+        assert found.max() > low * (high / low) ** 0.9
+    assert {point["offset"] for point in points} == {1.5}
+    assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
+    assert points[:5] == PathDrawn(trials=5, offset=1.5).points()
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_all_trials_or_none_can_be_mirrored(share):
+    assert {point["mirror"] for point in PathDrawn(mirror=share).points()} == {share}
+
+
+def test_ridges_go_from_low_to_high_by_one_factor():
+    path = np.array(PathDrawn(ridge=[1e-4, 1e4]).path())
+    assert path[[0, -1]] == pytest.approx([1e-4, 1e4])
+    assert path[1:] / path[:-1] == pytest.approx(10.0)
+    assert PathDrawn(ridge=2).path() == [2.0]

@@ -1,0 +1,46 @@
+"""Free runs: a vessel reproduces its simulated log, pieces begin at measured states, errors are root mean squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError
+from shipid.identification.free_run import ALL, MEASURED, free_runs
+from shipid.identification.settings import Identify
+from shipid.vessel.load import load_vessel
+from tests.identification.trials import trials
+
+SHIP = load_vessel("gunnerus-28.9")
+OTHER = SHIP.with_values({"hull.derivatives.N_ur": 1.2 * SHIP.parameters["hull.derivatives.N_ur"]})
+DATA = trials(SHIP, runs=2, steps=30)
+SETTINGS = Identify(parameters=["hull.derivatives.N_ur"])
+
+
+def test_the_simulating_vessel_reproduces_its_log() -> None:
+    errors = free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS).errors
+    assert errors["run"].tolist() == [ALL, *DATA.runs]
+    assert errors["samples"].tolist() == [60, 30, 30]
+    assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
+
+
+def test_errors_are_root_mean_squares_of_the_series() -> None:
+    result = free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS)
+    log, other = (result.series[result.series["model"] == name] for name in (MEASURED, "other"))
+    difference = (other["u"].to_numpy() - log["u"].to_numpy())[1:]
+    assert np.abs(difference).max() > 1e-4
+    assert result.errors["u"][0] == pytest.approx(np.sqrt((difference**2).mean()))
+
+
+def test_every_piece_begins_at_the_measured_state() -> None:
+    series = free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS, length=10.0).series
+    assert series["piece"].nunique() == 3
+    for _, piece in series.groupby("piece"):
+        log, other = (piece[piece["model"] == name].iloc[0] for name in (MEASURED, "other"))
+        assert log["north"] == other["north"]
+        assert log["u"] == other["u"]
+
+
+def test_a_piece_shorter_than_two_steps_is_refused() -> None:
+    with pytest.raises(DataError, match="must hold two steps of 1 s"):
+        free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS, length=1.0)

@@ -1,0 +1,69 @@
+"""The variational step: structure of a layout, states that are left out, and derivatives of one step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.engine.rollout import rollout
+from shipid.identification.sensitivities import Layout, is_thrust, run_machine, variation
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+
+SHIP = load_vessel("gunnerus-28.9")
+PATH = "hull.derivatives.N_ur"
+
+
+def layout(signals: tuple[str, ...] = ("u", "v", "r"), nuisances: tuple[str, ...] = (), step: float = 0.5) -> Layout:
+    return Layout(dynamics(SHIP), ((PATH,),), signals, nuisances, (), 0, step, "rk4")
+
+
+def test_thrust_coefficients_are_recognised() -> None:
+    assert is_thrust("thruster.port.k_T")
+    assert is_thrust("thruster.propeller.K_T.J")
+    assert not is_thrust("thruster.port.D_p")
+    assert not is_thrust("hull.mmg.R_0")
+
+
+def test_only_states_that_influence_a_signal_are_integrated() -> None:
+    assert set(variation(layout()).states) == {"u", "v", "r"}
+    assert {"north", "east", "psi"} <= set(variation(layout((*layout().signals, "north", "east"))).states)
+
+
+def test_nuisances_that_change_the_motion_are_columns() -> None:
+    one = layout(nuisances=("current_north", "current_east", "heading_bias"))
+    assert one.num_moving == 2
+    assert variation(one).num_columns == len(variation(one).node) + 1 + 2
+
+
+def test_one_layout_is_built_once() -> None:
+    assert variation(layout()) is variation(layout())
+
+
+def test_outputs_of_a_step_are_those_of_a_rollout() -> None:
+    model, nx = variation(layout()), 3
+    start = {"north": 0.0, "east": 0.0, "psi": 0.3, "u": 4.0, "v": 0.1, "r": 0.01}
+    commands = {name: 2.0 if name.endswith(".n") else 0.2 for name in model.layout.model.commands}
+    factor, base = 1.1, np.array(list(SHIP.parameters.values()))
+    x = np.zeros((1, model.size))
+    x[0, :nx] = [start[name] for name in model.states]
+    x[0, nx : nx + nx * nx] = np.eye(nx).ravel()
+    fixed = np.concatenate([[factor], base, [SHIP.parameters[PATH]]])[None]
+    given = [commands[name] for name in model.layout.model.commands]
+    given += [commands[name] for name in model.layout.model.memory]
+    seen = np.concatenate([np.zeros(3), np.ones(3)])[None, None]
+    record = run_machine(layout(), x, fixed, np.array(given)[None, None], seen)[0, 0, 0]
+
+    def simulated(value: float) -> np.ndarray:
+        path = rollout(
+            SHIP.with_values({PATH: value * SHIP.parameters[PATH]}),
+            {name: np.array([number]) for name, number in start.items()},
+            {name: np.array([number]) for name, number in commands.items()},
+            {name: np.zeros(1) for name in model.layout.model.environment},
+            step=0.5, num_steps=1, method="rk4", engine="casadi",
+        )  # fmt: skip
+        return np.array([path[name][1, 0, 0] for name in ("u", "v", "r")])
+
+    assert np.allclose(record[:3], simulated(factor), rtol=0, atol=1e-12)
+    slope = (simulated(factor + 1e-4) - simulated(factor - 1e-4)) / 2e-4
+    assert np.abs(slope).max() > 1e-6
+    assert np.allclose(record[3 + 3 * nx :], slope, rtol=1e-6, atol=1e-12)

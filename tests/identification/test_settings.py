@@ -1,0 +1,70 @@
+"""The `[identify]` table: validation, factors with bounds and priors, ties, and overrides of single runs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.identification.settings import POSITIVE, WIDE, Identify, overrides, unknowns
+from shipid.vessel.load import load_vessel
+
+SHIP = load_vessel("gunnerus-28.9")
+MASS, YAW = "inertia.m", "hull.derivatives.N_ur"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"weights": {"speed": 0.1}}, "weights.speed is none"),
+        ({"nuisance": ["wind"]}, "nuisance.wind is none"),
+        ({"bounds": {MASS: (2.0, 1.0)}}, "give \\[low, high\\]"),
+        ({"horizon": 1.5}, "must hold two steps of 1 s"),
+    ],
+)
+def test_wrong_settings_are_refused(given: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Identify(parameters=[MASS], **given)
+
+
+def test_a_position_weight_fits_two_columns() -> None:
+    assert Identify(parameters=[MASS], weights={"position": 2.0, "psi": 0.1}).signals == {
+        "north": 2.0,
+        "east": 2.0,
+        "psi": 0.1,
+    }
+
+
+def test_nuisances_have_default_widths_in_a_fixed_order() -> None:
+    settings = Identify(parameters=[MASS], nuisance=["lever_arm", "current"])
+    assert list(settings.widths.items()) == [("current", WIDE["current"]), ("lever_arm", WIDE["lever_arm"])]
+
+
+def test_factors_have_the_bounds_of_the_vessel_checks() -> None:
+    free = unknowns(SHIP, Identify(parameters=[MASS, YAW], prior={YAW: 0.5}))
+    place = {path: i for i, path in enumerate(free.paths)}
+    assert free.low[place[MASS]] == POSITIVE
+    assert free.low[place[YAW]] == -math.inf
+    assert free.prior[place[YAW]] == 0.5
+    assert free.prior[place[MASS]] == math.inf
+    assert np.array_equal(free.centre, np.ones(2))
+    assert free.values(2 * free.centre)[MASS] == 2 * SHIP.parameters[MASS]
+
+
+def test_tied_paths_share_one_factor() -> None:
+    pair = ["thruster.port.k_T", "thruster.starboard.k_T"]
+    free = unknowns(SHIP, Identify(parameters=pair, together=[pair]))
+    assert free.groups == (tuple(pair),)
+    with pytest.raises(DocumentError, match="is in two groups"):
+        unknowns(SHIP, Identify(parameters=pair, together=[pair, pair[:1]]))
+
+
+def test_overrides_belong_to_one_run() -> None:
+    settings = Identify(parameters=[YAW], runs={"a": {"inertia": {"m": 7e5}, "environment": {"V_w": 3}}})
+    assert overrides(settings, ["a", "b"], SHIP, ["V_w"]) == {"a": {MASS: 7e5, "environment.V_w": 3.0}, "b": {}}
+    with pytest.raises(DocumentError, match="begins with no run of the data"):
+        overrides(settings, ["b"], SHIP, ["V_w"])
+    with pytest.raises(DocumentError, match="nothing to set"):
+        overrides(settings, ["a"], SHIP, [])

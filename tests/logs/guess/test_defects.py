@@ -1,0 +1,85 @@
+"""Defects put into a clean log are reported with their size; a clean log has none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.logs.guess.columns import Guess, guess
+from tests.logs.simulated import as_bridge, si_log
+
+CLEAN = as_bridge(si_log()).round(4)
+
+
+def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
+    frame.to_csv(folder / "log.csv", index=False)
+    return guess(folder / "log.csv")
+
+
+def test_a_clean_log_has_no_defect(tmp_path: Path) -> None:
+    assert guessed(tmp_path, CLEAN).kinds == set()
+
+
+def late(frame: pd.DataFrame, columns: list[str], delay: float) -> pd.DataFrame:
+    t = frame["time"].to_numpy()
+    return frame.assign(**{name: np.interp(t - delay, t, frame[name]) for name in columns})
+
+
+def moved(frame: pd.DataFrame, x: float, y: float) -> pd.DataFrame:
+    c, s = np.cos(np.radians(frame["psi"])), np.sin(np.radians(frame["psi"]))
+    return frame.assign(N=frame["N"] + x * c - y * s, E=frame["E"] + x * s + y * c)
+
+
+def turned(frame: pd.DataFrame, angle: float) -> pd.DataFrame:
+    """The heading reads `angle` [deg] low; the velocities are along the wrong heading."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    u, v = c * frame["u"] - s * frame["v"], s * frame["u"] + c * frame["v"]
+    return frame.assign(psi=(frame["psi"] - angle) % 360.0, u=u, v=v)
+
+
+DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
+    "frozen rows": (
+        lambda frame: frame.assign(
+            **{
+                name: frame[name].where((frame.index // 20) % 4 != 0).ffill().bfill()
+                for name in frame
+                if name != "time"
+            }
+        ),
+        r"2\d % of the rows repeat",
+    ),
+    "holes in time": (lambda frame: frame.drop(range(500, 540)), r"1 steps are more than 3 times"),
+    "missing values": (lambda frame: frame.assign(u=frame["u"].where(frame.index % 50 != 7)), r"no value in 'u'"),
+    "lever arm": (lambda frame: moved(frame, 9.0, -3.0), r"\+(8\.9|9\.\d) m forward and -(2\.9|3\.\d) m to starboard"),
+    "position jumps": (
+        lambda frame: frame.assign(E=frame["E"] + np.where(frame["time"] >= 300.0, 80.0, 0.0)),
+        r"does not come back: t = 29\d\S* to 30\d\S* \((79|80|81) m\)",
+    ),
+    "position spikes": (
+        lambda frame: frame.assign(N=frame["N"] + np.where(frame["time"] == 300.0, 90.0, 0.0)),
+        r"comes back near t = 300",
+    ),
+    "late position": (lambda frame: late(frame, ["N", "E"], 1.5), r"1\.\d s later than the velocity"),
+    "heading offset": (lambda frame: turned(frame, 4.0), r"by \+[34]\.\d deg"),
+}
+
+
+@pytest.mark.parametrize("kind", DEFECTS)
+def test_a_defect_is_reported_with_its_size(kind: str, tmp_path: Path) -> None:
+    spoil, sentence = DEFECTS[kind]
+    result = guessed(tmp_path, spoil(CLEAN))
+    findings = {finding.kind: finding for finding in result.findings}
+    assert kind in findings, sorted(findings)
+    assert re.search(sentence, findings[kind].sentence), findings[kind].sentence
+
+
+def test_a_repair_is_what_would_undo_the_defect(tmp_path: Path) -> None:
+    (arm,) = (f for f in guessed(tmp_path, moved(CLEAN, 9.0, -3.0)).findings if f.kind == "lever arm")
+    assert arm.repair is not None
+    assert (arm.repair["kind"], arm.repair["moves"]) == ("lever_arm", "position")
+    assert (arm.repair["x"], arm.repair["y"]) == (pytest.approx(9.0, abs=0.5), pytest.approx(-3.0, abs=0.5))

@@ -1,0 +1,131 @@
+"""Formats of text logs are recognised, and their clock and columns read as numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.guess.sniff import cells, plain, sniff
+
+T = np.arange(0.0, 10.0, 0.5)
+TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})
+
+
+def text(
+    separator: str = ",", decimal: str = ".", above: str = "", table: pd.DataFrame = TABLE, header: bool = True
+) -> str:
+    return above + table.to_csv(index=False, sep=separator, decimal=decimal, header=header)
+
+
+@pytest.mark.parametrize(
+    ("content", "form"),
+    [
+        (text(), {"separator": ",", "decimal": ".", "skip_rows": 0}),
+        (text(";"), {"separator": ";", "decimal": "."}),
+        (text(";", ","), {"separator": ";", "decimal": ","}),
+        (text("\t"), {"separator": "\t"}),
+        (text(above="Trial of the ship\nof last May\n"), {"separator": ",", "skip_rows": 2}),
+        (
+            "s,m,deg\n".join(text().split("\n", 1)).replace("psis", "psi\ns"),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+    ],
+)
+def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(content)
+    sniffed = sniff(file)
+    assert sniffed.form.items() >= form.items()
+    np.testing.assert_allclose(sniffed.t, T)
+    assert [plain(name) for name in sniffed.columns] == ["n", "psi"]
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text(header=False))
+    numbered = sniff(file)
+    assert numbered.form["header"] is False
+    assert all(name.isdecimal() for name in numbered.columns)
+    assert list(sniff(file, ("clock", "N", "psi")).columns) == ["N", "psi"]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "expected"),
+    [("utf-8", "utf-8"), ("utf-8-sig", "utf-8-sig"), ("cp1252", "cp1252"), ("utf-16", "utf-16")],
+)
+def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(text(table=TABLE.rename(columns={"psi": "psi [°]"})).encode(encoding))
+    sniffed = sniff(file)
+    assert sniffed.form["encoding"] == expected
+    assert "psi [°]" in sniffed.columns
+
+
+@pytest.mark.parametrize(
+    ("clock", "unit", "t"),
+    [
+        ((1000 * T).astype(int), "ms", T),
+        (1.7e9 + T, "s", 1.7e9 + T),
+        (pd.to_datetime(1.7e9 + T, unit="s").strftime("%Y-%m-%dT%H:%M:%S.%f"), "date", 1.7e9 + T),
+    ],
+)
+def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path: Path) -> None:
+    TABLE.assign(time=clock).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": unit}
+    np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
+
+
+def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
+    counted = TABLE.rename(columns={"time": "time_s"})
+    counted.insert(0, "row", range(len(T)))
+    counted.to_csv(tmp_path / "log.csv", index=False)
+    assert sniff(tmp_path / "log.csv").clock["from"] == "time_s"
+    counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0).to_csv(tmp_path / "log.csv", index=False)
+    assert sniff(tmp_path / "log.csv").clock["from"] == "x"
+
+
+def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> None:
+    TABLE.assign(mode="auto", spare=np.nan, N=TABLE["N"].where(T != 2.0)).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns) == ["N", "psi"]
+    assert sniffed.notes == ("column 'mode' holds words, not numbers", "column 'spare' is empty")
+    assert np.flatnonzero(np.isnan(sniffed.columns["N"])).tolist() == [4]
+    assert not sniffed.scattered
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "the file is empty"),
+        (b"\x00\x01\x02 binary", "a binary file of unknown format"),
+        (b"a letter\nto the captain\nwith no numbers\n", "no table of numbers with any separator"),
+        (text(table=TABLE.assign(time=np.minimum(T, 8.0), N=1.0, psi=1.0)).encode(), "'time' repeats in row 18"),
+        (text(table=TABLE.assign(time=np.abs(T - 2.0), N=1.0, psi=1.0)).encode(), "'time' goes back in row 2"),
+        (
+            text(table=TABLE.assign(time=TABLE["time"].where(T != 1.0), N=1.0, psi=1.0)).encode(),
+            "'time' has no value in row 3",
+        ),
+        (text(table=TABLE.assign(time=1.0, N=1.0, psi=1.0).rename(columns={"time": "x"})).encode(), "none rises"),
+    ],
+)
+def test_what_is_no_log_is_one_sentence(content: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes(content)
+    with pytest.raises(DataError, match=rf"log\.csv.*{said}"):
+        sniff(tmp_path / "log.csv")
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"cannot be read \(No such file"):
+        sniff(tmp_path / "gone.csv")
+
+
+def test_cells_and_names() -> None:
+    assert cells('1, "a b" ,', ",") == ["1", "a b", ""]
+    assert cells(" 1   2\t3", "whitespace") == ["1", "2", "3"]
+    assert plain(" Yaw-Rate (deg/s)") == "yaw_rate"

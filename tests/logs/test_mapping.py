@@ -1,0 +1,105 @@
+"""Mappings: what is declared is read in SI units; what contradicts itself is refused with its key."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from shipid.document import bundled
+from shipid.errors import DocumentError
+from shipid.logs.mapping import INPUTS, UNITS, read_mapping, to_si
+from shipid.logs.repairs import REPAIRS, Despike
+
+Write = Callable[..., Path]
+
+
+@pytest.mark.parametrize("name", bundled("studies/mappings"))
+def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
+    mapping = read_mapping(name)
+    assert mapping.source.url is not None or mapping.source.file is not None
+    assert len(mapping.digest) >= 16
+
+
+@pytest.mark.parametrize(
+    ("unit", "name", "factor"),
+    [
+        ("deg", "psi", math.pi / 180),
+        ("kn", "speed", 1852 / 3600),
+        ("rpm", "port.n", 1 / 60),
+        ("deg/min", "r", math.pi / 10800),
+        ("ms", "t", 1e-3),
+        ("deg", "latitude", math.pi / 180),
+    ],
+)
+def test_units_of_columns(unit: str, name: str, factor: float) -> None:
+    assert to_si(unit, name) == pytest.approx(factor)
+
+
+def test_every_table_of_units_holds_its_si_unit() -> None:
+    assert all(units[si] == 1.0 for si, units in UNITS.items())
+    assert set(INPUTS.values()) <= set(UNITS)
+
+
+def test_the_digest_follows_the_content_and_not_the_layout(plain_mapping: Write) -> None:
+    first = read_mapping(plain_mapping()).digest
+    assert read_mapping(plain_mapping("\n# a remark\n")).digest == first
+    assert read_mapping(plain_mapping(replace=('unit = "rpm"', 'unit = "rev/s"'))).digest != first
+
+
+def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
+    repair = (
+        '[[repair]]\nkind = "despike"\ncolumns = ["psi"]\nwindow = 5.0\nthreshold = 90.0\nunit = "deg"\nreason = "x"\n'
+    )
+    (despike,) = read_mapping(plain_mapping("\n" + repair)).repair
+    assert isinstance(despike, Despike)
+    assert despike.threshold == pytest.approx(math.pi / 2)
+    assert despike.window == 5.0
+
+
+@pytest.mark.parametrize(
+    ("more", "replace", "path", "said"),
+    [
+        ('digest = "x"\n', None, "digest", "computed, not written"),
+        ("", ('unit = "rpm"', 'unit = "deg"'), "columns.propeller.n.unit", "unknown unit 'deg'"),
+        ("", ("[columns.psi]", "[columns.head]"), "columns.head", "unknown column"),
+        ('[columns.wobble]\nfrom = "u"\nunit = "m"\n', None, "columns.wobble", "unknown column"),
+        ('[columns.V_w]\nfrom = "u"\nunit = "m/s"\n', None, "columns", "wind needs both"),
+        (
+            "[estimate]\nposition = 1.0\nheading_deg = 1.0\nacceleration = 0.1\nangular_acceleration_deg = 0.1\n",
+            None,
+            "estimate",
+            "nothing to estimate",
+        ),
+        ("[origin]\nlatitude = 63.0\nlongitude = 10.0\n", None, "origin", "belongs to latitude and longitude"),
+        ('[[repair]]\nkind = "polish"\n', None, "repair.0", "unknown kind 'polish'"),
+        ('[repair]\nkind = "scale"\n', None, "repair", r"write \[\[repair\]\]"),
+        ('[[segment]]\nrun = "a"\nstart = 5.0\nend = 2.0\n', None, "segment.0", "must lie before"),
+        ('[[segment]]\nrun = "a"\nstart = 1.0\nend = 2.0\n' * 2, None, "segment.1", "a run 'a' exists"),
+    ],
+)
+def test_a_contradiction_is_refused_with_its_key(
+    more: str, replace: tuple[str, str] | None, path: str, said: str, plain_mapping: Write
+) -> None:
+    file = plain_mapping("", replace or ("", ""))
+    text = file.read_text()
+    file.write_text(more + text if more.startswith("digest") else f"{text}\n{more}")
+    with pytest.raises(DocumentError, match=said) as caught:
+        read_mapping(file)
+    assert str(caught.value.path).startswith(path)
+    assert "mapping.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", REPAIRS)
+def test_unknown_keys_of_a_repair_are_named_with_those_of_its_kind(kind: str, plain_mapping: Write) -> None:
+    with pytest.raises(DocumentError, match="wobble"):
+        read_mapping(plain_mapping(f'\n[[repair]]\nkind = "{kind}"\nreason = "x"\nwobble = 1.0\n'))
+
+
+def test_columns_are_interpolated_where_their_instants_differ(plain_mapping: Write) -> None:
+    assert not read_mapping(plain_mapping()).resamples
+    late = plain_mapping(replace=('from = "N"', 'from = "N"\nlatency = 0.5'))
+    late.write_text(late.read_text().replace("[clock]", "[clock]\nmax_gap = 3.0"))
+    assert read_mapping(late).resamples

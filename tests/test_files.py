@@ -1,0 +1,152 @@
+"""Files appear whole or not at all, whatever goes wrong while they are written."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid import files
+from shipid.errors import DataError, ResultError
+
+FRAME = pd.DataFrame({"run": ["a", "b"], "H": [1.5, 2.5]})
+WRITERS: dict[str, Callable[[Path], None]] = {
+    "text.md": lambda file: files.write_text(file, "new ä"),
+    "text.json": lambda file: files.write_json(file, {"H": 1.0}),
+    "table.csv": lambda file: files.write_table(file, FRAME),
+    "table.parquet": lambda file: files.write_table(file, FRAME),
+    "arrays.npz": lambda file: files.write_arrays(file, {"x": np.arange(3.0)}),
+}
+
+
+def full(*_: Any, **__: Any) -> None:
+    """A disk without space."""
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_only_the_file_is_left(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "deep" / "er" / name
+    WRITERS[name](file)
+    assert file.stat().st_size > 0
+    assert list(file.parent.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("broken", ["replace", "fsync"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_failing_disk_leaves_the_old_file(
+    name: str, broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / name
+    file.write_bytes(b"old")
+    monkeypatch.setattr(files.os, broken, full)
+    with pytest.raises(OSError, match="No space"):
+        WRITERS[name](file)
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("before", [b"old", None])
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_error_inside_leaves_what_was_there(before: bytes | None, error: type[Exception], tmp_path: Path) -> None:
+    file = tmp_path / "out.txt"
+    if before is not None:
+        file.write_bytes(before)
+
+    def write() -> None:
+        with files.whole(file) as temporary:
+            temporary.write_text("half")
+            raise error("stop")
+
+    with pytest.raises(error):
+        write()
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == ([("out.txt", before)] if before else [])
+
+
+def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    file = tmp_path / "out.txt"
+    file.write_text("old")
+    with files.whole(file) as temporary:
+        temporary.write_text("new")
+        assert file.read_text() == "old"
+        assert temporary.name == file.name
+    assert file.read_text() == "new"
+
+
+def test_what_is_not_finite_is_null_in_json(tmp_path: Path) -> None:
+    files.write_json(tmp_path / "a.json", {"x": np.float64(2.5), 3: [np.nan, (np.inf, np.int64(7))], "s": "ä"})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"x": 2.5, "3": [None, [None, 7]], "s": "ä"}
+    assert files.read_json(tmp_path / "a.json")["x"] == 2.5
+
+
+def test_json_that_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="is this the folder of a run"):
+        files.read_json(tmp_path / "gone.json")
+    (tmp_path / "half.json").write_text('{"a": ')
+    with pytest.raises(ResultError, match=r"half\.json.*damaged"):
+        files.read_json(tmp_path / "half.json")
+
+
+@pytest.mark.parametrize(("name", "read"), [("a.csv", pd.read_csv), ("a.parquet", pd.read_parquet)])
+def test_tables_come_back(name: str, read: Callable[[Path], pd.DataFrame], tmp_path: Path) -> None:
+    files.write_table(tmp_path / name, FRAME)
+    pd.testing.assert_frame_equal(read(tmp_path / name), FRAME, check_dtype=False)
+
+
+@pytest.mark.parametrize("name", ["a.xlsx", "a"])
+def test_a_table_of_another_kind_is_refused_before_it_is_written(name: str, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
+        files.write_table(tmp_path / name, FRAME)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_arrays_come_back(compressed: bool, tmp_path: Path) -> None:
+    arrays = {"x": np.arange(6.0).reshape(2, 3), "words": np.array(["a", "bc"])}
+    files.write_arrays(tmp_path / "a.npz", arrays, compressed=compressed)
+    again = files.read_arrays(tmp_path / "a.npz")
+    assert list(again) == ["x", "words"]
+    for name, values in arrays.items():
+        np.testing.assert_array_equal(again[name], values)
+
+
+def test_arrays_with_pickles_are_neither_written_nor_read(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="allow_pickle"):
+        files.write_arrays(tmp_path / "a.npz", {"x": np.array([{}], dtype=object)})
+    assert not list(tmp_path.iterdir())
+    np.savez(tmp_path / "b.npz", x=np.array([{}], dtype=object))
+    with pytest.raises(ValueError, match="allow_pickle"):
+        files.read_arrays(tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize("length", [0, 1, 40, -1])
+def test_half_a_file_of_arrays_is_a_value_error(length: int, tmp_path: Path) -> None:
+    file = tmp_path / "a.npz"
+    files.write_arrays(file, {"x": np.arange(50.0)})
+    file.write_bytes(file.read_bytes()[:length])
+    with pytest.raises(ValueError, match=r"a\.npz is not a whole \.npz|allow_pickle"):
+        files.read_arrays(file)
+
+
+def test_a_new_document_is_never_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    assert files.write_new("x = 1\n", file) == file
+    with pytest.raises(DataError, match="is not written over"):
+        files.write_new("x = 2\n", file)
+    assert file.read_text() == "x = 1\n"
+    with pytest.raises(DataError, match=r"a study is a TOML file: let the name end in \.toml"):
+        files.write_new("x = 2\n", tmp_path / "a.txt", "study")
+
+
+def test_a_document_on_a_full_disk_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files.os, "replace", full)
+    with pytest.raises(DataError, match=r"a\.toml.*cannot be written \(No space"):
+        files.write_new("x = 1\n", tmp_path / "a.toml")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,100 @@
+"""Ctrl-C during a block is held back, and raised when the block ends."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from shipid.interrupts import uninterrupted
+
+
+@pytest.fixture(autouse=True)
+def handler() -> Iterator[object]:
+    """The handler of SIGINT, which every test must leave as it was."""
+    before = signal.getsignal(signal.SIGINT)
+    yield before
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def press() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_it_is_raised_at_the_end_of_the_block() -> None:
+    steps: list[str] = []
+
+    def work() -> None:
+        with uninterrupted() as held:
+            press()
+            assert held == [signal.SIGINT]
+            steps.append("end of the block")
+        steps.append("behind the block")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert steps == ["end of the block"]
+
+
+def test_without_it_nothing_is_raised() -> None:
+    with uninterrupted() as held:
+        pass
+    assert held == []
+
+
+def test_behind_the_block_it_is_raised_at_once() -> None:
+    with uninterrupted():
+        pass
+    with pytest.raises(KeyboardInterrupt):
+        press()
+
+
+def test_the_outermost_block_holds() -> None:
+    reached: list[int] = []
+
+    def work() -> None:
+        with uninterrupted() as outer:
+            with uninterrupted() as inner:
+                press()
+                assert inner is outer
+            reached.append(len(outer))
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert reached == [1]
+
+
+def test_it_is_raised_where_the_block_failed() -> None:
+    def work() -> None:
+        with uninterrupted():
+            press()
+            raise ValueError("wrong arguments")
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        work()
+    assert isinstance(caught.value.__context__, ValueError)
+
+
+def test_an_error_passes_and_the_next_block_holds_again() -> None:
+    def fail() -> None:
+        with uninterrupted():
+            raise ValueError("wrong arguments")
+
+    with pytest.raises(ValueError, match="wrong arguments"):
+        fail()
+    test_it_is_raised_at_the_end_of_the_block()
+
+
+def test_another_thread_changes_no_handler(handler: object) -> None:
+    seen: list[object] = []
+
+    def work() -> None:
+        with uninterrupted() as held:
+            seen.extend([signal.getsignal(signal.SIGINT), list(held)])
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [handler, []]

@@ -1,0 +1,132 @@
+"""`shipid.predictor.fit`: a method fitted on windows is a predictor, by the folds that were asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Windows, cut_windows
+from shipid.errors import DataError
+from shipid.hybrid.alone import Alone
+from shipid.hybrid.features import Memory
+from shipid.hybrid.method import Method
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.physics import Physics
+from shipid.metrics import position_error
+from shipid.predictor import Predictor, _folds, fit
+from shipid.vessel.load import load_vessel
+
+HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
+NONE = Physics(None, HORIZON, 1.0)
+
+
+def turns(count: int = 6, rows: int = 30) -> Windows:
+    """Windows of steady turns on circles, each run with another speed, rate and order."""
+    frames = []
+    for number in range(count):
+        t = np.arange(float(rows))
+        u, r = 2.0 + 0.2 * number, 0.01 * (number - 2)
+        psi = r * t
+        north = u * t if r == 0 else u / r * np.sin(psi)
+        east = 0 * t if r == 0 else u / r * (1 - np.cos(psi))
+        columns = {"t": t, "north": north, "east": east, "psi": psi, "u": u, "v": 0.0, "r": r}
+        columns |= {f"{side}.{name}": r if name == "alpha" else u / 2 for side in SIDES for name in ("n", "alpha")}
+        frame = pd.DataFrame(columns).astype("float64").assign(flags=0)
+        frame.insert(0, "run", pd.Series([f"M{number}"] * rows, dtype="str"))
+        frames.append(frame)
+    return cut_windows(Dataset(pd.concat(frames, ignore_index=True), {"clock": "run", "flags": []}), horizon=HORIZON)
+
+
+SIDES = ("port", "starboard")
+WINDOWS = turns()
+
+
+@pytest.fixture(scope="module")
+def predictor() -> Predictor:
+    return fit(SMALL, NONE, WINDOWS)
+
+
+def test_it_predicts_what_it_was_fitted_to(predictor: Predictor) -> None:
+    error = position_error(predictor.predict(WINDOWS.instants()), WINDOWS.future)
+    still = position_error(np.zeros_like(WINDOWS.future), WINDOWS.future)
+    assert error.mean() < 0.1 * still.mean()
+
+
+def test_it_says_what_it_was_fitted_with(predictor: Predictor) -> None:
+    assert predictor.method == "path-drawn"
+    assert predictor.limits["u"] == (2.0, 3.0)
+    assert set(predictor.limits) == {"u", "v", "r", *WINDOWS.planned}
+    assert not predictor.outside(WINDOWS.columns).any()
+    assert predictor.provenance == {"runs": [f"M{number}" for number in range(6)], "seed": 0}
+
+
+def test_it_can_be_saved(predictor: Predictor, tmp_path: Path) -> None:
+    again = Predictor.load(predictor.save(tmp_path / "predictor.npz"))
+    np.testing.assert_array_equal(again.predict(WINDOWS.instants()), predictor.predict(WINDOWS.instants()))
+    assert again.limits == predictor.limits
+
+
+def test_physics_alone_is_the_physics() -> None:
+    physics = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
+    alone = fit(Alone(), physics, WINDOWS)
+    np.testing.assert_array_equal(alone.predict(WINDOWS.instants()), physics.paths(WINDOWS.instants()))
+
+
+def test_known_commands_are_needed_to_predict() -> None:
+    known = fit(SMALL, NONE, WINDOWS, commands="known")
+    assert known.predict(WINDOWS.instants(known=True)).shape == WINDOWS.future.shape
+    with pytest.raises(DataError, match="planned over the horizon"):
+        known.predict(WINDOWS.instants())
+
+
+class Shared(Method):
+    """A method that holds out a fifth of the runs."""
+
+
+def test_folds_are_by_run() -> None:
+    """Every run in turn, a fifth of the runs, or those that are named; training and validation share no run."""
+
+    def validated(method: Method, windows: Windows = WINDOWS, runs: list[str] | None = None) -> list[set[str]]:
+        folds = _folds(method, windows, runs, seed=0)
+        for training, validation in folds:
+            assert not set(windows.run[training]) & set(windows.run[validation])
+            assert len(training) + len(validation) == len(windows)
+        return [set(windows.run[validation]) for _, validation in folds]
+
+    assert validated(SMALL) == [{f"M{number}"} for number in range(6)]
+    (fifth,) = validated(Shared())
+    assert len(fifth) == 1
+    assert validated(SMALL, runs=["M4", "M1"]) == [{"M1", "M4"}]
+
+
+def test_one_run_is_split_in_time() -> None:
+    one = WINDOWS.select(WINDOWS.run == "M3")
+    for training, validation in _folds(SMALL, one, None, 0):
+        begin, end = one.begin[validation].min(), one.end[validation].max()
+        assert ((one.end[training] < begin) | (one.begin[training] > end)).all()
+
+
+@pytest.mark.parametrize(
+    ("method", "physics", "runs", "said"),
+    [
+        (SMALL, Physics(None, 4, 1.0), None, "the physics has 4 steps of 1 s, the windows have 5 steps of 1 s"),
+        (PathDrawn(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
+        (Alone(), NONE, None, "'alone' needs a vessel"),
+        (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "takes this command"),
+        (SMALL, NONE, ["M1", "M9"], "validation_runs: no run with windows"),
+        (SMALL, NONE, WINDOWS.spans, "no training window is left"),
+    ],
+)
+def test_what_does_not_fit_is_one_sentence(method: Method, physics: Physics, runs: list[str], said: str) -> None:
+    with pytest.raises(DataError, match=said):
+        fit(method, physics, WINDOWS, validation_runs=runs)
+
+
+def test_diverging_physics_is_refused() -> None:
+    wild = load_vessel("gunnerus-28.9").with_values({"hull.derivatives.X_u|u|": 1e60})
+    with pytest.raises(DataError, match=r"diverges on .*% of the windows"):
+        fit(SMALL, Physics(wild, HORIZON, 1.0), WINDOWS)

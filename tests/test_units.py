@@ -1,0 +1,27 @@
+"""Factors to SI against quantities that are known in both units."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from shipid.logs.mapping import UNITS
+from shipid.units import DEGREE, KNOT, MINUTE, RPM
+
+
+@pytest.mark.parametrize(
+    ("value", "factor", "si"),
+    [(120.0, RPM, 2.0), (180.0, DEGREE, math.pi), (1.0, KNOT, 1852.0 / 3600.0), (2.5, MINUTE, 150.0)],
+)
+def test_a_value_times_its_factor_is_si(value: float, factor: float, si: float) -> None:
+    assert value * factor == pytest.approx(si, rel=1e-15)
+
+
+def test_logs_use_the_same_factors() -> None:
+    assert UNITS["rev/s"]["rpm"] == RPM
+    assert UNITS["rad"]["deg"] == UNITS["rad/s"]["deg/s"] == DEGREE
+    assert UNITS["rad/s"]["deg/min"] == pytest.approx(DEGREE / MINUTE)
+    assert UNITS["m/s"]["kn"] == KNOT
+    assert UNITS["s"]["min"] == MINUTE
+    assert UNITS["rev/s"]["rad/s"] == pytest.approx(1 / (2 * math.pi))

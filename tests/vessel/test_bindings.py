@@ -1,0 +1,32 @@
+"""Bindings: every keyword of a physics function has a path, shared numbers come from the particulars."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipid.document import get
+from shipid.physics.inertia import rigid_body
+from shipid.vessel.bindings import bind, bindings, units
+from shipid.vessel.load import load_vessel
+from shipid.vessel.schema import parameters
+
+
+def test_a_missing_keyword_takes_its_default() -> None:
+    binding = bind("inertia", {"m": 1.0, "I_z": 2.0, "x_G": 0.0}, parameters(rigid_body))
+    assert binding["m"] == "inertia.m"
+    assert binding["z_G"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner"])
+def test_every_path_leads_to_a_number(name: str) -> None:
+    document = load_vessel(name).document
+    known = units(document)
+    assert known["inertia.m"] == "kg"
+    assert all(isinstance(get(document, path), int | float) for path in known)
+
+
+def test_shared_numbers_come_from_the_particulars() -> None:
+    bound = bindings(load_vessel("kvlcc2-l7").document)
+    assert bound["hull.mmg"]["L_pp"] == "particulars.L_pp"
+    assert bound["hull.mmg"]["rho"] == "constants.rho"
+    assert bound["thruster.propeller"]["D_p"] == "thruster.propeller.D_p"
