@@ -1,6 +1,6 @@
 """Velocities one step at a time: what a step of the physics misses, and paths on which something is added to each step.
 
-After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where the physics is
+After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where physics is
 integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a. By `euler`, which errs there by half a
 step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
 Steps start from measured states: an observer of the physics is not used.

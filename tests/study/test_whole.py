@@ -35,6 +35,12 @@ SMALL: Mapping[str, Mapping[str, Any]] = {  # settings that make a method cheap;
     "path-drawn": {"trials": 2, "units": 8, "terms": 3},
     "path-trained": {"trials": 1, "layers": 1, "units": 8, "epochs": 3},
     "learned-force": {"trials": 1, "ridge": 0.1, "units": 2, "iterations": 3},
+    "calibrator": {"trials": 2, "units": 8, "terms": 3},
+    "forest": {"trials": 1, "trees": 3},
+    "hankel-dmd": {"delays": [2.0]},
+    "modules": {"trials": 1, "units": 2},
+    "one-step": {"trials": 1, "units": 8},
+    "recurrent": {"trials": 1, "units": 4, "epochs": 2, "seconds": 2.0},
 }
 PATHS = ["hull.derivatives.X_u|u|", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
 IDENTIFY = {"parameters": PATHS, "weights": {"u": 0.01, "v": 0.01, "r": 0.001}, "method": "euler"}
@@ -138,7 +144,7 @@ def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> Non
 
 def test_the_report_shows_every_cell(whole: Finished) -> None:
     page = write_pages(whole.folder).read_text()
-    for name in ("seen", "fitted", "both", *METHODS):
+    for name in ("seen", "fitted", "both", *KINDS):
         assert name in page
 
 
