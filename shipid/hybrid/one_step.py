@@ -1,7 +1,7 @@
 """One step: networks of state, commands and wind that give the acceleration the physics misses, at every step.
 
 nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f trained on what single steps of the physics
-from true states miss (without physics: on the acceleration itself). Skulstad et al. (2021) train a network by gradients;
+from true states miss (without physics: on the acceleration itself). Skulstad et al. (2021) train it by gradients;
 here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
 """
 
