@@ -15,18 +15,36 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
-from shipid.hybrid.features import Inputs, choose_features, group_of
+from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.settings import seed_of
+
+
+class Drawn(Protocol):
+    """Settings that the closed form takes, see `shipid.hybrid.path_drawn.PathDrawn`."""
+
+    @property
+    def units(self) -> int: ...  # noqa: D102
+    @property
+    def terms(self) -> int: ...  # noqa: D102
+    @property
+    def averaged(self) -> int: ...  # noqa: D102
+    @property
+    def trials(self) -> int: ...  # noqa: D102
+    @property
+    def memory(self) -> Memory: ...  # noqa: D102
+    def inputs(self, commands: tuple[str, ...]) -> Inputs: ...  # noqa: D102
+    def path(self) -> list[float]: ...  # noqa: D102
+    def points(self) -> list[dict[str, float]]: ...  # noqa: D102
+    def left_out(self, point: Mapping[str, float]) -> frozenset[str]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -92,7 +110,7 @@ class _Group:
     mirrored: _Inputs | None
 
 
-def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
+def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -169,7 +187,7 @@ def _groups(
     return found
 
 
-def _unsolvable(method: PathDrawn) -> Fitted:
+def _unsolvable(method: Drawn) -> Fitted:
     """The result where targets are not numbers: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
     return Fitted(None, [{"number": i, "params": point, **blank} for i, point in enumerate(method.points())], 0.0)

@@ -18,10 +18,10 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
-from shipid.predictor import Predictor
+from shipid.predictor import Predictor, limits_of
 from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import Prepared, constant_motion, instants_of, limits, obtain, prepare, window_memory
+from shipid.study.prepare import Prepared, constant_motion, instants_of, obtain, prepare, window_memory
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import draw, resolve
@@ -353,7 +353,7 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
 
 def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
-    found = limits(prepared.pool, prepared.commands)
+    found = limits_of(prepared.pool, prepared.commands)
     assert set(found) == {"u", "v", "r", "V_w", *dataset.commands}
     rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
     for name, (low, high) in found.items():
