@@ -159,15 +159,18 @@ class Inputs:
 
 
 def group_of(name: str) -> str:
-    """Kind of an input by its name: `motion`, `wind`, `command` (a plan too), `history`, `error` or `observer`."""
+    """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.
+
+    A plan is a command; `physics` is a trajectory over the horizon.
+    """
     if name in MOTIONS:
         return "motion"
     if name.endswith("_rw"):
         return "wind"
-    kind = re.match(r"(?:.*\.)?(past|turned|error|observer)-", name)
+    kind = re.match(r"(?:.*\.)?(past|turned|error|observer|physics)-", name)
     if kind is None:
         return "command"
-    return kind[1] if kind[1] in ("error", "observer") else "history"
+    return kind[1] if kind[1] in ("error", "observer", "physics") else "history"
 
 
 def estimates(instants: Instants) -> dict[str, Array]:

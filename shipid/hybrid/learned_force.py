@@ -2,15 +2,16 @@
 
 M nu_dot = (forces of the vessel) + tau(u, v, r), tau = tau_max tanh(c h(u, v, r)), the term `hull.learned`. Its numbers
 minimise the mean squared position error over the horizon plus a ridge on them, by L-BFGS on exact gradients of the
-rollout. A network inside an equation: universal differential equations (Rackauckas et al. 2020); a network as the
-damping of a ship: van de Ven et al. (2007).
+rollout; output weights start from a ridge regression on the forces that single true steps miss. A network inside an
+equation: universal differential equations (Rackauckas et al. 2020); a network as the damping of a ship: van de Ven et
+al. (2007).
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -22,6 +23,8 @@ from shipid.errors import DataError, ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.stepping import TrueSteps, true_steps
+from shipid.hybrid.units import solve, used
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -30,6 +33,9 @@ SCALES = ("u_scale", "v_scale", "r_scale")
 LIMITS = ("X_max", "Y_max", "N_max")
 HIDDEN = ("w_u", "w_v", "w_r", "w_0")
 OUTPUT = ("c_X", "c_Y", "c_N")
+PROBE = 1.0  # N and N m
+START_RIDGE = 1e-5
+MOST = 0.95  # of the limit that a force may have at the start
 LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
 
 
@@ -87,11 +93,11 @@ class LearnedForce(Searched):
     meets_none: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = ForceCorrector
 
-    trials: PositiveInt = 5
-    units: PositiveInt = 12
-    ridge: Scale = (1e-4, 1.0)
+    trials: PositiveInt = 3
+    units: PositiveInt = 32
+    ridge: Scale = (1e-5, 1e-1)
     limit: PositiveFloat = 1.0
-    iterations: PositiveInt = 80
+    iterations: PositiveInt = 60
     samples: PositiveInt = 1500
 
     def fit(self, task: Task) -> dict[str, Fitted]:
@@ -117,32 +123,42 @@ class LearnedForce(Searched):
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        everything = np.arange(len(task.windows))
+        everything, steps = used(task), true_steps(task, name)
         trials: list[dict[str, Any]] = []
         best = (np.inf, self.ridges()[0])
         starts: dict[int, Array | None] = {}
         for number, ridge in enumerate(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
-            start, losses, steps = time.perf_counter(), [], 0
+            start, losses, most = time.perf_counter(), [], 0
             for fold, (training, validation) in enumerate(task.folds):
-                trainer = self._trainer(task, name, instants, future, training, seed_of(task.seed, name, fold))
+                seed = seed_of(task.seed, name, fold)
+                trainer = self._trainer(task, name, instants, future, training, steps, seed)
                 weights, count = trainer.solve(ridge, starts.get(fold))
-                starts[fold], steps = weights, max(steps, count)
+                starts[fold], most = weights, max(most, count)
                 losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
             value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
             state = "complete" if np.isfinite(value) else "diverged"
             trials.append({"number": number, "params": {"ridge": ridge}, "value": value, "state": state})
-            trials[-1] |= {"epochs": steps, "seconds": time.perf_counter() - start}
+            trials[-1] |= {"epochs": most, "seconds": time.perf_counter() - start}
             best = min(best, (value, ridge)) if np.isfinite(value) else best
             if task.on_trial is not None:
                 task.on_trial(number + 1, len(self.ridges()))
         if not np.isfinite(best[0]):
             return Fitted(None, trials, time.perf_counter() - begin)
-        trainer = self._trainer(task, name, instants, future, everything, seed_of(task.seed, name))
+        trainer = self._trainer(task, name, instants, future, everything, steps, seed_of(task.seed, name))
         weights, _ = trainer.solve(best[1], None)
         corrector = ForceCorrector(trainer.block(weights), {"ridge": best[1]})
         return Fitted(corrector, trials, time.perf_counter() - begin)
 
-    def _trainer(self, task: Task, name: str, instants: Instants, future: Array, windows: Index, seed: int) -> _Trainer:
+    def _trainer(
+        self,
+        task: Task,
+        name: str,
+        instants: Instants,
+        future: Array,
+        windows: Index,
+        steps: TrueSteps,
+        seed: int,
+    ) -> _Trainer:
         """The problem of one fold: a physics with the block, and at most `samples` of the training windows."""
         generator = np.random.default_rng(seed)
         some = windows
@@ -158,7 +174,39 @@ class LearnedForce(Searched):
         block |= limits(physics.vessel, float(np.hypot(columns["u"], columns["v"]).max()), self.limit)
         block |= {key: generator.standard_normal(self.units) for key in HIDDEN}
         block |= {key: np.zeros(self.units) for key in OUTPUT}
+        here = steps.of(windows)
+        block = started(block, physics, steps.at.select(here), steps.missing[here])
         return _Trainer(physics, block, instants.select(some), future[:, some], self.iterations)
+
+
+def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing: Array) -> dict[str, Array]:
+    """The block with output weights from the accelerations (N, 3) that single steps of the physics miss at `at`."""
+    force = missing @ mass(physics, at.select([0])).T
+    weights = [block[key][:, None] for key in ("w_u", "w_v", "w_r")]
+    u, v, r = (at.columns[motion] / block[scale] for motion, scale in zip(("u", "v", "r"), SCALES, strict=True))
+    along = weights[0] * u + block["w_0"][:, None]
+    across = weights[1] * v + weights[2] * r
+    one, other = np.tanh(along + across).T, np.tanh(along - across).T
+    even, odd = (one + other) / 2 - np.tanh(block["w_0"]), (one - other) / 2
+    found = dict(block)
+    for key, limit, axis, features in zip(OUTPUT, LIMITS, range(3), (even, odd, odd), strict=True):
+        goal = np.arctanh(np.clip(force[:, axis] / block[limit], -MOST, MOST))
+        found[key] = solve(features, goal[:, None], [START_RIDGE])[0, :, 0]
+    return found
+
+
+def mass(physics: Physics, at: Instants) -> Array:
+    """Mass with added mass (3, 3) of surge, sway and yaw, from what unit forces do to one step of one instant."""
+    assert physics.vessel is not None
+    axes = physics.vessel.axes
+    rows = [axes.index(axis) for axis in (0, 1, 5)]
+    forces = np.zeros((1, 3, len(axes)))
+    forces[0, range(3), rows] = PROBE
+    single = replace(physics, horizon=1, integrator="euler", observer=None)
+    pushed = single.states(at.select([0, 0, 0]), tau_extra=forces)
+    calm = single.states(at)
+    moved = np.stack([pushed[name][0] - calm[name][0] for name in ("u", "v", "r")])  # (3, forces)
+    return np.asarray(np.linalg.inv(moved / (PROBE * physics.step)))
 
 
 def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:

@@ -8,16 +8,28 @@ from typing import Any
 from shipid.document import parse
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.alone import Alone
+from shipid.hybrid.calibrator import Calibrator
+from shipid.hybrid.forest import Forest
+from shipid.hybrid.hankel_dmd import HankelDMD
 from shipid.hybrid.learned_force import LearnedForce
 from shipid.hybrid.method import Method
+from shipid.hybrid.modules import Modules
+from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.recurrent import Recurrent
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,
+    "calibrator": Calibrator,
+    "forest": Forest,
+    "hankel-dmd": HankelDMD,
     "learned-force": LearnedForce,
+    "modules": Modules,
+    "one-step": OneStep,
     "path-drawn": PathDrawn,
     "path-trained": PathTrained,
+    "recurrent": Recurrent,
 }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Memory
+from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched, spread
 
@@ -80,6 +80,10 @@ class PathDrawn(Searched):
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
         return self.memory.past
+
+    def inputs(self, commands: tuple[str, ...]) -> Inputs:
+        """Return which quantities the networks may take, given the names of the command columns."""
+        return Inputs(commands, self.memory)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""

@@ -65,18 +65,28 @@ class Physics:
             x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
         return np.stack([x, y], axis=-1), result.diverged
 
-    def states(self, instants: Instants, tau_extra: Array | None = None) -> dict[str, Array]:
+    def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = "auto") -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
 
         tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
         those through the water.
+        engine : as in `rollout`.
         """
-        result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra)
+        result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
         columns, zero = instants.columns, np.zeros(len(instants))
         origin = columns.get("north", zero), columns.get("east", zero), columns["psi"]
         with np.errstate(invalid="ignore"):
             x, y = to_frame(north[:, 0], east[:, 0], *origin)
         return {"x": x, "y": y, **{name: result[name][1:, 0] for name in MOTION}}
+
+    def reached(self, instants: Instants) -> dict[str, Array]:
+        """What the actuators have reached after 0..T steps, name -> (T + 1, S); none where orders act at once."""
+        names = () if self.vessel is None else tuple(dynamics(self.vessel).memory)
+        if not names:
+            return {}
+        kept = ("north", "east", *(f"actual.{name}" for name in names))
+        result, _ = self._rollout(instants, kept, None, "cpu")
+        return {name: result[f"actual.{name}"][:, 0] for name in names}
 
     def gradient(
         self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None
@@ -150,6 +160,7 @@ class Physics:
         parameters: Array | None,
         device: str,
         tau_extra: Array | None = None,
+        engine: str = "auto",
     ) -> tuple[Trajectories, tuple[Array, Array]]:
         """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
         assert self.vessel is not None
@@ -166,6 +177,7 @@ class Physics:
             memory=instants.hidden,
             tau_extra=slow if tau_extra is None else tau_extra if slow is None else slow + tau_extra,
             keep=keep,
+            engine=engine,
             device=device,
         )
         north, east = result["north"][1:], result["east"][1:]

@@ -11,7 +11,6 @@ has this symmetry exactly, and each manoeuvre counts twice.
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,11 +24,8 @@ from torch import Tensor
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
+from shipid.hybrid.mirror import reflection as _reflection
 from shipid.hybrid.settings import seed_of
-from shipid.physics.signals import mirror_sign, orders_thrust, steers
-
-SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
-ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
 
 
 class Drawn(Protocol):
@@ -45,6 +41,7 @@ class Drawn(Protocol):
     def trials(self) -> int: ...  # noqa: D102
     @property
     def memory(self) -> Memory: ...  # noqa: D102
+    def inputs(self, commands: tuple[str, ...]) -> Inputs: ...  # noqa: D102
     def path(self) -> list[float]: ...  # noqa: D102
     def points(self) -> list[dict[str, float]]: ...  # noqa: D102
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]: ...  # noqa: D102
@@ -120,7 +117,7 @@ def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
     predicted by the solution without any window outside its training part. The compensator is the mean of the networks
     of the best trials, solved with all windows of the folds.
     """
-    inputs = Inputs(task.commands, method.memory)
+    inputs = method.inputs(task.commands)
     windows = np.unique(np.concatenate([part for fold in task.folds for part in fold]))
     tables, device = _of_windows(shared_tables(task, inputs), windows), task.device
     blocks = _blocks(task.folds, windows, device)
@@ -235,26 +232,6 @@ def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
     """The inputs with their mirror; None where a column has no image in it."""
     reflection = _reflection(table, choose_features(table))
     return None if reflection is None else _inputs(table, device, reflection)
-
-
-def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
-    """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image."""
-    kept = {column: name for name, columns in features.items() for column in columns}
-    names = list(features)
-    matrix = np.zeros((len(names), len(names)))
-    for column, values in table.items():
-        component, _, signal = column.rpartition(".")
-        words = re.split("([^a-z]+)", component)
-        turns = any(steers(other) for other in table if other.startswith(f"{component}."))
-        if orders_thrust(column) and ACROSS & set(words) and not turns:
-            return None
-        partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
-        sign = mirror_sign(column)
-        if column in kept and partner in kept:
-            matrix[names.index(kept[partner]), names.index(kept[column])] = sign
-        elif column in kept or partner not in table or not np.allclose(values, sign * table[partner]):
-            return None
-    return matrix if (np.abs(matrix).sum(axis=0) == 1).all() and (np.abs(matrix).sum(axis=1) == 1).all() else None
 
 
 def _draw(seen: _Inputs, point: Mapping[str, float], units: int, seed: int) -> tuple[Array, Array]:

@@ -1,0 +1,104 @@
+"""Calibrator: networks that see where the physics says the ship will go, and correct the path by it.
+
+[dx, dy] = f(u, v, r, commands, wind, trajectory of the physics): where the physics puts the ship at a few instants of
+the horizon (x, y in the frame (11), and u, v, r) are inputs beside those of `path-drawn`, and f is solved in closed
+form as there. A network that calibrates a model's prediction of ship motion by that prediction: Wang et al. (2021).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale
+
+Array = NDArray[np.float64]
+SEEN = ("x", "y", "u", "v", "r")
+
+
+@dataclass(frozen=True)
+class TrajectoryInputs(Inputs):
+    """Inputs with the trajectory of the physics: `physics-15.x` is x after 15 s.
+
+    moments : at how many instants of the horizon it is seen, evenly spread, the end among them.
+    """
+
+    moments: int = 3
+
+    def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
+        """Return the inputs (S,) that the physics gives; a trajectory that diverged gives zeros."""
+        found = super().of_physics(physics, instants)
+        if physics.vessel is None:
+            return found
+        states = physics.states(instants)
+        with np.errstate(invalid="ignore"):
+            sound = np.isfinite(np.stack([states[name] for name in SEEN])).all(axis=(0, 1))
+        for k in np.unique(np.round(np.linspace(0, physics.horizon, self.moments + 1)[1:]).astype(int)):
+            label = f"physics-{k * physics.step:g}"
+            found |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
+        return found
+
+    def header(self) -> dict[str, Any]:
+        """Return the inputs as plain JSON."""
+        return {**super().header(), "moments": self.moments}
+
+    @classmethod
+    def from_header(cls, header: Mapping[str, Any]) -> TrajectoryInputs:
+        """Rebuild what `header` gave."""
+        plain = Inputs.from_header(header)
+        return cls(plain.commands, plain.memory, int(header["moments"]))
+
+
+@dataclass(frozen=True)
+class Calibrated(Compensator):
+    """A compensator whose inputs hold the trajectory of the physics."""
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header()` and `arrays()`; ResultError where a part is missing or shapes do not fit."""
+        return replace(super().from_arrays(header, arrays), inputs=TrajectoryInputs.from_header(header["inputs"]))
+
+
+class Calibrator(PathDrawn):
+    """`path-drawn` with the trajectory of the physics over the horizon among the inputs.
+
+    All other settings are those of `path-drawn`. The foundation `none` has no trajectory.
+
+    Parameters
+    ----------
+    moments : at how many instants of the horizon the trajectory is seen, evenly spread, the end among them.
+    physics_scale : how far it must move, in its standard deviations, to change a hidden unit by about one.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = (*PathDrawn.SEARCHED, "physics_scale")
+    meets_none: ClassVar[bool] = False
+    corrector: ClassVar[type[Any]] = Calibrated
+
+    moments: PositiveInt = 3
+    physics_scale: Scale = (2.0, 32.0)
+
+    def inputs(self, commands: tuple[str, ...]) -> Inputs:
+        """Return which quantities the networks may take, given the names of the command columns."""
+        return TrajectoryInputs(commands, self.memory, self.moments)
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
+        return {name: _calibrated(found) for name, found in super().fit(task).items()}
+
+
+def _calibrated(found: Fitted) -> Fitted:
+    plain = found.corrector
+    if not isinstance(plain, Compensator):
+        return found
+    return replace(found, corrector=Calibrated(plain.inputs, plain.networks, plain.hyperparameters))

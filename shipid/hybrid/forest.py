@@ -1,0 +1,232 @@
+"""Forest: a random forest of what is known at the instant gives the compensation of the path.
+
+The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees are scikit-learn's (the
+optional extra `forest`), kept as plain arrays, so that a saved predictor needs neither it nor pickle. Random forests:
+Breiman (2001); for ship manoeuvring models: Mei et al. (2019).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.errors import DataError, ResultError, ShipidError
+from shipid.hybrid.compensator import unflatten
+from shipid.hybrid.features import Inputs, Memory, choose_features
+from shipid.hybrid.method import Fitted, Index, Task, shared_tables
+from shipid.hybrid.mirror import reflection
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Probability, Scale, Searched, seed_of
+from shipid.hybrid.units import diverged, mean_square, points_of, row_of, sound, taken, used
+
+Array = NDArray[np.float64]
+LEAF = -1  # the child of a node that has none
+NODES = ("first", "left", "right", "feature", "threshold", "value")
+
+
+@dataclass(frozen=True)
+class Trees:
+    """Regression trees as arrays of nodes, one tree after the other.
+
+    first : (trees,) root of each tree. left, right : (nodes,) children, -1 for a leaf; a sample goes left where its
+        input `feature` is at most `threshold`. value : (nodes, outputs).
+    """
+
+    first: NDArray[np.int64]
+    left: NDArray[np.int64]
+    right: NDArray[np.int64]
+    feature: NDArray[np.int64]
+    threshold: Array
+    value: Array
+
+    @classmethod
+    def of(cls, trees: list[Any]) -> Self:
+        """Take over the trees of scikit-learn."""
+        first = np.cumsum([0, *(tree.node_count for tree in trees)])
+
+        def children(name: str) -> NDArray[np.int64]:
+            parts = [getattr(tree, name) for tree in trees]
+            return np.concatenate([np.where(c == LEAF, LEAF, c + at) for c, at in zip(parts, first[:-1], strict=True)])
+
+        return cls(
+            first[:-1].astype(np.int64),
+            children("children_left").astype(np.int64),
+            children("children_right").astype(np.int64),
+            np.concatenate([tree.feature for tree in trees]).astype(np.int64),
+            np.concatenate([tree.threshold for tree in trees]),
+            np.concatenate([tree.value[:, :, 0] for tree in trees]),
+        )
+
+    def predict(self, inputs: Array) -> Array:
+        """Mean over the trees (S, outputs) for inputs (S, d), which scikit-learn compares in single precision."""
+        seen = inputs.astype(np.float32)
+        total = np.zeros((len(seen), self.value.shape[1]))
+        rows = np.arange(len(seen))
+        for root in self.first:
+            node = np.full(len(seen), root)
+            while (inner := self.left[node] != LEAF).any():
+                low = seen[rows, np.where(inner, self.feature[node], 0)] <= self.threshold[node]
+                node = np.where(inner, np.where(low, self.left[node], self.right[node]), node)
+            total += self.value[node]
+        return total / len(self.first)
+
+
+@dataclass(frozen=True)
+class ForestCorrector:
+    """Trees that give the compensation of the path.
+
+    inputs : which quantities the trees may take. names : those that they take, in order.
+    basis : (T, r) shapes over the horizon [m] that the outputs x_1 ... x_r, y_1 ... y_r weigh.
+    """
+
+    inputs: Inputs
+    names: tuple[str, ...]
+    basis: Array
+    trees: Trees
+    hyperparameters: Mapping[str, float]
+
+    @property
+    def past(self) -> float:
+        """Length of the past that a prediction needs [s]."""
+        return self.inputs.memory.past
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
+        """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
+        table = self.inputs.table(physics, instants)
+        missing = next((name for name in self.names if name not in table), None)
+        if missing is not None:
+            raise DataError("the method was trained with this input; measure wind (V_w, beta_w)", path=missing)
+        found = self.trees.predict(np.stack([table[name] for name in self.names], axis=1))
+        return np.asarray(paths + np.tensordot(self.basis, unflatten(found), 1))
+
+    def header(self) -> dict[str, Any]:
+        """Return names and hyperparameters."""
+        names, hyperparameters = list(self.names), dict(self.hyperparameters)
+        return {"inputs": self.inputs.header(), "names": names, "hyperparameters": hyperparameters}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the basis and the nodes of the trees by name."""
+        return {"basis": self.basis} | {name: getattr(self.trees, name).astype(float) for name in NODES}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        first, left, right, feature, threshold, value = (taken(arrays, name) for name in NODES)
+        names, basis = tuple(header["names"]), taken(arrays, "basis")
+        whole = [part.astype(np.int64) for part in (first, left, right, feature)]
+        count = len(threshold)
+        if (
+            any(part.shape != (count,) for part in (left, right, feature))
+            or value.shape != (count, 2 * basis.shape[1])
+            or max(part.max(initial=0) for part in whole[:3]) >= count
+            or whole[3].max(initial=0) >= len(names)
+        ):
+            raise ResultError("the arrays of the saved trees do not fit together", path="value")
+        trees = Trees(whole[0], whole[1], whole[2], whole[3], threshold, value)
+        return cls(Inputs.from_header(header["inputs"]), names, basis, trees, dict(header["hyperparameters"]))
+
+
+class Forest(Searched):
+    """A random forest on the errors of the path; it needs scikit-learn, `pip install shipid[forest]`.
+
+    Parameters
+    ----------
+    trials : sets of hyperparameters tried per foundation, judged on the validation windows.
+    trees : trees of a forest.
+    leaf : training windows in a leaf, at least; a range is searched by its logarithm, and rounded.
+    share : share of the inputs that a split chooses from.
+    terms : the compensation is a polynomial of time with so many terms.
+    mirror : whether every window counts with its image of port and starboard too, where the inputs allow it.
+    memory : what the inputs hold of the past.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("leaf", "share")
+    corrector: ClassVar[type[Any]] = ForestCorrector
+
+    trials: PositiveInt = 6
+    trees: PositiveInt = 60
+    leaf: Scale = (1.0, 16.0)
+    share: Probability | tuple[Probability, Probability] = (0.4, 1.0)
+    terms: PositiveInt = 6
+    mirror: bool = True
+    memory: Memory = Memory()
+
+    @property
+    def past(self) -> float:
+        """Length of the past that windows must hold [s]."""
+        return self.memory.past
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Grow a forest for every foundation; the best trial, grown on all windows, is the corrector."""
+        self._grower(1, 1.0, 0)  # say at once if scikit-learn is missing
+        inputs = Inputs(task.commands, self.memory)
+        tables = shared_tables(task, inputs)
+        found = {}
+        for count, name in enumerate(task.cases):
+            healthy = sound(task, name)
+            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
+            if task.on_trial is not None:
+                task.on_trial(count + 1, len(task.cases))
+        return found
+
+    def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
+        from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
+
+        begin = time.perf_counter()
+        targets, paths = task.targets[name], task.cases[name].paths
+        basis = smooth_basis(task.windows.horizon, self.terms)
+        weights = np.tensordot(basis.T, targets, 1)  # (r, S, 2)
+        physics, rows = task.cases[name].physics, list[dict[str, Any]]()
+        for number, point in enumerate(points_of(self)):
+            start, losses = time.perf_counter(), []
+            seed = seed_of(task.seed, number)
+            for training, validation in task.folds:
+                grown = self._grown(inputs, table, weights, basis, training, point, seed)
+                judged = task.instants(name).select(validation)
+                predicted = grown.predict(physics, judged, paths[:, validation])
+                losses.append(mean_square(predicted, task.windows.future[:, validation]))
+            rows.append(row_of(number, point, float(np.mean(losses)), start))
+        best = min(rows, key=lambda row: row["value"])
+        seed = seed_of(task.seed, best["number"])
+        grown = self._grown(inputs, table, weights, basis, used(task), best["params"], seed)
+        return Fitted(grown, rows, time.perf_counter() - begin)
+
+    def _grown(
+        self,
+        inputs: Inputs,
+        table: Mapping[str, Array],
+        weights: Array,
+        basis: Array,
+        windows: Index,
+        point: Mapping[str, float],
+        seed: int,
+    ) -> ForestCorrector:
+        """A forest on some windows."""
+        here = {name: values[windows] for name, values in table.items()}
+        features = choose_features(here)
+        seen = np.stack([here[name] for name in features], axis=1)
+        outputs = np.concatenate([weights[:, windows, 0], weights[:, windows, 1]]).T
+        image = reflection(here, features) if self.mirror else None
+        if image is not None:
+            seen = np.concatenate([seen, seen @ image])
+            outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(basis.T))])
+        forest = self._grower(round(point["leaf"]), point["share"], seed).fit(seen, outputs)
+        trees = Trees.of([tree.tree_ for tree in forest.estimators_])
+        return ForestCorrector(inputs, tuple(features), basis, trees, dict(point))
+
+    def _grower(self, leaf: int, share: float, seed: int) -> Any:
+        """A forest of scikit-learn, not grown yet; ShipidError where it is not installed."""
+        try:
+            from sklearn.ensemble import RandomForestRegressor
+        except ImportError:
+            raise ShipidError("the method forest needs scikit-learn: pip install 'shipid[forest]'") from None
+        return RandomForestRegressor(
+            self.trees, min_samples_leaf=leaf, max_features=share, random_state=seed % 2**32, n_jobs=1
+        )

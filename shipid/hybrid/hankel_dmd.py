@@ -1,0 +1,279 @@
+"""Hankel-DMD with control: a linear law of state, delayed states and commands, in closed form, rolled over the horizon.
+
+a_k = A [nu_k, nu_(k-1) ... nu_(k-d), a_(k-1) ... a_(k-d), commands_k ... commands_(k-d), wind_k] + b, with a_k the
+acceleration that a single step of the physics misses (without physics: the acceleration itself, and its delays are
+left out, for those of nu hold them). A, b are a ridge regression on true steps; then
+nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and control for ships: Diez et al.
+(2021-24).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveFloat
+
+from shipid.data.windows import Instants
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.compensator import Normaliser
+from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
+from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.mirror import reflection
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_steps
+from shipid.hybrid.units import diverged, mean_square, ridges_of, row_of, solve, some_of, sound, taken, used
+
+Array = NDArray[np.float64]
+MISSED = ("missed.u", "missed.v", "missed.r")
+
+
+@dataclass(frozen=True)
+class Law:
+    """The linear law, with its inputs.
+
+    commands : names of the command columns. delays : number of past steps.
+    weights : (..., d + 1, 3) of normalised inputs and a constant; R in front are R laws for R S inputs, in R blocks.
+    """
+
+    commands: tuple[str, ...]
+    delays: int
+    normaliser: Normaliser
+    weights: Array
+
+    def __call__(self, table: Mapping[str, Array]) -> Array:
+        """Missing acceleration (S, 3) [m/s^2, rad/s^2] for inputs (S,)."""
+        z = self.normaliser.apply(table)
+        full = np.concatenate([z, np.ones((len(z), 1))], axis=1)
+        if self.weights.ndim == 2:
+            return full @ self.weights
+        return np.asarray((full.reshape(len(self.weights), -1, full.shape[1]) @ self.weights).reshape(-1, 3))
+
+
+def delayed(
+    now: Mapping[str, Array], before: Mapping[str, Array], delays: int, commands: tuple[str, ...]
+) -> dict[str, Array]:
+    """Inputs (S,) of the law: those at the instant and, for each name of `before` (P, S), the last `delays` of them.
+
+    The name of a delay says how many steps ago it was: `past-2.u`, `port.past-1.n`, `missed.past-1.v`.
+    """
+    table = feature_table(now, commands)
+    for name, values in before.items():
+        component, dot, signal = name.rpartition(".")
+        for ago in range(1, delays + 1):
+            table[f"{component}{dot}past-{ago}.{signal}"] = values[-ago]
+    return table
+
+
+class _History:
+    """The last steps of a rollout: velocities, commands and what the physics missed, (P, S) by name."""
+
+    def __init__(self, physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> None:
+        self.delays, held = delays, len(instants.past.get("u", ()))
+        if held < delays:
+            raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
+        past = {name: instants.past[name][held - delays :] for name in (*MOTIONS, *commands)}
+        self.rows = {name: list(values) for name, values in past.items()}
+        if physics.vessel is not None:
+            for name, values in zip(MISSED, _missed_before(physics, instants, delays), strict=True):
+                self.rows[name] = list(values)
+
+    def move(self, at: Instants, missed: Array) -> None:
+        """Go one step: what held at its start becomes the past."""
+        for name, values in self.rows.items():
+            values.append(missed[:, MISSED.index(name)] if name in MISSED else at.columns[name])
+
+    def before(self) -> dict[str, Array]:
+        """The last steps (P, S) by name, the oldest first."""
+        return {name: np.stack(values[-self.delays :]) for name, values in self.rows.items()}
+
+
+def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Array]:
+    """What single steps of the physics missed over the last `delays` steps before the instants, u, v, r (P, S) each."""
+    first = len(instants.past["u"]) - delays
+    past = {name: values[first:] for name, values in instants.past.items()}
+    given = {name: values for name, values in past.items() if "." in name}
+    then = Instants({name: values[0] for name, values in past.items()}, planned=given)
+    stepper = Stepper(replace(physics, horizon=delays), then)
+    found = []
+    for k in range(delays):
+        motion = {name: past[name][k] for name in (*MOTIONS, "psi")}
+        source = past if k + 1 < delays else None
+        after = [instants.columns[name] if source is None else source[name][k + 1] for name in MOTIONS]
+        alone = free(replace(physics, horizon=delays), stepper.at(k, motion))
+        found.append((np.stack(after, axis=1) - alone) / physics.step)
+    return [np.stack([step[:, axis] for step in found]) for axis in range(3)]
+
+
+@dataclass(frozen=True)
+class HankelCorrector:
+    """The law, rolled over the horizon from the past of the instants."""
+
+    law: Law
+    past: float
+    hyperparameters: Mapping[str, float]
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return paths (T, S, 2) [m] in the frame (11)."""
+        law = self.law
+        history = _History(physics, instants, law.delays, law.commands)
+
+        def acceleration(at: Instants, _: int, __: Array) -> Array:
+            found = law(delayed(at.columns, history.before(), law.delays, law.commands))
+            history.move(at, found)
+            return found
+
+        return stepped_paths(physics, instants, acceleration)
+
+    def header(self) -> dict[str, Any]:
+        """Return names and hyperparameters."""
+        return {
+            "commands": list(self.law.commands),
+            "delays": self.law.delays,
+            "names": list(self.law.normaliser.names),
+            "past": self.past,
+            "hyperparameters": dict(self.hyperparameters),
+        }
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name."""
+        return {"mean": self.law.normaliser.mean, "std": self.law.normaliser.std, "weights": self.law.weights}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        names = tuple(header["names"])
+        mean, std, weights = (taken(arrays, name) for name in ("mean", "std", "weights"))
+        if mean.shape != (len(names),) or std.shape != mean.shape or weights.shape != (len(names) + 1, 3):
+            raise ResultError("the arrays of the saved method do not fit together", path="weights")
+        law = Law(tuple(header["commands"]), int(header["delays"]), Normaliser(names, mean, std), weights)
+        return cls(law, float(header["past"]), dict(header["hyperparameters"]))
+
+
+class HankelDMD(Searched):
+    """A linear law with delays and control; it needs a past, and works with and without physics.
+
+    Parameters
+    ----------
+    delays : how far back the law may look [s]; each is tried with every ridge, and judged by the path.
+    ridge : weight of the squared weights of normalised inputs; 8 from low to high.
+    mirror : whether every step counts with its image of port and starboard too, where the inputs allow it.
+    samples : validation windows that a trial is judged on, at most.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
+    RIDGES: ClassVar[int] = 8
+    corrector: ClassVar[type[Any]] = HankelCorrector
+
+    delays: tuple[PositiveFloat, ...] = (2.0, 4.0, 8.0)
+    ridge: Scale = (1e-8, 1e-1)
+    mirror: bool = True
+    samples: int = 300
+
+    @property
+    def past(self) -> float:
+        """Length of the past that windows must hold [s]."""
+        return max(self.delays)
+
+    def varied(self) -> tuple[str, ...]:
+        """Return the names of the hyperparameters that differ between trials."""
+        return ("delays", *self.ranges())
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve the law for every foundation; the best delays and ridge, solved with all windows, are the corrector."""
+        found = {}
+        for count, name in enumerate(task.cases):
+            points = [{"delays": delays} for delays in self.delays]
+            found[name] = self._fit(task, name) if sound(task, name) else diverged(points)
+            if task.on_trial is not None:
+                task.on_trial(count + 1, len(task.cases))
+        return found
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        begin = time.perf_counter()
+        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
+        rows: list[dict[str, Any]] = []
+        for number, seconds in enumerate(self.delays):
+            start = time.perf_counter()
+            table = _true_table(task, name, steps, steps_of(seconds, task.windows.step))
+            errors = np.zeros(len(ridges))
+            for fold, (training, validation) in enumerate(task.folds):
+                law = self._law(task, table, steps, steps.of(training), seconds, ridges)
+                judged = some_of(validation, self.samples, seed_of(task.seed, fold))
+                instants = task.instants(name).select(np.tile(judged, len(ridges)))
+                found = HankelCorrector(law, seconds, {}).predict(task.cases[name].physics, instants, np.empty(0))
+                future = task.windows.future[:, judged]
+                errors += [mean_square(path, future) for path in np.split(found, len(ridges), axis=1)]
+            best = int(errors.argmin())
+            value = float(errors[best]) / len(task.folds)
+            rows.append(row_of(number, {"delays": seconds, "ridge": ridges[best]}, value, start))
+        complete = [row for row in rows if row["state"] == "complete"]
+        if not complete:
+            return Fitted(None, rows, time.perf_counter() - begin)
+        params = min(complete, key=lambda row: row["value"])["params"]
+        table = _true_table(task, name, steps, steps_of(params["delays"], task.windows.step))
+        law = self._law(task, table, steps, steps.of(used(task)), params["delays"], [params["ridge"]])
+        corrector = HankelCorrector(replace(law, weights=law.weights[0]), params["delays"], params)
+        return Fitted(corrector, rows, time.perf_counter() - begin)
+
+    def _law(
+        self,
+        task: Task,
+        table: Mapping[str, Array],
+        steps: TrueSteps,
+        chosen: Index,
+        seconds: float,
+        ridges: list[float],
+    ) -> Law:
+        """The law on the chosen steps, for each ridge."""
+        here = {key: values[chosen] for key, values in table.items()}
+        features = choose_features(here)
+        names = tuple(features)
+        values, missing = np.stack([here[key] for key in names], axis=1), steps.missing[chosen]
+        image = reflection(here, features) if self.mirror else None
+        if image is not None:
+            values = np.concatenate([values, values @ image])
+            missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
+        normaliser = Normaliser(names, values.mean(axis=0), values.std(axis=0))
+        full = np.concatenate([(values - normaliser.mean) / normaliser.std, np.ones((len(values), 1))], axis=1)
+        size = np.maximum(missing.std(axis=0), 1e-12)
+        penalty = np.r_[np.ones(len(names)), 1e-3]
+        weights = solve(full, missing / size, ridges, penalty) * size
+        return Law(task.commands, steps_of(seconds, task.windows.step), normaliser, weights)
+
+
+def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[str, Array]:
+    """Inputs (N,) of the law at the true steps: what came before them is the past and the horizon of their windows."""
+    windows, case = task.windows, task.cases[name]
+    if windows.num_past < delays:
+        raise DataError(
+            f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past"
+        )
+    first = windows.num_past - delays
+    before: dict[str, Array] = {}
+    for key in MOTIONS:
+        before[key] = np.concatenate([windows.past[key][first:], windows.columns[key][None], windows.states[key]])
+    for key in task.commands:
+        before[key] = np.concatenate([windows.past[key][first:], windows.planned[key]])
+    if case.physics.vessel is not None:
+        instants = windows.instants(known=True, hidden=task.hidden.get(name))
+        stepper, missed = Stepper(case.physics, instants), []
+        for k in range(windows.horizon):
+            motion = {key: before[key][delays + k] for key in MOTIONS}
+            motion["psi"] = windows.columns["psi"] if k == 0 else windows.states["psi"][k - 1]
+            after = np.stack([windows.states[key][k] for key in MOTIONS], axis=1)
+            missed.append((after - free(case.physics, stepper.at(k, motion))) / windows.step)
+        for axis, key in enumerate(MISSED):
+            past = _missed_before(case.physics, instants, delays)[axis]
+            before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])
+    at = delays + steps.number
+    chosen = {
+        key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)])
+        for key, values in before.items()
+    }
+    return delayed(steps.at.columns, chosen, delays, task.commands)

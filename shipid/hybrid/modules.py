@@ -1,0 +1,300 @@
+"""Modules: bounded factors of hull, thrusters and rudders, learned from single steps, with an alarm off the data.
+
+M nu_dot = sum over modules of f_m(u, v, r, commands) F_m + the rest, with 1 - limit <= f_m <= 1 + limit. What a module
+does to a step is the difference of two steps of the physics, with the module and without it. f_m - 1 = w_m h is linear
+in a constant and drawn hidden units h, so that w follows in closed form from the missing accelerations of single true
+steps; outside of the limits it is cut. Far from the training data all factors fade to 1.
+
+Corrections of single modules with limits and a distance-based alarm have been published for free-running model tests;
+the closed form is ours.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.errors import ResultError
+from shipid.hybrid.compensator import Normaliser
+from shipid.hybrid.features import feature_table
+from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
+from shipid.hybrid.units import (
+    Seen,
+    Units,
+    diverged,
+    mean_square,
+    part_of,
+    points_of,
+    ridges_of,
+    row_of,
+    solve,
+    some_of,
+    sound,
+    taken,
+    used,
+)
+from shipid.physics import TERMS
+from shipid.vessel.schema import behind, term_blocks
+
+Array = NDArray[np.float64]
+MOST = 2000  # moments from which the radius of the alarm is taken, about
+ORDER = ("rudders", "thrusters", "hull")  # in which modules are switched off: a rudder needs the wash of its propeller
+
+
+def modules_of(physics: Physics) -> dict[str, tuple[str, ...]]:
+    """Module -> dotted paths of its blocks, in the order in which they are switched off; none without a vessel."""
+    found: dict[str, list[str]] = {name: [] for name in ORDER}
+    for path, key, _ in () if physics.vessel is None else term_blocks(physics.vessel.document):
+        if key.startswith("hull."):
+            found["hull"].append(path)
+        elif key.startswith("thruster."):
+            rudder = key.startswith("thruster.rudder") or bool(behind(TERMS[key]))
+            found["rudders" if rudder else "thrusters"].append(path)
+    return {name: tuple(paths) for name, paths in found.items() if paths}
+
+
+def without(physics: Physics) -> list[Physics]:
+    """The physics without the first module, without the first two, ... of `modules_of`."""
+    found: list[Physics] = []
+    off: dict[str, bool] = {}
+    for paths in modules_of(physics).values():
+        off |= {f"{path}.off": True for path in paths}
+        found.append(physics.with_values(off))
+    return found
+
+
+def shares(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
+    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as `free` gives it."""
+    after = np.stack([whole, *(free(one, at) for one in reduced)], axis=1)
+    return (after[:, :-1] - after[:, 1:]) / step
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """How far a moment is from the training data: the distance to the nearest of some of its moments.
+
+    centres : (C, d) normalised inputs. radius : how far the moments of one run of training are from the other runs, at
+        most; of a single run, from the centres.
+    """
+
+    normaliser: Normaliser
+    centres: Array
+    radius: float
+
+    @classmethod
+    def fit(cls, table: Mapping[str, Array], normaliser: Normaliser, count: int, run: NDArray[np.str_]) -> Self:
+        """Choose centres, each the moment that is farthest from those before; `run` (S,) names the run of each."""
+        z = normaliser.apply(table)
+        centres = [z[np.square(z).sum(axis=1).argmin()]]
+        apart = np.linalg.norm(z - centres[0], axis=1)
+        while len(centres) < min(count, len(z)) and apart.max() > 0:
+            centres.append(z[apart.argmax()])
+            apart = np.minimum(apart, np.linalg.norm(z - centres[-1], axis=1))
+        few = np.arange(0, len(z), max(len(z) // MOST, 1))
+        z, run = z[few], run[few]
+        across = [nearest(z[run == name], z[run != name]).max() for name in np.unique(run) if (run != name).any()]
+        return cls(normaliser, np.array(centres), float(max([*across, apart.max()])))
+
+    def weight(self, table: Mapping[str, Array], fade: float) -> Array:
+        """1 within the radius of a centre, falling to 0 at `fade` (in standard deviations) beyond it, (S,)."""
+        z = self.normaliser.apply(table)
+        found = np.clip(1 - (nearest(z, self.centres) - self.radius) / fade, 0.0, 1.0)
+        return np.where(np.isfinite(found), found, 0.0)
+
+
+def nearest(z: Array, centres: Array) -> Array:
+    """Distance of each point (S, d) to the nearest of the centres (C, d), (S,)."""
+    squares = np.square(z).sum(axis=1)[:, None] - 2 * z @ centres.T + np.square(centres).sum(axis=1)
+    return np.asarray(np.sqrt(np.maximum(squares.min(axis=1), 0.0)))
+
+
+@dataclass(frozen=True)
+class ModulesCorrector:
+    """Factors of the modules of the physics.
+
+    commands : names of the command columns. modules : names, in order.
+    weights : (..., K, M + 1) of the constant and the even hidden units, for each module; R in front are R corrections
+        for R S inputs, in R blocks.
+    limit : greatest departure of a factor from 1. fade : distance beyond the training data at which factors are 1.
+    """
+
+    commands: tuple[str, ...]
+    modules: tuple[str, ...]
+    units: Units
+    weights: Array
+    alarm: Alarm
+    limit: float
+    fade: float
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return paths (T, S, 2) [m] in the frame (11) of the physics with these factors."""
+        if tuple(modules_of(physics)) != self.modules:
+            raise ResultError(f"the physics has other modules than {', '.join(self.modules)}", path="modules")
+        reduced = without(physics)
+
+        def acceleration(at: Instants, _: int, whole: Array) -> Array:
+            extra = self.factors(at) - 1
+            return np.asarray(np.einsum("sk,skj->sj", extra, shares(reduced, at, whole, physics.step)))
+
+        return stepped_paths(physics, instants, acceleration)
+
+    def factors(self, at: Instants) -> Array:
+        """Factor of each module (S, K)."""
+        table = feature_table(at.columns, self.commands)
+        even, _ = self.units.parts(table)
+        count = 1 if self.weights.ndim == 2 else len(self.weights)
+        weights = self.weights.reshape(count, *self.weights.shape[-2:]).swapaxes(1, 2)
+        raw = (even.reshape(count, -1, even.shape[1]) @ weights).reshape(len(even), -1)
+        found: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
+        return found
+
+    def header(self) -> dict[str, Any]:
+        """Return names, limits and hyperparameters."""
+        return {
+            "commands": list(self.commands),
+            "modules": list(self.modules),
+            "units": self.units.header(),
+            "limit": self.limit,
+            "fade": self.fade,
+            "radius": self.alarm.radius,
+            "hyperparameters": dict(self.hyperparameters),
+        }
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name."""
+        units = {f"units.{name}": values for name, values in self.units.arrays().items()}
+        return {**units, "weights": self.weights, "centres": self.alarm.centres}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        units = Units.from_arrays(header["units"], part_of(arrays, "units."))
+        weights, centres = taken(arrays, "weights"), taken(arrays, "centres")
+        if (
+            weights.shape != (len(header["modules"]), len(units.offset) + 1)
+            or centres.shape[1:] != units.weight.shape[:1]
+        ):
+            raise ResultError("the arrays of the saved method do not fit together", path="weights")
+        return cls(
+            tuple(header["commands"]),
+            tuple(header["modules"]),
+            units,
+            weights,
+            Alarm(units.normaliser, centres, float(header["radius"])),
+            float(header["limit"]),
+            float(header["fade"]),
+            dict(header["hyperparameters"]),
+        )
+
+
+class Modules(Searched):
+    """Bounded factors of hull, thrusters and rudders: a constant each, and a small network of state and commands.
+
+    Parameters
+    ----------
+    trials : sets of hyperparameters tried per foundation, each with 6 ridges; judged by the path.
+    units : drawn hidden units; 0 leaves constants alone.
+    motion_scale, command_scale, offset : as in `path-drawn`.
+    ridge : weight of the squared weights of the hidden units; the constants have a hundredth of it.
+    limit : greatest departure of a factor from 1, below 1.
+    mirror : whether port and starboard are mirror images, where the inputs allow it.
+    centres : moments of training that the alarm keeps, at most.
+    fade : distance beyond the training data, in standard deviations of the inputs, at which all factors are 1.
+    samples : validation windows that a trial is judged on, at most.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
+    RIDGES: ClassVar[int] = 6
+    meets_none: ClassVar[bool] = False
+    corrector: ClassVar[type[Any]] = ModulesCorrector
+
+    trials: PositiveInt = 6
+    units: NonNegativeInt = 24
+    motion_scale: Scale = (2.0, 16.0)
+    command_scale: Scale = (2.0, 16.0)
+    offset: Scale = (0.5, 4.0)
+    ridge: Scale = (1e-6, 1.0)
+    limit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    mirror: bool = True
+    centres: PositiveInt = 256
+    fade: PositiveFloat = 1.0
+    samples: PositiveInt = 300
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
+        found = {}
+        for count, name in enumerate(task.cases):
+            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
+            if task.on_trial is not None:
+                task.on_trial(count + 1, len(task.cases))
+        return found
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        begin, physics = time.perf_counter(), task.cases[name].physics
+        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
+        modules = tuple(modules_of(physics))
+        if not modules:
+            raise ResultError(
+                "the vessel has no hull, thruster or rudder whose factor could be learned", path="modules"
+            )
+        parts = shares(without(physics), steps.at, steps.free, steps.step)
+        rows: list[dict[str, Any]] = []
+        for number, point in enumerate(points_of(self)):
+            start = time.perf_counter()
+            errors = np.zeros(len(ridges))
+            for fold, (training, validation) in enumerate(task.folds):
+                found = self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
+                judged = some_of(validation, self.samples, seed_of(task.seed, fold))
+                instants = task.instants(name).select(np.tile(judged, len(ridges)))
+                paths = np.split(found.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
+                errors += [mean_square(path, task.windows.future[:, judged]) for path in paths]
+            best = int(errors.argmin())
+            value = float(errors[best]) / len(task.folds)
+            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
+        complete = [row for row in rows if row["state"] == "complete"]
+        if not complete:
+            return Fitted(None, rows, time.perf_counter() - begin)
+        row = min(complete, key=lambda row: row["value"])
+        params = row["params"]
+        everything = steps.of(used(task))
+        found = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
+        return Fitted(found, rows, time.perf_counter() - begin)
+
+    def _solved(
+        self,
+        task: Task,
+        modules: tuple[str, ...],
+        steps: TrueSteps,
+        parts: Array,
+        chosen: Index,
+        point: Mapping[str, float],
+        number: int,
+        ridges: list[float],
+    ) -> ModulesCorrector:
+        """Factors on the chosen steps for all ridges; one ridge has no axis in front."""
+        table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
+        table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
+        units = Seen.of(table, self.mirror).draw(point, self.units, seed_of(task.seed, number))
+        even, _ = units.parts(table)
+        missing, acting = steps.missing[chosen], parts[chosen]
+        size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
+        rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
+        penalty = np.tile(np.r_[0.1, np.ones(self.units)], len(modules))
+        weights = solve(rows, (missing / size).reshape(-1, 1), ridges, penalty)
+        weights = weights.reshape(len(ridges), len(modules), -1)
+        alarm = Alarm.fit(table, units.normaliser, self.centres, task.windows.run[steps.window[chosen]])
+        weights = weights[0] if len(ridges) == 1 else weights
+        hyperparameters = {**point}
+        return ModulesCorrector(task.commands, modules, units, weights, alarm, self.limit, self.fade, hyperparameters)

@@ -1,0 +1,213 @@
+"""One step: networks of state, commands and wind that give the acceleration the physics misses, at every step.
+
+nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f trained on what single steps of the physics
+from true states miss (without physics: on the acceleration itself). Skulstad et al. (2021) train it by gradients;
+here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.errors import ResultError
+from shipid.hybrid.features import feature_table
+from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
+from shipid.hybrid.units import (
+    Seen,
+    Units,
+    diverged,
+    mean_square,
+    part_of,
+    points_of,
+    ridges_of,
+    row_of,
+    solve,
+    some_of,
+    sound,
+    taken,
+    used,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Head:
+    """One network: hidden units and their output weights, (M + 1, 1) for surge and (M or M + 1, 2) for sway and yaw.
+
+    Weights may have R more in front, (R, M + 1, 1) and (R, M, 2), for R networks on the same units.
+    """
+
+    units: Units
+    surge: Array
+    sway_yaw: Array
+
+    def acceleration(self, table: Mapping[str, Array]) -> Array:
+        """Missing acceleration (S, 3) [m/s^2, rad/s^2] for inputs (S,); of R networks for R S inputs, in R blocks."""
+        even, odd = self.units.parts(table)
+        if self.surge.ndim == 2:
+            return np.concatenate([even @ self.surge, odd @ self.sway_yaw], axis=1)
+        count = len(self.surge)
+        stacked = [
+            part.reshape(count, -1, part.shape[1]) @ weight
+            for part, weight in ((even, self.surge), (odd, self.sway_yaw))
+        ]
+        return np.concatenate(stacked, axis=2).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class OneStepCorrector:
+    """The mean of some networks, applied at every step of the rollout.
+
+    commands : names of the command columns.
+    """
+
+    commands: tuple[str, ...]
+    heads: tuple[Head, ...]
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return paths (T, S, 2) [m] in the frame (11), rolled out with the missing acceleration."""
+
+        def acceleration(at: Instants, _: int, __: Array) -> Array:
+            table = feature_table(at.columns, self.commands)
+            return np.asarray(np.mean([head.acceleration(table) for head in self.heads], axis=0))
+
+        return stepped_paths(physics, instants, acceleration)
+
+    def header(self) -> dict[str, Any]:
+        """Return names and hyperparameters."""
+        units = [head.units.header() for head in self.heads]
+        return {"commands": list(self.commands), "units": units, "hyperparameters": dict(self.hyperparameters)}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by flat names: `0.weight`, `0.surge`, ..."""
+        found: dict[str, Array] = {}
+        for i, head in enumerate(self.heads):
+            parts = {**head.units.arrays(), "surge": head.surge, "sway_yaw": head.sway_yaw}
+            found |= {f"{i}.{name}": values for name, values in parts.items()}
+        return found
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        heads = []
+        for i, entry in enumerate(header["units"]):
+            parts = part_of(arrays, f"{i}.")
+            head = Head(Units.from_arrays(entry, parts), taken(parts, "surge"), taken(parts, "sway_yaw"))
+            count = len(head.units.offset)
+            if head.surge.shape != (count + 1, 1) or head.sway_yaw.shape != (count + (not entry["mirror"]), 2):
+                raise ResultError("the arrays of the saved method do not fit together", path=f"{i}.surge")
+            heads.append(head)
+        return cls(tuple(header["commands"]), tuple(heads), dict(header["hyperparameters"]))
+
+
+class OneStep(Searched):
+    """Networks with drawn hidden units on the missing acceleration, applied at every step of the rollout.
+
+    Every trial draws hidden units, solves them for 8 ridges on the training steps, and is judged by the path on the
+    validation windows. Sway and yaw change sign in the mirror, surge does not.
+
+    Parameters
+    ----------
+    trials : sets of hyperparameters tried per foundation.
+    units : hidden units of tanh, drawn at random; in mirrored pairs where the inputs have a mirror.
+    motion_scale, command_scale, wind_scale, offset : as in `path-drawn`.
+    ridge : weight of the squared output weights beside the mean squared error of the accelerations, each axis by its
+        standard deviation; from low to high, the best of 8 is taken for each trial.
+    mirror : whether port and starboard are mirror images, where the inputs allow it.
+    averaged : the accelerations are the mean of the networks of so many best trials.
+    samples : validation windows that a trial is judged on, at most.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
+    RIDGES: ClassVar[int] = 8
+    corrector: ClassVar[type[Any]] = OneStepCorrector
+
+    trials: PositiveInt = 12
+    units: PositiveInt = 200
+    motion_scale: Scale = (1.0, 16.0)
+    command_scale: Scale = (1.0, 16.0)
+    wind_scale: Scale = (4.0, 64.0)
+    offset: Scale = (0.5, 4.0)
+    ridge: Scale = (1e-9, 1e-2)
+    mirror: bool = True
+    averaged: PositiveInt = 4
+    samples: PositiveInt = 300
+
+    def num_chosen(self) -> int:
+        """Return how many of the best trials make the corrector, at most."""
+        return self.averaged
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
+        found = {}
+        for count, name in enumerate(task.cases):
+            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
+            if task.on_trial is not None:
+                task.on_trial(count + 1, len(task.cases))
+        return found
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        begin = time.perf_counter()
+        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
+        table = feature_table(steps.at.columns, task.commands)
+        rows: list[dict[str, Any]] = []
+        for number, point in enumerate(points_of(self)):
+            start = time.perf_counter()
+            errors = np.zeros(len(ridges))
+            for fold, (training, validation) in enumerate(task.folds):
+                head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
+                errors += self._errors(task, name, head, some_of(validation, self.samples, seed_of(task.seed, fold)))
+            best = int(errors.argmin())
+            value = float(errors[best]) / len(task.folds)
+            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
+        kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
+        if not kept:
+            return Fitted(None, rows, time.perf_counter() - begin)
+        everything, heads = steps.of(used(task)), []
+        for row in kept[: self.averaged]:
+            params = row["params"]
+            head = self._head(steps, table, everything, params, row["number"], [params["ridge"]], task.seed)
+            heads.append(Head(head.units, head.surge[0], head.sway_yaw[0]))
+        corrector = OneStepCorrector(task.commands, tuple(heads), kept[0]["params"])
+        return Fitted(corrector, rows, time.perf_counter() - begin)
+
+    def _head(
+        self,
+        steps: TrueSteps,
+        table: Mapping[str, Array],
+        chosen: Index,
+        point: Mapping[str, float],
+        number: int,
+        ridges: list[float],
+        seed: int,
+    ) -> Head:
+        """Networks for all ridges on the chosen steps."""
+        here = {key: values[chosen] for key, values in table.items()}
+        units = Seen.of(here, self.mirror).draw(point, self.units, seed_of(seed, number))
+        missing = steps.missing[chosen]
+        size = np.maximum(missing.std(axis=0), 1e-12)
+        even, odd = units.parts(here)
+        surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
+        return Head(units, surge, solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:])
+
+    def _errors(self, task: Task, name: str, head: Head, windows: Index) -> Array:
+        """Mean squared error [m^2] per coordinate of the path on some windows, for each ridge."""
+        count = len(head.surge)
+        instants = task.instants(name).select(np.tile(windows, count))
+        paths = OneStepCorrector(task.commands, (head,), {}).predict(task.cases[name].physics, instants, np.empty(0))
+        each = np.split(paths, count, axis=1)
+        return np.array([mean_square(path, task.windows.future[:, windows]) for path in each])

@@ -1,0 +1,390 @@
+"""Recurrent: a gated recurrent unit reads the past, and gives the compensation of the path.
+
+h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
+[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are
+known, the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path,
+early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even
+and y odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014);
+PyTorch trains it, plain arrays predict.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+
+from shipid.data.windows import Instants
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.compensator import Normaliser, unflatten
+from shipid.hybrid.features import Inputs, Memory, choose_features, feature_table, steps_of
+from shipid.hybrid.method import Fitted, Index, Task, shared_tables
+from shipid.hybrid.mirror import reflection
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.units import diverged, mean_square, part_of, points_of, row_of, sound, taken
+
+Array = NDArray[np.float64]
+LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
+
+
+@dataclass(frozen=True)
+class Sequences:
+    """What a network reads, normalised: the past with the instant (P + 1, S, d), and inputs at the instant (S, e)."""
+
+    past: Array
+    now: Array
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Names, statistics and mirrors of what a network reads.
+
+    past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
+    mirrors : of both; None where port and starboard are not mirror images.
+    steps : number of past steps.
+    """
+
+    past: Normaliser
+    now: Normaliser
+    mirrors: tuple[Array, Array] | None
+    steps: int
+
+    def read(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Sequences:
+        """Read instants, with their inputs (S,) as `Inputs.table` gives them."""
+        missing = next((name for name in self.now.names if name not in table), None)
+        if missing is not None:
+            raise DataError("the method was trained with this input; measure wind (V_w, beta_w)", path=missing)
+        rows = [self.past.apply(signals) for signals in signals_of(instants, self.steps, commands)]
+        return Sequences(np.stack(rows), self.now.apply(table))
+
+    def mirrored(self, seen: Sequences) -> Sequences:
+        """The image of port and starboard."""
+        assert self.mirrors is not None
+        along, at = self.mirrors
+        return Sequences(seen.past @ along, seen.now @ at)
+
+
+def signals_of(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
+    """Motion, commands and relative wind (S,) at the last `steps` steps and at the instant, the oldest first."""
+    held = len(instants.past.get("u", ()))
+    if held < steps:
+        raise DataError(f"the method needs {steps} steps of the past, there are {held}", path="u")
+    before = [{name: values[k] for name, values in instants.past.items()} for k in range(held - steps, held)]
+    return [feature_table(columns, commands) for columns in (*before, instants.columns)]
+
+
+@dataclass(frozen=True)
+class GatedNetwork:
+    """One trained network: what it reads, its layers by name, and its basis (T, r) [m]."""
+
+    reader: Reader
+    layers: Mapping[str, Array]
+    basis: Array
+
+    def predict(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Array:
+        """Compensation (T, S, 2) [m]."""
+        seen = self.reader.read(table, instants, commands)
+        outputs = self._outputs(seen)
+        if self.reader.mirrors is not None:
+            half = np.repeat([1.0, -1.0], outputs.shape[1] // 2)
+            outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
+        return np.tensordot(self.basis, unflatten(outputs), 1)
+
+    def _outputs(self, seen: Sequences) -> Array:
+        layers = self.layers
+        hidden = np.zeros((len(seen.now), layers["W_h"].shape[1]))
+        for row in seen.past:
+            a = row @ layers["W_i"].T + layers["b_i"]
+            b = hidden @ layers["W_h"].T + layers["b_h"]
+            reset, update, fresh = np.split(a, 3, axis=1)
+            reset_h, update_h, fresh_h = np.split(b, 3, axis=1)
+            gate = _sigmoid(update + update_h)
+            hidden = (1 - gate) * np.tanh(fresh + _sigmoid(reset + reset_h) * fresh_h) + gate * hidden
+        full = np.concatenate([hidden, seen.now], axis=1)
+        found: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        return found
+
+
+def _sigmoid(values: Array) -> Array:
+    return (1 + np.tanh(values / 2)) / 2
+
+
+@dataclass(frozen=True)
+class RecurrentCorrector:
+    """The mean of the networks of the folds."""
+
+    inputs: Inputs
+    past: float
+    networks: tuple[GatedNetwork, ...]
+    hyperparameters: Mapping[str, float]
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
+        """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
+        table = self.inputs.table(physics, instants)
+        found = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
+        return np.asarray(paths + np.mean(found, axis=0))
+
+    def header(self) -> dict[str, Any]:
+        """Return names and hyperparameters."""
+        readers = [network.reader for network in self.networks]
+        return {
+            "inputs": self.inputs.header(),
+            "past": self.past,
+            "networks": [
+                {
+                    "past": list(r.past.names),
+                    "now": list(r.now.names),
+                    "steps": r.steps,
+                    "mirror": r.mirrors is not None,
+                }
+                for r in readers
+            ],
+            "hyperparameters": dict(self.hyperparameters),
+        }
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by flat names: `0.W_i`, `0.past.mean`, ..."""
+        found: dict[str, Array] = {}
+        for i, network in enumerate(self.networks):
+            parts = {**network.layers, "basis": network.basis}
+            for name, normaliser in (("past", network.reader.past), ("now", network.reader.now)):
+                parts |= {f"{name}.mean": normaliser.mean, f"{name}.std": normaliser.std}
+            if network.reader.mirrors is not None:
+                parts |= dict(zip(("past.mirror", "now.mirror"), network.reader.mirrors, strict=True))
+            found |= {f"{i}.{name}": values for name, values in parts.items()}
+        return found
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        networks = []
+        for i, entry in enumerate(header["networks"]):
+            parts = part_of(arrays, f"{i}.")
+            past, now = (
+                Normaliser(tuple(entry[key]), taken(parts, f"{key}.mean"), taken(parts, f"{key}.std"))
+                for key in ("past", "now")
+            )
+            mirrors = (taken(parts, "past.mirror"), taken(parts, "now.mirror")) if entry["mirror"] else None
+            layers = {name: taken(parts, name) for name in LAYERS}
+            if layers["W_i"].shape[1] != len(past.names) or layers["W_2"].shape[1] != len(layers["c_1"]):
+                raise ResultError("the arrays of the saved network do not fit together", path=f"{i}.W_i")
+            reader = Reader(past, now, mirrors, int(entry["steps"]))
+            networks.append(GatedNetwork(reader, layers, taken(parts, "basis")))
+        inputs, hyperparameters = Inputs.from_header(header["inputs"]), dict(header["hyperparameters"])
+        return cls(inputs, float(header["past"]), tuple(networks), hyperparameters)
+
+
+class Recurrent(Searched):
+    """A gated recurrent unit on the past, trained on the errors of the path.
+
+    Parameters
+    ----------
+    trials : networks tried per foundation and fold, each with a start of its own; the best by validation is taken.
+    seconds : length of the past that it reads.
+    units : of the recurrent state, and of the layer after it.
+    learning_rate : of AdamW at the start, falling to 0 by half a cosine; a range is searched by its logarithm.
+    weight_decay : decoupled.
+    epochs : passes over the training windows, at most.
+    batch : windows per optimiser step.
+    patience : epochs without a better validation loss after which training stops.
+    terms : the compensation is a polynomial of time with so many terms.
+    mirror : whether the compensation has the symmetry of port and starboard, where the inputs allow it.
+    memory : what the inputs at the instant hold of the past.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("learning_rate",)
+    corrector: ClassVar[type[Any]] = RecurrentCorrector
+
+    trials: PositiveInt = 3
+    seconds: PositiveFloat = 10.0
+    units: PositiveInt = 24
+    learning_rate: Scale = (3e-3, 2e-2)
+    weight_decay: NonNegativeFloat = 1e-3
+    epochs: PositiveInt = 80
+    batch: PositiveInt = 128
+    patience: PositiveInt = 20
+    terms: PositiveInt = 6
+    mirror: bool = True
+    memory: Memory = Memory()
+
+    @property
+    def past(self) -> float:
+        """Length of the past that windows must hold [s]."""
+        return max(self.seconds, self.memory.past)
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
+        inputs = Inputs(task.commands, self.memory)
+        tables = shared_tables(task, inputs)
+        found = {}
+        for count, name in enumerate(task.cases):
+            healthy = sound(task, name)
+            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
+            if task.on_trial is not None:
+                task.on_trial(count + 1, len(task.cases))
+        return found
+
+    def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
+        from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
+
+        begin, rows, trained = time.perf_counter(), list[dict[str, Any]](), []
+        basis = smooth_basis(task.windows.horizon, self.terms)
+        targets = task.targets[name]
+        for number, point in enumerate(points_of(self)):
+            start, losses, networks, most = time.perf_counter(), [], [], 0
+            for fold, (training, validation) in enumerate(task.folds):
+                seed = seed_of(task.seed, name, number, fold)
+                network, epochs = self._trained(task, name, table, targets, basis, training, validation, point, seed)
+                here = {key: values[validation] for key, values in table.items()}
+                predicted = network.predict(here, task.instants(name).select(validation), task.commands)
+                losses.append(mean_square(predicted, targets[:, validation]))
+                networks.append(network)
+                most = max(most, epochs)
+            rows.append(row_of(number, point, float(np.mean(losses)), start, most))
+            trained.append(tuple(networks))
+        best = min(rows, key=lambda row: row["value"])
+        if best["state"] != "complete":
+            return Fitted(None, rows, time.perf_counter() - begin)
+        corrector = RecurrentCorrector(inputs, self.past, trained[best["number"]], best["params"])
+        return Fitted(corrector, rows, time.perf_counter() - begin)
+
+    def _reader(self, task: Task, table: Mapping[str, Array], training: Index) -> Reader:
+        """Statistics of the training windows alone."""
+        steps = steps_of(self.seconds, task.windows.step)
+        rows = signals_of(task.windows.select(training).instants(), steps, task.commands)
+        along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+        at = {name: values[training] for name, values in table.items()}
+        normalisers, mirrors = [], []
+        for part in (along, at):
+            features = choose_features(part)
+            image = reflection(part, features) if self.mirror else None
+            values = np.stack([part[key] for key in features], axis=1)
+            both = values if image is None else np.concatenate([values, values @ image])
+            normalisers.append(Normaliser(tuple(features), both.mean(axis=0), both.std(axis=0)))
+            mirrors.append(image)
+        first, second = mirrors
+        if first is None or second is None:
+            return Reader(normalisers[0], normalisers[1], None, steps)
+        return Reader(normalisers[0], normalisers[1], (first, second), steps)
+
+    def _trained(
+        self,
+        task: Task,
+        name: str,
+        table: Mapping[str, Array],
+        targets: Array,
+        basis: Array,
+        training: Index,
+        validation: Index,
+        point: Mapping[str, float],
+        seed: int,
+    ) -> tuple[GatedNetwork, int]:
+        """Train a network on one fold; the network of the best epoch, and the number of epochs."""
+        reader = self._reader(task, table, training)
+        weights = np.tensordot(basis.T, targets, 1)
+        data = []
+        scale = max(float(np.sqrt(np.square(weights[:, training]).mean())), 1e-9)
+        for part in (training, validation):
+            here = {key: values[part] for key, values in table.items()}
+            seen = reader.read(here, task.instants(name).select(part), task.commands)
+            image = None if reader.mirrors is None else reader.mirrored(seen)
+            outputs = np.concatenate([weights[:, part, 0], weights[:, part, 1]]).T / scale
+            data.append((seen, image, outputs))
+        layers, epochs = train(data, self.units, point["learning_rate"], self, seed)
+        scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
+        return GatedNetwork(reader, scaled, basis), epochs
+
+
+Part = tuple[Sequences, Sequences | None, Array]
+
+
+def train(
+    data: list[Part], units: int, learning_rate: float, method: Recurrent, seed: int
+) -> tuple[dict[str, Array], int]:
+    """Train on the first part of the data, stop by the second; layers by name and the number of epochs.
+
+    Each part is what is read, its mirror image or None, and the outputs (S, 2 r). On one thread, for the same digits.
+    """
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        return _train(data, units, learning_rate, method, seed)
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _train(
+    data: list[Part], units: int, learning_rate: float, method: Recurrent, seed: int
+) -> tuple[dict[str, Array], int]:
+    import torch
+
+    def tensor(values: Array) -> torch.Tensor:
+        return torch.as_tensor(values, dtype=torch.float32)
+
+    generator = torch.Generator().manual_seed(seed)
+    begun = data[0][0]
+    shapes = {
+        "W_i": (3 * units, begun.past.shape[2]),
+        "W_h": (3 * units, units),
+        "b_i": (3 * units,),
+        "b_h": (3 * units,),
+        "W_1": (units, units + begun.now.shape[1]),
+        "c_1": (units,),
+        "W_2": (data[0][2].shape[1], units),
+        "c_2": (data[0][2].shape[1],),
+    }
+    bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
+    layers = {
+        name: ((torch.rand(shape, generator=generator) * 2 - 1) * bounds[name]).requires_grad_()
+        for name, shape in shapes.items()
+    }
+    parts = [
+        ([(tensor(s.past), tensor(s.now)) for s in (seen, image) if s is not None], tensor(outputs))
+        for seen, image, outputs in data
+    ]
+    sign = torch.ones(parts[0][1].shape[1])
+    sign[len(sign) // 2 :] = -1.0
+
+    def forward(seen: list[Any]) -> torch.Tensor:
+        past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
+        flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
+        _, hidden = torch.gru(past, torch.zeros(1, now.shape[0], units), flat, True, 1, 0.0, False, False, False)
+        full = torch.cat([hidden[0], now], dim=1)
+        found: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        if len(seen) == 1:
+            return found
+        plain, image = found.chunk(2)
+        both: torch.Tensor = (plain + sign * image) / 2
+        return both
+
+    optimiser = torch.optim.AdamW(layers.values(), lr=learning_rate, weight_decay=method.weight_decay)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, method.epochs)
+    seen, outputs = parts[0]
+    best, kept, since, epoch = float("inf"), {}, 0, 0
+    for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is told
+        order = torch.randperm(len(outputs), generator=generator)
+        for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
+            optimiser.zero_grad()
+            loss = (forward([(past[:, rows], now[rows]) for past, now in seen]) - outputs[rows]).square().mean()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimiser.step()
+        schedule.step()
+        with torch.no_grad():
+            value = float((forward(parts[1][0]) - parts[1][1]).square().mean())
+        since += 1
+        if value < best:
+            best, since = value, 0
+            kept = {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
+        if since >= method.patience:
+            break
+    if not kept:  # never a number: the start is as good as any
+        kept = {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
+    return kept, epoch

@@ -1,0 +1,166 @@
+"""Velocities one step at a time: what a step of the physics misses, and paths on which something is added to each step.
+
+After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where physics is
+integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a. By `euler`, which errs there by half a
+step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
+Steps start from measured states: an observer of the physics is not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.windows import Instants
+from shipid.engine.native import compiler
+from shipid.errors import DataError
+from shipid.hybrid.features import MOTIONS
+from shipid.hybrid.method import Index, Task
+from shipid.hybrid.physics import Physics
+
+Array = NDArray[np.float64]
+Acceleration = Callable[[Instants, int, Array], Array]
+KEPT = ("psi", "V_w", "beta_w")  # columns that a step needs beside u, v, r and the commands
+WORTH_COMPILING = 2000  # steps of single samples: below it compiling C costs more than it saves
+LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
+
+
+class Stepper:
+    """The physics in single steps from some instants.
+
+    Parameters
+    ----------
+    physics : as in a case.
+    instants : S instants of prediction; commands are held or planned.
+    """
+
+    def __init__(self, physics: Physics, instants: Instants) -> None:
+        self.instants = instants
+        self.columns = {name: values for name, values in instants.columns.items() if name in KEPT or "." in name}
+        self.reached = replace(physics, observer=None).reached(instants)
+
+    def at(self, k: int, motion: Mapping[str, Array]) -> Instants:
+        """What holds at the start of step k = 0..T-1, given u, v, r and psi (S,) then."""
+        planned = self.instants.planned or {}
+        columns = {**self.columns, **{name: values[k] for name, values in planned.items()}, **motion}
+        hidden = {name: values[k] for name, values in self.reached.items()}
+        return Instants(columns, hidden=hidden or None)
+
+
+def free(physics: Physics, at: Instants) -> Array:
+    """Velocities u, v, r (S, 3) that the physics alone says after one step from `at`."""
+    return _one_step(physics, at)[0]
+
+
+def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
+    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
+    if physics.vessel is None:
+        return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
+    engine = "native" if len(at) * physics.horizon > WORTH_COMPILING and compiler() is not None else "auto"
+    found = replace(physics, horizon=1, observer=None).states(at, engine=engine)
+    after = np.stack([found[name][0] for name in MOTIONS], axis=1)
+    if physics.integrator == "euler":
+        return after, None
+    return after, np.stack([found["x"][0], found["y"][0], found["psi"][0] - at.columns["psi"]], axis=1)
+
+
+def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
+    """Paths (T, S, 2) [m] in the frame (11) on which `acceleration` is added to each step of the physics.
+
+    acceleration : (what holds at the start of the step, number of the step, velocities (S, 3) after it by the physics
+        alone) -> missing acceleration (S, 3) [m/s^2, rad/s^2].
+    """
+    stepper, step = Stepper(physics, instants), physics.step
+    nu = np.stack([np.asarray(instants.columns[name], dtype=float) for name in MOTIONS], axis=1)
+    first = np.asarray(instants.columns["psi"], dtype=float)
+    psi, place, found = first, np.zeros((len(nu), 2)), []
+    with np.errstate(all="ignore"):  # a diverged path is not finite, and no news to the caller
+        for k in range(physics.horizon):
+            at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
+            alone, way = _one_step(physics, at)
+            more = acceleration(at, k, alone)
+            after = alone + step * more
+            after = np.where((np.abs(after) <= LIMIT).all(axis=1, keepdims=True), after, np.nan)
+            if way is None:
+                psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
+                place = place + step / 2 * (_turned(nu, psi - first) + _turned(after, psi_after - first))
+            else:
+                way = way + step**2 / 2 * more + 0 * after  # not finite where the path has diverged
+                psi_after = psi + way[:, 2]
+                place = place + _turned(way, psi - first)
+            nu, psi = after, psi_after
+            found.append(place)
+    return np.stack(found)
+
+
+def _turned(nu: Array, angle: Array) -> Array:
+    """Velocity over ground (S, 2) in axes from which the ship has turned by an angle (S,)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1]], axis=1)
+
+
+@dataclass(frozen=True)
+class TrueSteps:
+    """Steps of the true motion, each moment of a run once.
+
+    at : what held at the start of N steps, with the commands in force.
+    free, after : velocities (N, 3) after the step by the physics alone, and the true ones.
+    window : index of the window that each step was taken from, (N,).
+    number : how far into its horizon the step lies, 0..T-1, (N,).
+    """
+
+    at: Instants
+    free: Array
+    after: Array
+    window: Index
+    number: Index
+    step: float
+
+    @property
+    def missing(self) -> Array:
+        """Acceleration (N, 3) [m/s^2, rad/s^2] that the physics misses."""
+        return (self.after - self.free) / self.step
+
+    def of(self, windows: Index) -> Index:
+        """Indices of the steps that were taken from these windows."""
+        return np.flatnonzero(np.isin(self.window, windows))
+
+
+def true_steps(task: Task, name: str) -> TrueSteps:
+    """Steps of the true motion over the windows of a task, and what the physics of a foundation makes of them.
+
+    A moment that several windows of a run hold is taken where it is nearest to the instant, so that the wind is as
+    fresh as can be. DataError where the windows hold no true states.
+    """
+    windows, physics = task.windows, task.cases[name].physics
+    if not windows.states:
+        raise DataError("the method learns from the true velocities over the horizon: these windows hold none")
+    stepper = Stepper(physics, windows.instants(known=True, hidden=task.hidden.get(name)))
+    before = [
+        {key: windows.columns[key] if k == 0 else windows.states[key][k - 1] for key in (*MOTIONS, "psi")}
+        for k in range(windows.horizon)
+    ]
+    chosen = _first_of_each_moment(task)
+    number, window = np.divmod(chosen, len(windows))
+    at = joined([stepper.at(k, motion) for k, motion in enumerate(before)]).select(chosen)
+    after = np.stack([windows.states[key].ravel()[chosen] for key in MOTIONS], axis=1)
+    return TrueSteps(at, free(physics, at), after, window, number, physics.step)
+
+
+def _first_of_each_moment(task: Task) -> Index:
+    """Indices into (T, S), flattened, of steps such that no moment of a run comes twice."""
+    windows = task.windows
+    runs = np.unique(windows.run, return_inverse=True)[1]
+    t = windows.t + windows.step * np.arange(windows.horizon)[:, None]
+    moments = np.stack([np.broadcast_to(runs, t.shape).ravel(), np.round(t.ravel() / (windows.step / 1000))], axis=1)
+    return np.sort(np.unique(moments, axis=0, return_index=True)[1])
+
+
+def joined(parts: Sequence[Instants]) -> Instants:
+    """Several sets of instants one after the other."""
+    columns = {key: np.concatenate([part.columns[key] for part in parts]) for key in parts[0].columns}
+    hidden = {key: np.concatenate([(part.hidden or {})[key] for part in parts]) for key in parts[0].hidden or {}}
+    return Instants(columns, hidden=hidden or None)

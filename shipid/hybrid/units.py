@@ -1,0 +1,176 @@
+"""Hidden units of tanh with drawn weights, in mirrored pairs where the inputs have a mirror, and ridge regression."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.compensator import Normaliser
+from shipid.hybrid.features import choose_features, group_of
+from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.mirror import reflection as mirror_of
+from shipid.hybrid.settings import Searched, spread
+
+Array = NDArray[np.float64]
+MADE_OF = ("mean", "std", "weight", "offset")
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Inputs that vary in training, their z-score, and their mirror.
+
+    reflection : (d, d) of normalised inputs, image = values @ it; None where a column has no image in it.
+    """
+
+    normaliser: Normaliser
+    reflection: Array | None
+
+    @classmethod
+    def of(cls, table: Mapping[str, Array], mirror: bool) -> Self:
+        """Choose inputs and take their statistics from training samples (S,) by name, with their images if mirrored."""
+        features = choose_features(table)
+        names = tuple(features)
+        values = np.stack([table[name] for name in names], axis=1)
+        reflection = mirror_of(table, features) if mirror else None
+        both = values if reflection is None else np.concatenate([values, values @ reflection])
+        return cls(Normaliser(names, both.mean(axis=0), both.std(axis=0)), reflection)
+
+    def draw(self, point: Mapping[str, float], count: int, seed: int) -> Units:
+        """Draw hidden units with the scales and the offset of a trial."""
+        scales = np.array([point[f"{group_of(name)}_scale"] for name in self.normaliser.names])
+        normal = np.random.default_rng(seed).standard_normal((count, len(scales) + 1))
+        return Units(self.normaliser, (normal[:, :-1] / scales).T, normal[:, -1] * point["offset"], self.reflection)
+
+
+@dataclass(frozen=True)
+class Units:
+    """Hidden units tanh(z w + c) of normalised inputs z: `even` ones do not feel the mirror, `odd` ones change sign.
+
+    weight : (d, M). offset : (M,). reflection : (d, d), or None: then even and odd are the same, plain units.
+    """
+
+    normaliser: Normaliser
+    weight: Array
+    offset: Array
+    reflection: Array | None
+
+    def parts(self, table: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Even units with a constant (S, M + 1), and odd ones: (S, M) with a mirror, else the even ones again."""
+        missing = next((name for name in self.normaliser.names if name not in table), None)
+        if missing is not None:
+            raise DataError("the method was trained with this input; measure wind (V_w, beta_w)", path=missing)
+        size = len(self.offset) ** 0.5
+        z = self.normaliser.apply(table)
+        plain = np.tanh(z @ self.weight + self.offset) / size
+        one = np.ones((len(plain), 1))
+        if self.reflection is None:
+            even = np.concatenate([one, plain], axis=1)
+            return even, even
+        image = np.tanh(z @ (self.reflection @ self.weight) + self.offset) / size
+        return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
+
+    def header(self) -> dict[str, Any]:
+        """Return the names of the inputs."""
+        return {"names": list(self.normaliser.names), "mirror": self.reflection is not None}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the arrays by name."""
+        found = {"mean": self.normaliser.mean, "std": self.normaliser.std, "weight": self.weight, "offset": self.offset}
+        return found if self.reflection is None else found | {"reflection": self.reflection}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
+        names, mirror = tuple(header["names"]), bool(header["mirror"])
+        mean, std, weight, offset = (taken(arrays, name) for name in MADE_OF)
+        d = len(names)
+        if mean.shape != (d,) or std.shape != (d,) or weight.shape != (d, len(offset)):
+            raise ResultError("the arrays of the saved method do not fit together", path="weight")
+        return cls(Normaliser(names, mean, std), weight, offset, taken(arrays, "reflection") if mirror else None)
+
+
+def taken(arrays: Mapping[str, Array], name: str) -> Array:
+    """An array of a saved method; ResultError where it is missing."""
+    if name not in arrays:
+        raise ResultError("missing in the saved method", path=name)
+    return arrays[name]
+
+
+def part_of(arrays: Mapping[str, Array], prefix: str) -> dict[str, Array]:
+    """Arrays whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
+
+
+def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
+    """Weights (R, M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2 for R ridges.
+
+    features : (N, M). targets : (N, K). penalty : (M,) relative weights of the ridge, all above 0; default 1.
+    """
+    scale = np.ones(features.shape[1]) if penalty is None else penalty
+    scaled = features / scale
+    values, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
+    product = axes.T @ (scaled.T @ targets) / len(scaled)
+    values = np.maximum(values, 0.0)
+    return np.stack([axes @ (product / (values + ridge)[:, None]) / scale[:, None] for ridge in ridges])
+
+
+def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> list[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm."""
+    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
+    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
+    return [
+        {**fixed, **{n: exp(log(a) + s * (log(b) - log(a))) for s, (n, (a, b)) in zip(at, ranges.items(), strict=True)}}
+        for at in spread(max(len(ranges), 1), method.trials if ranges else 1)
+        for at in [at[: len(ranges)]]
+    ]
+
+
+def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
+    """Ridges that every trial is solved with, evenly spread by their logarithm."""
+    return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
+
+
+def diverged(points: Sequence[Mapping[str, float]]) -> Fitted:
+    """The result where the physics is not finite: no corrector, every trial diverged."""
+    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
+    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(points)], 0.0)
+
+
+def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
+    """The row of a trial that began at `start` by `time.perf_counter`."""
+    state = "complete" if np.isfinite(value) else "diverged"
+    seconds = time.perf_counter() - start
+    return {
+        **{"number": number, "params": dict(params), "value": value},
+        **{"seconds": seconds, "epochs": epochs, "state": state},
+    }
+
+
+def used(task: Task) -> Index:
+    """Indices of the windows that train or validate in any fold."""
+    return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+
+
+def sound(task: Task, name: str) -> bool:
+    """Whether the physics of a foundation is finite on all windows of the folds."""
+    return bool(np.isfinite(task.cases[name].paths[:, used(task)]).all())
+
+
+def some_of(windows: Index, most: int, seed: int) -> Index:
+    """At most so many of the windows, drawn without replacement, in order."""
+    if len(windows) <= most:
+        return windows
+    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
+
+
+def mean_square(paths: Array, future: Array) -> float:
+    """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
+    value = float(np.square(paths - future).mean())
+    return value if np.isfinite(value) else float("inf")

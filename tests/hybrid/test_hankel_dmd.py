@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.hybrid.hankel_dmd import HankelDMD, delayed
+from tests.hybrid.worlds import FINE, fitted, ship, world
+
+AGO = 4.0  # s
+
+
+def late(nus, told):
+    """A force of the velocities and orders four seconds ago."""
+    then = max(len(nus) - 1 - round(AGO / FINE), 0)
+    u, v, r = nus[then].T
+    return np.stack([-3e3 * (u - 3.5), -2e4 * v - 2e5 * r, -1.5e6 * r + 2e5 * told[then]["port.alpha"]], 1)
+
+
+def test_home_a_force_that_comes_late():
+    here = world(ship(), ship(), force=late, past=8, known=True)
+    assert here.removed(fitted(HankelDMD(), here)) > 0.8
+
+
+def test_a_law_that_looks_back_too_little_leaves_more():
+    """The world is a home for delays: a second of past leaves much more than the four that the force is late."""
+    here = world(ship(), ship(), force=late, past=8, known=True)
+    short, long_ = (here.removed(fitted(HankelDMD(delays=(seconds,)), here)) for seconds in (1.0, 4.0))
+    assert 1 - long_ < 0.7 * (1 - short)
+
+
+def test_a_delay_names_how_many_steps_ago():
+    now = {name: np.array([1.0]) for name in ("u", "v", "r", "port.n")}
+    before = {"u": np.array([[7.0], [8.0]]), "port.n": np.array([[5.0], [6.0]]), "missed.v": np.array([[3.0], [4.0]])}
+    table = delayed(now, before, 2, ("port.n",))
+    assert {k: float(v[0]) for k, v in table.items() if "past" in k} == {
+        **{"past-1.u": 8.0, "past-2.u": 7.0, "port.past-1.n": 6.0, "port.past-2.n": 5.0},
+        **{"missed.past-1.v": 4.0, "missed.past-2.v": 3.0},
+    }

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.modules import Modules
+from shipid.hybrid.one_step import OneStep
+from shipid.hybrid.units import Seen, Units, points_of, ridges_of, solve, some_of
+
+POINT = {"motion_scale": 2.0, "command_scale": 3.0, "wind_scale": 4.0, "offset": 1.0}
+MIRROR = {"u": 1, "v": -1, "r": -1, "port.n": 1, "port.alpha": -1}
+
+
+@pytest.fixture
+def table():
+    rng = np.random.default_rng(0)
+    return {name: rng.normal(1.0, 2.0, 50) for name in MIRROR} | {"psi.steady": np.ones(50)}
+
+
+def side(table):
+    both = {name: values for name, values in table.items() if name in MIRROR}
+    return both | {name.replace("port", "starboard"): values for name, values in both.items() if "port" in name}
+
+
+def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
+    here = side(table)
+    units = Seen.of(here, mirror=True).draw(POINT, 12, 0)
+    image = {name: MIRROR[name.replace("starboard", "port")] * values for name, values in here.items()}
+    (even, odd), (even_image, odd_image) = units.parts(here), units.parts(image)
+    assert even.shape == (50, 13)
+    assert odd.shape == (50, 12)
+    np.testing.assert_allclose(even, even_image, atol=1e-12)
+    np.testing.assert_allclose(odd, -odd_image, atol=1e-12)
+    assert np.abs(odd).max() > 0.01
+
+
+def test_without_a_mirror_there_is_one_kind_of_unit(table):
+    units = Seen.of(side(table), mirror=False).draw(POINT, 12, 0)
+    even, odd = units.parts(side(table))
+    np.testing.assert_array_equal(even, odd)
+    assert units.reflection is None
+
+
+def test_units_are_saved_and_refused_where_a_part_is_missing(table):
+    units = Seen.of(side(table), mirror=True).draw(POINT, 5, 0)
+    again = Units.from_arrays(units.header(), units.arrays())
+    np.testing.assert_array_equal(again.parts(side(table))[1], units.parts(side(table))[1])
+    with pytest.raises(ResultError, match="missing"):
+        Units.from_arrays(units.header(), {k: v for k, v in units.arrays().items() if k != "offset"})
+    with pytest.raises(ResultError, match="fit together"):
+        Units.from_arrays(units.header(), {**units.arrays(), "mean": np.zeros(2)})
+    with pytest.raises(DataError, match="trained with this input"):
+        units.parts({name: values for name, values in side(table).items() if name != "v"})
+
+
+def test_a_ridge_regression_is_the_normal_equations():
+    rng = np.random.default_rng(1)
+    features, targets, penalty = rng.normal(size=(40, 4)), rng.normal(size=(40, 2)), np.array([1.0, 2.0, 0.5, 1.0])
+    for ridge, found in zip((1e-3, 2.0), solve(features, targets, (1e-3, 2.0), penalty), strict=True):
+        gram = features.T @ features / 40 + ridge * np.diag(penalty**2)
+        np.testing.assert_allclose(found, np.linalg.solve(gram, features.T @ targets / 40), atol=1e-10)
+
+
+def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
+    points = points_of(OneStep(trials=16, offset=1.5))
+    assert len(points) == 16
+    assert {point["offset"] for point in points} == {1.5}
+    assert all(1 <= point["motion_scale"] <= 16 for point in points)
+    assert len({point["motion_scale"] for point in points}) == 16
+    assert len(points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0))) == 1
+    np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
+    assert ridges_of(0.5, 4) == [0.5]
+
+
+def test_some_windows_are_drawn_by_a_seed_alone():
+    many = np.arange(100) * 2
+    np.testing.assert_array_equal(some_of(many, 100, 0), many)
+    few = some_of(many, 10, 3)
+    np.testing.assert_array_equal(few, some_of(many, 10, 3))
+    assert len(set(few)) == 10
+    assert set(few) <= set(many)

@@ -1,0 +1,166 @@
+"""Made-up worlds in which one thing is missing from the physics, and what a method makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Windows, cut_windows
+from shipid.engine.rollout import rollout
+from shipid.hybrid.method import Case, Corrector, Method, Task
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import Vessel, load_vessel
+
+Array = np.ndarray
+#: (velocities (S, 3), commands by name (S,)) at each past step of `FINE` seconds, the present last -> force (S, 3)
+Force = Callable[[Sequence[Array], Sequence[Mapping[str, Array]]], Array]
+FINE = 0.2  # s: step of the truth
+HORIZON = 15
+TEST = "test"  # runs whose names begin so are held out
+
+
+@dataclass(frozen=True)
+class World:
+    """Windows that train and windows that judge; physics: what is known of the ship; perfect: what a master would say.
+
+    commands : names of the command columns.
+    """
+
+    train: Windows
+    test: Windows
+    physics: Physics
+    perfect: Array
+    commands: tuple[str, ...]
+    known: bool = False
+
+    def task(self, physics: Mapping[str, Physics] | None = None, **changes: object) -> Task:
+        cases = {
+            name: case_of(one, self.train, self.known) for name, one in (physics or {"physics": self.physics}).items()
+        }
+        return replace(Task(cases, self.train, folds_of(self.train), self.commands, self.known), **changes)
+
+    def removed(self, corrector: Corrector, physics: Physics | None = None) -> float:
+        """Share of the removable error that a corrector removes on runs it never saw."""
+        physics = self.physics if physics is None else physics
+        instants = self.test.instants(known=self.known)
+        paths = physics.paths(instants)
+        alone, left, least = (
+            self.error(found) for found in (paths, corrector.predict(physics, instants, paths), self.perfect)
+        )
+        return (alone - left) / (alone - least)
+
+    def error(self, paths: Array) -> float:
+        """Mean distance [m] to the true path."""
+        return float(np.hypot(*np.moveaxis(paths - self.test.future, -1, 0)).mean())
+
+
+def case_of(physics: Physics, windows: Windows, known: bool = False) -> Case:
+    return Case(physics, physics.paths(windows.instants(known=known)))
+
+
+def folds_of(windows: Windows) -> list[tuple[Array, Array]]:
+    """One fold: every fifth run validates."""
+    names = sorted(set(windows.run))
+    validation = np.isin(windows.run, names[::5])
+    return [(np.flatnonzero(~validation), np.flatnonzero(validation))]
+
+
+def world(
+    truth: Vessel,
+    known_as: Vessel | None,
+    *,
+    force: Force | None = None,
+    runs: int = 20,
+    seconds: float = 60.0,
+    past: int = 0,
+    seed: int = 0,
+    perfect: Vessel | None = None,
+    known: bool = False,
+    hold: tuple[float, float] = (8.0, 25.0),
+) -> World:
+    """Windows of a truth, and physics for it. The master says what the truth says of itself without noise."""
+    dataset = sailed(truth, runs + 6, runs, seconds, seed, force, hold)
+    windows = cut_windows(dataset, horizon=HORIZON, past=past)
+    held_out = np.char.startswith(windows.run, TEST)
+    physics = Physics(known_as, HORIZON, 1.0, "rk4")
+    test = windows.select(held_out)
+    best = test.future if perfect is None else Physics(perfect, HORIZON, 1.0, "rk4").paths(test.instants(known=known))
+    return World(windows.select(~held_out), test, physics, best, tuple(dataset.commands), known)
+
+
+def sailed(
+    vessel: Vessel,
+    count: int,
+    training: int,
+    seconds: float,
+    seed: int,
+    force: Force | None = None,
+    hold: tuple[float, float] = (8.0, 25.0),
+) -> Dataset:
+    """Runs at 1 Hz with orders that change at random times; both units act as one."""
+    rng = np.random.default_rng(seed)
+    steps = round(seconds / FINE)
+    state = {name: np.zeros(count) for name in ("north", "east")}
+    state |= {"psi": rng.uniform(-3, 3, count), "u": rng.uniform(2, 5, count)}
+    state |= {"v": rng.uniform(-0.3, 0.3, count), "r": rng.uniform(-0.03, 0.03, count)}
+    n, alpha = (orders(rng, count, steps, *span, hold) for span in ((1.2, 3.2), (-0.5, 0.5)))
+    orders_ = {"port.n": n, "port.alpha": alpha, "starboard.n": n, "starboard.alpha": alpha}
+    rows, nus, told = [], [], []
+    every = round(1 / FINE)
+    for i in range(steps):
+        here = {name: values[i] for name, values in orders_.items()}
+        nus.append(np.stack([state[name] for name in ("u", "v", "r")], axis=1))
+        told.append(here)
+        if i % every == 0:
+            rows.append(pd.DataFrame({"run": names(count, training), "t": i * FINE, **state, **here, "flags": 0}))
+        extra = None if force is None else force(nus, told)
+        found = rollout(
+            vessel, state, here, dict.fromkeys(("V_w", "beta_w"), np.zeros(count)),
+            step=FINE, num_steps=1, method="rk4", tau_extra=extra, engine="native",
+        )  # fmt: skip
+        state = {name: found[name][-1, 0] for name in state}
+    frame = pd.concat(rows).sort_values(["run", "t"], ignore_index=True)
+    return Dataset(frame, {"clock": "run"})
+
+
+def names(count: int, training: int) -> list[str]:
+    return [f"run-{i:02d}" if i < training else f"{TEST}-{i:02d}" for i in range(count)]
+
+
+def orders(
+    rng: np.random.Generator, count: int, steps: int, low: float, high: float, hold: tuple[float, float]
+) -> Array:
+    """Orders (steps, count) that are held for some seconds and then jump."""
+    found = np.zeros((steps, count))
+    for run in range(count):
+        at = 0
+        while at < steps:
+            length = max(round(rng.uniform(*hold)), 1) * round(1 / FINE)  # orders change on whole seconds
+            found[at : at + length, run] = rng.uniform(low, high)
+            at += length
+    return found
+
+
+def ship() -> Vessel:
+    return load_vessel("gunnerus-28.9")
+
+
+def fitted(method: Method, world_: World, seed: int = 0) -> Corrector:
+    found = method.fit(world_.task(seed=seed))["physics"].corrector
+    assert found is not None
+    return found
+
+
+def missed(world_: World, error: Callable[[World, Windows], Array]) -> World:
+    """The world whose true paths are those of the physics plus an error (T, S, 2) [m]: the master knows it."""
+
+    def changed(windows: Windows) -> Windows:
+        paths = world_.physics.paths(windows.instants(known=world_.known))
+        return replace(windows, future=paths + error(world_, windows))
+
+    test = changed(world_.test)
+    return replace(world_, train=changed(world_.train), test=test, perfect=test.future)
