@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.alone import Alone
+from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
 from shipid.hybrid.method import Method
 from shipid.hybrid.path_drawn import PathDrawn
@@ -83,6 +84,18 @@ def test_known_commands_are_needed_to_predict() -> None:
         known.predict(WINDOWS.instants())
 
 
+def test_held_commands_are_never_those_of_the_plan() -> None:
+    """A plan given to a predictor for held commands changes nothing; one for known commands follows it."""
+    ship = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
+    now = WINDOWS.instants()
+    planned = replace(now, planned={name: values + 0.5 for name, values in WINDOWS.planned.items()})
+    held = Predictor(ship, "alone", Unchanged({}))
+    known = replace(held, commands="known")
+    np.testing.assert_array_equal(held.predict(planned), held.predict(now))
+    np.testing.assert_array_equal(held.alone(planned), held.alone(now))
+    assert np.abs(known.predict(planned) - held.predict(now)).max() > 0.01
+
+
 class Shared(Method):
     """A method that holds out a fifth of the runs."""
 
@@ -116,7 +129,7 @@ def test_one_run_is_split_in_time() -> None:
         (SMALL, Physics(None, 4, 1.0), None, "the physics has 4 steps of 1 s, the windows have 5 steps of 1 s"),
         (PathDrawn(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
         (Alone(), NONE, None, "'alone' needs a vessel"),
-        (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "takes this command"),
+        (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "needs this command"),
         (SMALL, NONE, ["M1", "M9"], "validation_runs: no run with windows"),
         (SMALL, NONE, WINDOWS.spans, "no training window is left"),
     ],
