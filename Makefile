@@ -6,13 +6,20 @@ STAMP  := $(VENV)/.installed
 
 export OMP_NUM_THREADS ?= 2
 
-.PHONY: study test check format bench clean
+.PHONY: study test slow check format bench clean
 
 study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
 	$(BIN)/shipid study run quick
 
-test: $(STAMP)           ## all tests
-	$(BIN)/pytest
+# Tests run in processes of one thread each; `make test WORKERS=4` takes more of them.
+WORKERS ?= 2
+PYTEST  := OMP_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
+
+test: $(STAMP)           ## all tests but the slow ones
+	$(PYTEST) -m "not slow"
+
+slow: $(STAMP)           ## the slow tests
+	$(PYTEST) -m slow
 
 check: $(STAMP)          ## format, lint, types, layers
 	$(BIN)/ruff format --check .

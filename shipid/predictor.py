@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from shipid.data.windows import Commands, Instants, Windows, fold_masks, part_folds, split_runs
+from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
@@ -23,7 +23,6 @@ from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
 FORMAT = 4
-VALIDATION_SHARE = 0.2  # of the runs; Kanazawa et al. 2022, section 4
 
 
 @dataclass(frozen=True)
@@ -214,27 +213,26 @@ def fit(
     corrector = method.fit(task)[name].corrector
     if corrector is None:
         raise DataError("no training converged: check the windows for outliers, or widen the ranges of the method")
-    columns = ["u", "v", "r", *windows.planned, *({"V_w"} & windows.columns.keys())]
-    limits = {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in columns}
+    limits = limits_of(windows, windows.planned)
     provenance = {"runs": list(windows.spans), "seed": seed}
     return Predictor(physics, kind_of(method), corrector, limits, provenance, commands)
+
+
+def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of u, v, r, the commands and the wind speed over windows, by column."""
+    names = ["u", "v", "r", *commands, *(name for name in ("V_w",) if name in windows.columns)]
+    return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 
 def _folds(
     method: Method, windows: Windows, validation_runs: Iterable[str] | None, seed: int
 ) -> list[tuple[Index, Index]]:
-    """(Training, validation) indices of windows, split by run: one pair per fold, without a moment in both."""
-    runs = list(windows.spans)
-    if validation_runs is not None:
-        held_out = [tuple(validation_runs)]
-        unknown = next((run for run in held_out[0] if run not in runs), None)
-        if unknown is not None:
-            raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
-    elif len(runs) == 1:
-        return part_folds(windows)
-    elif method.validation == "runs":
-        held_out = [(run,) for run in runs]
-    else:
-        held_out = [split_runs(runs, VALIDATION_SHARE, seed)[1]]
-    masks = [fold_masks(windows, names) for names in held_out]
-    return [(np.flatnonzero(training), np.flatnonzero(validation)) for training, validation in masks]
+    """(Training, validation) indices of windows, split by run: as the method wants, or with the named runs."""
+    if validation_runs is None:
+        return run_folds(windows, method.validation, seed)
+    names, runs = tuple(validation_runs), list(windows.spans)
+    unknown = next((run for run in names if run not in runs), None)
+    if unknown is not None:
+        raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
+    training, judged = fold_masks(windows, names)
+    return [(np.flatnonzero(training), np.flatnonzero(judged))]

@@ -235,7 +235,7 @@ def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Pat
 
 
 def test_a_log_is_predicted_by_what_was_known(tmp_path: Path) -> None:
-    """Speeds interpolated between fixes: another fix after 12 s changes no path that begins up to 10 s."""
+    """Speeds interpolated between fixes: another fix at 12 s changes no path that begins up to 10 s."""
     physics = Physics(load_vessel("gunnerus-28.9"), 5, 1.0)
     Predictor(physics, "alone", Unchanged({}), causal=("u",)).save(cell_file(tmp_path, "one"))
     t, fixes = np.arange(31.0), np.arange(0.0, 31.0, 3.0)

@@ -17,6 +17,7 @@ Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each an order of its own."""
+VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
@@ -325,6 +326,31 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
     (run,) = windows.spans
     length = (windows.num_past + windows.horizon) * windows.step
     raise DataError(f"run {run!r} is too short to train and validate on with windows of {length:g} s")
+
+
+def run_folds(
+    windows: Windows, validation: str, seed: int, num_folds: int = 1
+) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """(Training, validation) indices of windows, split by run, so that no moment is seen by both.
+
+    Parameters
+    ----------
+    validation : `runs` leaves out every run in turn; `share` holds out a fifth of the runs, drawn by `seed`.
+    num_folds : with 2 or more, runs are dealt into so many folds instead, or as many as there are runs.
+
+    A single run is left out part by part. Raises DataError where a part would have no windows.
+    """
+    runs = list(windows.spans)
+    if len(runs) == 1:
+        return part_folds(windows)
+    if num_folds > 1:
+        held_out = list(split_folds(runs, min(num_folds, len(runs)), seed))
+    elif validation == "runs":
+        held_out = [(run,) for run in runs]
+    else:
+        held_out = [split_runs(runs, VALIDATION_SHARE, seed)[1]]
+    masks = [fold_masks(windows, names) for names in held_out]
+    return [(np.flatnonzero(training), np.flatnonzero(judged)) for training, judged in masks]
 
 
 def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:

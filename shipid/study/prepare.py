@@ -17,11 +17,9 @@ from shipid.data.windows import (
     Instants,
     Windows,
     cut_windows,
-    fold_masks,
     nested_runs,
     part_folds,
-    split_folds,
-    split_runs,
+    run_folds,
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DocumentError, choices
@@ -38,7 +36,6 @@ from shipid.vessel.perturb import Family, draw, resolve
 
 Array = np.ndarray
 MOST_REDRAWS = 100
-VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 
 
 @dataclass(frozen=True)
@@ -87,18 +84,7 @@ class Prepared:
         With one fold, 20 % of the runs validate; a method with `validation` = `runs` leaves out every run in turn. A
         single run is left out part by part.
         """
-        runs, num_folds = self.runs(plan, batch), plan.study.split.folds
-        if len(runs) == 1:
-            return part_folds(windows)
-        held_out: list[tuple[str, ...]]
-        if num_folds == 1 and validation == "runs":
-            held_out = [(run,) for run in runs]
-        elif num_folds == 1:
-            held_out = [split_runs(runs, VALIDATION_SHARE, batch.seed)[1]]
-        else:
-            held_out = list(split_folds(runs, min(num_folds, len(runs)), batch.seed))
-        masks = [fold_masks(windows, names) for names in held_out]
-        return [(np.flatnonzero(train), np.flatnonzero(judged)) for train, judged in masks]
+        return run_folds(windows, validation, batch.seed, plan.study.split.folds)
 
 
 def obtain(plan: Plan) -> Dataset:
@@ -421,12 +407,6 @@ def constant_motion(windows: Windows) -> Array:
     along, across = chord * np.cos(half), chord * np.sin(half)
     path: Array = np.stack([u * along - v * across, u * across + v * along], axis=-1)
     return path
-
-
-def limits(windows: Windows, commands: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of what the compensator takes in, over the windows."""
-    names = ["u", "v", "r", *commands, *(name for name in ("V_w",) if name in windows.columns)]
-    return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 
 def describe(foundation: Foundation) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
 from shipid.metrics import position_error, summary
-from shipid.predictor import Predictor
+from shipid.predictor import Predictor, limits_of
 from shipid.study import store
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
@@ -34,7 +34,6 @@ from shipid.study.prepare import (
     at_instants,
     describe,
     instants_of,
-    limits,
     obtain,
     physics_of,
     prepare,
@@ -242,7 +241,7 @@ def _predictor(
         physics=_physics(plan, foundation),
         method=way.kind,
         corrector=corrector,
-        limits=limits(windows, prepared.commands),
+        limits=limits_of(windows, prepared.commands),
         commands=plan.study.prediction.commands,
         causal=plan.causal,
         provenance={

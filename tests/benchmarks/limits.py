@@ -1,4 +1,4 @@
-"""What one core of this machine can do, and how far a trial of the recipe `fast` is from it."""
+"""What one core of this machine can do, and how far a trial of the method `path-drawn` is from it."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 import torch
-from shipid.hybrid.recipe import Recipe, RidgeRecipe
-from shipid.hybrid.tuning import tune
 from torch.profiler import ProfilerActivity, profile
 
+from shipid.hybrid.path_drawn import PathDrawn
 from tests.benchmarks.timing import best_of
+from tests.hybrid.tasks import tune
 
 ORDER = 2048  # of the big matrices
 MODELS, RUNS, WINDOWS, HORIZON, INPUTS = 20, 50, 50, 30, 7  # a batch of experiment 1 at N_D = 50
 REPEAT = 200  # of small work, so that a clock can tell
 TRIALS = 4
+METHOD = PathDrawn(trials=TRIALS, mirror=1.0)
 ROUNDS = 7
 
 
@@ -68,12 +69,11 @@ def _often(run: Callable[[], object]) -> Callable[[], None]:
 
 def bounds(figures: dict[str, float]) -> dict[str, float]:
     """Least time [s] of a trial's parts: their flops at the peak of a product, tanh at its rate."""
-    recipe = _recipe()
-    samples, units, columns = RUNS * WINDOWS, recipe.units, MODELS * recipe.terms
+    samples, units, columns = RUNS * WINDOWS, METHOD.units, MODELS * METHOD.terms
     decomposed = 2 * (2 * samples * units**2 + 9 * units**3)  # Gram matrix, and its axes (Golub & Van Loan)
     rotated = 2 * (2 * samples * units**2 + 2 * samples * units * columns)
     block = 2 * WINDOWS**2 * units + 2 * WINDOWS**3 / 3 + 2 * WINDOWS**2 * columns  # hat matrix, its factors, solution
-    left_out = 2 * len(recipe.path()) * (2 * samples * units * columns + RUNS * block)
+    left_out = 2 * len(METHOD.path()) * (2 * samples * units * columns + RUNS * block)
     flops = {"decomposition": decomposed, "projection": rotated, "runs left out": left_out}
     peak = 1e9 * figures["product of order 2048, float64 [Gflop/s]"]
     tanh = {"tanh": 2 * samples * units / (1e9 * figures["tanh, float64 [G/s]"])}
@@ -89,12 +89,6 @@ def shares() -> dict[str, Any]:
     return {f"share of {name}": round(spent[name] / sum(spent.values()), 3) for name in most}
 
 
-def _recipe() -> RidgeRecipe:
-    recipe = Recipe.preset("fast", trials=TRIALS, mirror=1.0)
-    assert isinstance(recipe, RidgeRecipe)
-    return recipe
-
-
 def _tuning() -> Callable[[], object]:
     rng = np.random.default_rng(0)
     names = ("u", "v", "r", "port.n", "port.alpha", "psi", "V_w", "beta_w")
@@ -102,4 +96,4 @@ def _tuning() -> Callable[[], object]:
     targets = {f"model-{k}": rng.normal(size=(HORIZON, RUNS * WINDOWS, 2)) for k in range(MODELS)}
     run = np.repeat(np.arange(RUNS), WINDOWS)
     folds = [(np.flatnonzero(run != one), np.flatnonzero(run == one)) for one in range(RUNS)]
-    return lambda: tune(columns, ("port.n", "port.alpha"), targets, folds, _recipe(), 0)
+    return lambda: tune(columns, ("port.n", "port.alpha"), targets, folds, METHOD, 0)

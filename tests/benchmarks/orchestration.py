@@ -1,8 +1,8 @@
 """What a study costs beside its cells, and what a second worker gains, against bare processes in the same run.
 
-The cells of the first part are known work: `tune` is replaced by one that solves next to nothing and then computes
-until each of its cells has had a second of its thread's processor time. All else of a cell is as ever: windows, folds,
-predictors, scores, files.
+The cells of the first part are known work: the method solves next to nothing and then computes until each of its
+cells has had a second of its thread's processor time. All else of a cell is as ever: windows, folds, predictors,
+scores, files.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from unittest.mock import patch
 
 import numpy as np
 import torch
-from shipid.hybrid.recipe import Recipe
-from shipid.hybrid.tuning import Tuned, tune
 
-from shipid import cli
+from shipid.cli.terminal import draw
+from shipid.hybrid import ridge
+from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare
@@ -34,10 +35,10 @@ CELL = 1.0  # s
 WORKERS = (1, 2)
 LIGHT = {"trials": 1, "averaged": 1, "units": 16}
 KNOWN = {"grid.N_D": [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]}  # 60 cells
-REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "recipe.trials": 30}
+REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "method.0.trials": 30}
 PRODUCT, PRODUCTS = 1500, 40  # order of the matrices, and how many products each of two tasks is
 
-run_batch = study.run_batch
+run_batch, tune_ridge = study.run_batch, ridge.tune_ridge
 
 
 def run() -> dict[str, Any]:
@@ -55,7 +56,7 @@ def overhead() -> dict[str, Any]:
     with patch.object(study, "run_batch", known_batch):
         whole, moments = _study(plan, 2)
     first, last = moments["cell"][0], moments["cell"][-1]
-    waves = len(plan.batches) / 2 * len(plan.models) * CELL
+    waves = len(plan.batches) / 2 * len(plan.pairs) * CELL
     return {
         "cells": plan.cells,
         "study of 1 s cells [s]": round(whole, 2),
@@ -64,7 +65,7 @@ def overhead() -> dict[str, Any]:
         "until cells start [s]": round(moments["start"][0], 2),
         "until the first batch is done [s]": round(first, 2),
         "from the first batch to the last [s]": round(last - first, 2),
-        "of it cells [s]": round(waves - len(plan.models) * CELL, 2),
+        "of it cells [s]": round(waves - len(plan.pairs) * CELL, 2),
         "after the last batch [s]": round(whole - last, 2),
         "study / bare processes": round(whole / (preparing + bare), 3),
     }
@@ -72,17 +73,15 @@ def overhead() -> dict[str, Any]:
 
 def known_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> Any:
     """As `run_batch`, with cells that take a known time."""
-    with patch.object(study, "tune", _known_tune):
+    with patch.object(ridge, "tune_ridge", _known_tune):
         return run_batch(plan, prepared, batch, device)
 
 
-def _known_tune(
-    columns: Any, commands: Any, targets: Any, folds: Any, recipe: Recipe, seed: int, **options: Any
-) -> dict[str, Tuned]:
+def _known_tune(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     begun = time.thread_time()
-    found = tune(columns, commands, targets, folds, recipe.model_copy(update=LIGHT), seed, **options)
+    found = tune_ridge(task, method.model_copy(update=LIGHT))
     a = np.ones((64, 64))
-    while time.thread_time() - begun < CELL * len(targets):
+    while time.thread_time() - begun < CELL * len(task.cases):
         a @ a
     return found
 
@@ -99,7 +98,7 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
     terminal = patch.dict(os.environ, {"FORCE_COLOR": "1"})
     with tempfile.TemporaryDirectory() as folder, terminal, redirect_stdout(io.StringIO()):
         begun = time.perf_counter()
-        cli._draw(noted(study.run_study(plan, Path(folder) / "run", workers=workers)))
+        draw(noted(study.run_study(plan, Path(folder) / "run", workers=workers)))
         return time.perf_counter() - begun, moments
 
 

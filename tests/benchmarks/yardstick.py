@@ -1,4 +1,4 @@
-"""The recipe `paper` on cells of experiment 1: slow, so run once, piece by piece, and kept beside this file.
+"""The method `path-trained` on cells of experiment 1: slow, so run once, piece by piece, and kept beside this file.
 
 `python -m tests.benchmarks.yardstick` goes on where it was stopped: every trained network is kept in
 `results/yardstick` until its cell is done, and finished cells are added to `yardstick.json`. `--close` adds cells that
@@ -13,20 +13,20 @@ import pickle
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shipid.hybrid.recipe import Recipe
-from shipid.hybrid.tuning import tune
 
 from shipid.hybrid import gradient
+from shipid.hybrid.method import Case, Method, Task
+from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.training import use_threads
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Plan, read_plan
-from shipid.study.prepare import Prepared, obtain, prepare
+from shipid.study.prepare import Prepared, instants_of, obtain, physics_of, prepare
 from shipid.study.run import machine
 
 KEPT = Path(__file__).with_suffix(".json")
@@ -47,7 +47,7 @@ class Cell:
         return f"world-{self.world}-N{self.N_D:03d}-{self.model}"
 
 
-CELLS = (  # spanning N_D and A; worlds that no recipe was chosen on
+CELLS = (  # spanning N_D and A; worlds that no method was chosen on
     *(Cell(number, 10, model) for model in ("moderate-1", "high-1", "none", "nominal") for number in range(5, 10)),
     Cell(8, 30, "moderate-2"),
     Cell(9, 30, "high-2"),
@@ -59,33 +59,36 @@ CELLS = (  # spanning N_D and A; worlds that no recipe was chosen on
 
 def world(number: int) -> tuple[Plan, Prepared]:
     """The study `simulation` in a world: its plan and all that its cells need."""
-    plan = read_plan("simulation", {"seed": number, "recipe.kind": "fast"})
+    plan = read_plan("simulation", {"seed": number, "method": [{"name": "drawn", "kind": "path-drawn"}]})
     return plan, prepare(plan, obtain(plan))
 
 
-def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, recipe: Recipe) -> dict[str, Any]:
+def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, method: Method) -> dict[str, Any]:
     """Tune one cell alone, on one thread: core-seconds, H and H_90 [m], and its trials."""
     batch = Batch(cell.N_D, plan.batches[0].seed)
     mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
     windows = prepared.pool.select(mask)
-    targets = {cell.model: windows.future - prepared.pool_paths[cell.model][:, mask]}
-    folds = prepared.folds(replace(plan, recipe=recipe), batch, windows)
+    vessel = next(one.vessel for one in prepared.foundations if one.name == cell.model)
+    physics = physics_of(plan, vessel)
+    folds = prepared.folds(plan, batch, windows, method.validation)
+    case = Case(physics, prepared.pool_paths[cell.model][:, mask])
     start = time.process_time()
-    found = tune(windows.columns, prepared.commands, targets, folds, recipe, batch.seed)[cell.model]
+    found = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
     seconds = time.process_time() - start
-    assert found.compensator is not None
-    paths = prepared.test_paths[cell.model] + found.compensator.predict(prepared.test.columns)
+    assert found.corrector is not None
+    instants = instants_of(plan, vessel, prepared.data, prepared.test)
+    paths = found.corrector.predict(physics, instants, prepared.test_paths[cell.model])
     error = summary(position_error(paths, prepared.test.future))
     alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
     row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
-    chosen = dict(found.compensator.hyperparameters)
+    chosen = dict(found.corrector.hyperparameters)
     return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": found.trials}
 
 
 def main() -> None:
     """Run the cells that are not kept yet; `--close` keeps those begun with the trials that they have."""
     use_threads(1)
-    closing, whole = "--close" in sys.argv[1:], Recipe.preset("paper")
+    closing, whole = "--close" in sys.argv[1:], PathTrained()
     done = json.loads(KEPT.read_text()) if KEPT.exists() else []
     finished = {(row["world"], row["N_D"], row["model"]) for row in done}
     for cell in CELLS:
@@ -94,7 +97,7 @@ def main() -> None:
             continue
         plan, prepared = world(cell.world)
         spent = _remember(PIECES / cell.name)
-        row = tune_cell(plan, prepared, cell, Recipe.preset("paper", trials=trials))
+        row = tune_cell(plan, prepared, cell, PathTrained(trials=trials))
         row |= {"core_seconds": sum(spent) * whole.trials / trials, "extrapolated": trials < whole.trials}
         row |= {
             "machine": {k: v for k, v in machine().items() if k != "system"},
@@ -107,17 +110,17 @@ def main() -> None:
 
 
 def _remember(folder: Path) -> list[float]:
-    """Keep every network that `tune` trains, so that it is trained once; returns the core-seconds as they add up."""
+    """Keep every network that a fit trains, so that it is trained once; returns the core-seconds as they add up."""
     folder.mkdir(parents=True, exist_ok=True)
     train = getattr(gradient._fit, "__wrapped__", gradient._fit)
     spent: list[float] = []
 
-    def kept(data: Any, stack: Any, recipe: Recipe, entropy: tuple[int, ...], device: str) -> Any:
+    def kept(data: Any, targets: Any, stack: Any, method: PathTrained, entropy: tuple[int, ...], device: str) -> Any:
         words = json.dumps([entropy, {key: dict(values) for key, values in stack.items()}], sort_keys=True)
         file = folder / f"{entropy[1]:02d}-{hashlib.sha256(words.encode()).hexdigest()[:12]}.pickle"
         if not file.exists():
             start = time.process_time()
-            result = train(data, stack, recipe, entropy, device)
+            result = train(data, targets, stack, method, entropy, device)
             whole = file.with_suffix(".part")
             whole.write_bytes(pickle.dumps((time.process_time() - start, result)))
             whole.replace(file)

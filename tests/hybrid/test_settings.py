@@ -20,7 +20,7 @@ def test_the_trained_path_is_what_the_method_pins():
         "epochs": 3000,
         "batch": 0,  # full
         "patience": 200,
-        "memory": {"history": (), "turned": (), "error": 0.0, "observer": False},
+        "memory": {"history": (), "turned": (), "error": (), "observer": False},
     }
 
 

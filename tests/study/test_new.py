@@ -116,11 +116,11 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     draft, document = drafted(tmp_path, trial())
     plan = read_plan(tmp_path / "study.toml")
     assert plan.document == document
-    assert [model.name for model in plan.models] == [SHIP, "inaccurate", "none"]
+    assert [one.name for one in plan.foundations] == [SHIP, "inaccurate", "none"]
     prepared = prepare(plan, obtain(plan))
     assert len(prepared.pool.spans) == plan.study.grid.N_D[-1] == 7
     assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
-    assert document["prediction"]["horizon"] == 20  # 2.5 x 33.9 m / 4.35 m/s
+    assert document["prediction"]["ahead"] == 20  # 2.5 x 33.9 m / 4.35 m/s
     assert "8 zigzags" in document["description"]
     assert "wind is not measured" in draft.text
     assert not draft.warnings
@@ -206,7 +206,7 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     out.write_text(draft.text)
     plan = read_plan(out)
     assert plan.truth is not None
-    assert {model.family for model in plan.models} == {"nominal", "moderate", "high", "none"}
+    assert {one.family for one in plan.foundations} == {"nominal", "moderate", "high", "none"}
     truth = plan.study.truth
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
@@ -266,7 +266,7 @@ def test_recorded_sets(
     dataset = import_log(read_mapping(mapping), shared_data / log)
     draft, document = drafted(tmp_path, dataset, vessel)
     assert document["data"]["path"] == path
-    assert document["prediction"]["horizon"] * document["prediction"]["step"] == 15
+    assert document["prediction"]["ahead"] == 15
     assert [name[: len(start)] for name, start in zip(document["split"]["test"], tests, strict=True)] == tests
     assert not draft.warnings
     runs = survey(dataset).runs["duration"]

@@ -18,7 +18,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
-from shipid.predictor import Predictor
+from shipid.predictor import Predictor, limits_of
 from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import (
@@ -27,7 +27,6 @@ from shipid.study.prepare import (
     constant_motion,
     estimates_of,
     instants_of,
-    limits,
     obtain,
     prepare,
     window_memory,
@@ -284,7 +283,7 @@ def test_perturbed_lags_have_hidden_states_of_their_own(
 def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(
     recorded: Callable[..., tuple[Plan, Dataset]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Speeds interpolated between fixes: another fix after 13 s changes no input up to 10 s, past and observer too."""
+    """Speeds interpolated between fixes: another fix at 12 s changes no input up to 10 s, past and observer too."""
     t, fixes = np.arange(31.0), np.arange(0.0, 31.0, 3.0)
     speeds = 2.0 + np.random.default_rng(2).normal(size=(2, len(fixes)))
     speeds[1, fixes < 11.0] = speeds[0, fixes < 11.0]
@@ -386,7 +385,7 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
 
 def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
-    found = limits(prepared.pool, prepared.commands)
+    found = limits_of(prepared.pool, prepared.commands)
     assert set(found) == {"u", "v", "r", "V_w", *dataset.commands}
     rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
     for name, (low, high) in found.items():

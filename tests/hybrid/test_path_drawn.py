@@ -1,0 +1,165 @@
+"""The drawn path with a memory: company, choice by validation, and the mirror of what it takes from the past."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Instants, Windows, cut_windows
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
+from shipid.hybrid.method import Case, Task
+from shipid.hybrid.path_drawn import MEMORIES, PathDrawn
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.ridge import _reflection
+from shipid.observer import Observer, observe
+from shipid.study.prepare import at_instants
+from shipid.vessel.load import load_vessel
+from tests.hybrid.mirror import mirrored
+from tests.study.test_whole import windy
+
+Array = np.ndarray
+SHIP = load_vessel("gunnerus-28.9")
+EVERYTHING = Memory(history=(2.0, 4.0), turned=6.0, error=(3.0, 6.0), observer=True)  # type: ignore[arg-type]
+SMALL: dict[str, Any] = {"trials": 6, "units": 24, "terms": 3, "memory": EVERYTHING}
+
+
+def physics(observer: Observer | None = None, **values: float) -> Physics:
+    """The ship with other derivatives, `N_ur=-3e5`."""
+    changed = {f"hull.derivatives.{name}": value for name, value in values.items()}
+    return Physics(SHIP.with_values(changed), 5, 1.0, "euler", observer)
+
+
+def known_at(dataset: Dataset, windows: Windows, foundation: Physics) -> dict[str, Array]:
+    """What the observer of a foundation knows at the windows."""
+    if foundation.vessel is None or foundation.observer is None:
+        return {}
+    return at_instants(dataset, windows, observe(foundation.vessel, dataset, foundation.observer))
+
+
+def task(dataset: Dataset, foundations: dict[str, Physics], future: Array | None = None, seed: int = 3) -> Task:
+    """Foundations on the windows of a dataset, every run left out in turn."""
+    windows = cut_windows(dataset, horizon=5, past=6)
+    if future is not None:
+        windows.future[:] = future
+    estimates = {name: known_at(dataset, windows, one) for name, one in foundations.items()}
+    folds = [(np.flatnonzero(windows.run != run), np.flatnonzero(windows.run == run)) for run in windows.spans]
+    cases = {}
+    for name, one in foundations.items():
+        instants = windows.instants(estimates=estimates[name])
+        cases[name] = Case(one, one.paths(instants))
+    return Task(cases, windows, folds, tuple(dataset.commands), seed=seed, estimates=estimates)
+
+
+@pytest.fixture(scope="module")
+def dataset() -> Dataset:
+    """Runs in wind that the physics of no foundation explains."""
+    return windy()
+
+
+def test_a_foundation_with_a_memory_does_not_notice_its_company(dataset: Dataset) -> None:
+    """Inputs that come from the physics are of each foundation, those that do not are shared; results are the same."""
+    foundations = {
+        "slow": physics(N_ur=-3e5),
+        "other": physics(N_uv=-2e5),
+        "seen": physics(Observer(), N_ur=-3e5),
+        "none": Physics(None, 5, 1.0),
+    }
+    method = PathDrawn(**SMALL)
+    together = method.fit(task(dataset, foundations))
+    reordered = method.fit(task(dataset, dict(reversed(foundations.items()))))
+    for name, one in foundations.items():
+        alone = method.fit(task(dataset, {name: one}))[name]
+        for found in (together[name], reordered[name]):
+            assert [row["params"] for row in found.trials] == [row["params"] for row in alone.trials]
+            values = [[row["value"] for row in each.trials] for each in (found, alone)]
+            np.testing.assert_allclose(*values, rtol=1e-9)
+            assert isinstance(found.corrector, Compensator)
+            assert isinstance(alone.corrector, Compensator)
+            both = [each.corrector for each in (found, alone)]
+            assert both[0].header() == both[1].header()
+            given = task(dataset, {name: one})
+            instants = given.instants(name)
+            paths = [each.predict(one, instants, given.cases[name].paths) for each in both]
+            np.testing.assert_allclose(paths[0], paths[1], rtol=0.0, atol=1e-8)
+
+
+def kinds(corrector: Any) -> set[str]:
+    """Groups of the inputs of all networks of a compensator."""
+    return {group_of(name) for network in corrector.networks for name in network.features}
+
+
+def target(dataset: Dataset, foundation: Physics, group: str) -> Array:
+    """A future that the physics misses by what one group of inputs says, (T, S, 2)."""
+    given = task(dataset, {"one": foundation})
+    table = Inputs(tuple(dataset.commands), EVERYTHING).table(foundation, given.instants("one"))
+    values = next(values for name, values in table.items() if group_of(name) == group)
+    steps = np.arange(1.0, 6.0)[:, None] * values / np.abs(values).max()
+    future: Array = given.cases["one"].paths + np.stack([steps, 0.0 * steps], axis=-1)
+    return future
+
+
+@pytest.mark.parametrize("group", ["history", "error"])
+def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: str) -> None:
+    """What is missed is a function of one kind of memory: the trials that take it validate best, and are taken."""
+    foundation = physics(N_ur=-3e5)
+    method = PathDrawn(**{**SMALL, "trials": 9, "averaged": 1, "choose": True, "mirror": 0.0, "ridge": 1e-4})
+    found = method.fit(task(dataset, {"one": foundation}, target(dataset, foundation, group)))["one"]
+    assert [row["params"]["memory"] for row in found.trials] == [float(k % 3) for k in range(9)]
+    best = min(found.trials, key=lambda row: row["value"])
+    assert found.corrector is not None
+    assert found.corrector.hyperparameters == best["params"]
+    assert group in MEMORIES[int(best["params"]["memory"])]
+    without = [row["value"] for row in found.trials if group not in MEMORIES[int(row["params"]["memory"])]]
+    assert best["value"] < 0.9 * min(without)
+    assert kinds(found.corrector) & {"history", "error"} == set(MEMORIES[int(best["params"]["memory"])])
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_mirrored_run_gives_mirrored_inputs(dataset: Dataset, known: bool) -> None:
+    """Past, turned, error and observer inputs of the mirrored runs are the image under the mirror of the search."""
+    foundation = physics(Observer(), N_ur=-3e5)
+    inputs = Inputs(tuple(dataset.commands), EVERYTHING)
+
+    def table(data: Dataset) -> dict[str, Array]:
+        windows = cut_windows(data, horizon=5, past=6)
+        instants = windows.instants(known=known, estimates=known_at(data, windows, foundation))
+        return inputs.table(foundation, instants)
+
+    here, there = table(dataset), table(mirrored(dataset))
+    assert {group_of(name) for name in here} == {"motion", "wind", "command", "history", "error", "observer"}
+    features = choose_features(here)
+    mirror = _reflection(here, features)
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror @ mirror, np.eye(len(features)))
+    image = np.stack([here[name] for name in features], axis=1) @ mirror
+    for column, name in enumerate(features):
+        np.testing.assert_allclose(there[name], image[:, column], rtol=0.0, atol=1e-6, err_msg=name)
+        assert np.abs(there[name]).max() > 0, name
+
+
+def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_paths(dataset: Dataset) -> None:
+    foundation = physics(Observer(), N_ur=-3e5)
+    method = PathDrawn(**{**SMALL, "mirror": 1.0})
+    corrector = method.fit(task(dataset, {"one": foundation}))["one"].corrector
+    assert corrector is not None
+    assert corrector.hyperparameters["mirror"] == 1.0
+    paths = []
+    for data in (dataset, mirrored(dataset)):
+        given = task(data, {"one": foundation})
+        instants: Instants = given.instants("one")
+        paths.append(corrector.predict(foundation, instants, given.cases["one"].paths))
+    np.testing.assert_allclose(paths[1], paths[0] * [1.0, -1.0], rtol=0.0, atol=1e-5)
+
+
+def test_scales_of_a_memory_that_is_not_taken_are_no_hyperparameters() -> None:
+    assert not {"history_scale", "error_scale", "observer_scale"} & set(PathDrawn().ranges())
+    assert {"history_scale", "error_scale", "observer_scale"} <= set(PathDrawn(memory=EVERYTHING).ranges())
+    assert "error_scale" not in PathDrawn(memory=Memory(history=(2.0,))).ranges()
+    assert PathDrawn(memory=EVERYTHING).past == 6.0
+    assert PathDrawn().past == 0.0
+    assert "memory" in PathDrawn(choose=True).varied()
+    assert "memory" not in PathDrawn().varied()
