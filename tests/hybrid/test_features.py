@@ -112,7 +112,7 @@ def test_past_error_of_wrong_physics_grows_and_is_the_rollout_by_hand(past):
 
 
 def test_a_mirrored_past_has_the_mirrored_error(past):
-    """A ship that is alike on both sides: what lies across, turns or steers changes its sign, and sides change places."""
+    """A ship that is alike on both sides: what lies across or turns changes its sign, sides change places."""
     wrong, instants = Physics(SHIP.with_values({"hull.derivatives.N_uv": 9e4}), 5, 1.0), past.instants()
 
     def image(values):
