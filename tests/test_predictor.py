@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,13 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.physics import assumed, check_columns
+from shipid.hybrid.physics import Physics, assumed, check_columns
+from shipid.observer import Observer
 from shipid.predictor import FORMAT, Predictor
 from shipid.study.apply import predict_log
 from shipid.study.store import DATASET, cell_file, read_test
 from shipid.vessel.load import load_vessel
+from tests.study.tiny import logged
 
 CELL, PURE = "wrong-1+drawn-N0006-s0", "none+drawn-N0006-s0"
 
@@ -41,6 +43,20 @@ def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
     instants = read_test(tiny_run)[0].instants()
     np.testing.assert_array_equal(again.predict(instants), first.predict(instants))
     assert [file.name for file in (tmp_path / "deep").iterdir()] == ["again.npz"]
+
+
+def test_every_field_survives_a_file(tmp_path: Path) -> None:
+    """Each field has a value that is not its default, so that none can be left out of the file."""
+    physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
+    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"))
+    for one in (first, physics):
+        for place in fields(one):
+            value = getattr(one, place.name)
+            assert place.default is MISSING or value != place.default, place.name
+            assert place.default_factory is MISSING or value != place.default_factory(), place.name
+    again = Predictor.load(first.save(tmp_path / "all.npz"))
+    for place in fields(Predictor):
+        assert getattr(again, place.name) == getattr(first, place.name), place.name
 
 
 def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:
@@ -216,6 +232,21 @@ def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Pat
     for kind, metric in (("physics", "A"), ("cooperative", "H")):
         error = np.hypot(joined[f"{kind}_north"] - joined["north"], joined[f"{kind}_east"] - joined["east"])
         assert error.mean() == pytest.approx(row[metric], rel=1e-9)
+
+
+def test_a_log_is_predicted_by_what_was_known(tmp_path: Path) -> None:
+    """Speeds interpolated between fixes: another fix at 12 s changes no path that begins up to 10 s."""
+    physics = Physics(load_vessel("gunnerus-28.9"), 5, 1.0)
+    Predictor(physics, "alone", Unchanged({}), causal=("u",)).save(cell_file(tmp_path, "one"))
+    t, fixes = np.arange(31.0), np.arange(0.0, 31.0, 3.0)
+    frames = []
+    for later in (0.0, 1.0):
+        speeds = 2.0 + np.sin(fixes) + later * (fixes > 11.0)
+        file = write_dataset(logged({"a": {"u": np.interp(t, fixes, speeds)}}, t), tmp_path / f"{later}.parquet")
+        frames.append(predict_log(tmp_path, "one", file, None, tmp_path / "paths.csv")[0])
+    early = frames[0]["t"] <= 10.0
+    pd.testing.assert_frame_equal(frames[0][early], frames[1][early])
+    assert not frames[0].equals(frames[1])
 
 
 def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.alone import Alone
+from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
 from shipid.hybrid.method import Method
 from shipid.hybrid.path_drawn import PathDrawn
@@ -81,6 +82,18 @@ def test_known_commands_are_needed_to_predict() -> None:
     assert known.predict(WINDOWS.instants(known=True)).shape == WINDOWS.future.shape
     with pytest.raises(DataError, match="planned over the horizon"):
         known.predict(WINDOWS.instants())
+
+
+def test_held_commands_are_never_those_of_the_plan() -> None:
+    """A plan given to a predictor for held commands changes nothing; one for known commands follows it."""
+    ship = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
+    now = WINDOWS.instants()
+    planned = replace(now, planned={name: values + 0.5 for name, values in WINDOWS.planned.items()})
+    held = Predictor(ship, "alone", Unchanged({}))
+    known = replace(held, commands="known")
+    np.testing.assert_array_equal(held.predict(planned), held.predict(now))
+    np.testing.assert_array_equal(held.alone(planned), held.alone(now))
+    assert np.abs(known.predict(planned) - held.predict(now)).max() > 0.01
 
 
 class Shared(Method):

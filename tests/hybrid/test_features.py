@@ -7,8 +7,9 @@ import pytest
 
 from shipid.data.windows import Instants, cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.features import Inputs, Memory, choose_features, feature_table, group_of, past_error
+from shipid.hybrid.features import Inputs, Memory, choose_features, estimates, feature_table, group_of, past_error
 from shipid.hybrid.physics import Physics
+from shipid.physics.signals import mirror_sign
 from shipid.vessel.load import load_vessel
 from tests.study.test_commands import weaving
 
@@ -108,6 +109,36 @@ def test_past_error_of_wrong_physics_grows_and_is_the_rollout_by_hand(past):
     np.testing.assert_allclose(errors[8.0]["x"], -x, atol=1e-9)
     np.testing.assert_allclose(errors[8.0]["y"], -y, atol=1e-9)
     np.testing.assert_allclose(errors[8.0]["u"], past.columns["u"] - states["u"][-1], atol=1e-12)
+
+
+def test_a_mirrored_past_has_the_mirrored_error(past):
+    """A ship that is alike on both sides: what lies across or turns changes its sign, sides change places."""
+    wrong, instants = Physics(SHIP.with_values({"hull.derivatives.N_uv": 9e4}), 5, 1.0), past.instants()
+
+    def image(values):
+        sides = {"port": "starboard", "starboard": "port"}
+        names = {name: ".".join(sides.get(word, word) for word in name.split(".")) for name in values}
+        return {names[name]: column * mirror_sign(name) for name, column in values.items() if name != "flags"}
+
+    one = past_error(wrong, instants, 4.0)
+    other = past_error(wrong, Instants(image(instants.columns), image(instants.past)), 4.0)
+    assert np.abs(one["y"]).max() > 1e-3
+    for name, values in one.items():
+        np.testing.assert_allclose(other[name], mirror_sign(f"error-4.{name}") * values, atol=1e-9, err_msg=name)
+
+
+def test_estimates_of_the_observer_are_in_body_axes():
+    """Heading east, water that moves east comes from astern, and water that moves north goes to port."""
+    columns = {"psi": np.array([0.0, np.pi / 2]), "u": np.full(2, 3.0), "v": np.full(2, 0.2), "r": np.full(2, 0.01)}
+    known = {"observer.u": 2.5, "observer.v": 0.3, "observer.r": 0.02, "observer.X": 1.0, "observer.Y": 2.0}
+    known |= {"observer.N": 3.0, "observer.current_north": 0.1, "observer.current_east": 0.4}
+    table = estimates(Instants(columns, estimates={name: np.full(2, value) for name, value in known.items()}))
+    by_hand = {"observer-current.u": [0.1, 0.4], "observer-current.v": [0.4, -0.1], "observer-wave.u": [0.5, 0.5]}
+    by_hand |= {"observer-wave.v": [-0.1, -0.1], "observer-wave.r": [-0.01, -0.01]}
+    by_hand |= {f"observer-force.{name}": [value, value] for name, value in zip("uvr", (1.0, 2.0, 3.0), strict=True)}
+    assert set(table) == set(by_hand)
+    for name, values in by_hand.items():
+        np.testing.assert_allclose(table[name], values, atol=1e-12, err_msg=name)
 
 
 def test_a_past_that_is_missing_is_one_line(past):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,14 @@ def test_the_gradient_is_that_of_the_objective(nuisance: list[str], loss_kind: s
     for j, unit in enumerate(np.eye(3)):
         ends = [evaluate(own, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
         assert 2 * (here.J.T @ here.f)[j] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-2)
+
+
+def test_a_prior_is_about_the_base_vessel_also_where_that_is_zero() -> None:
+    own, factors = problem(), np.array([0.4, 0.9, 1.05])
+    centre, prior = np.array([0.0, 1.0, 1.0]), np.array([0.5, 0.25, np.inf])
+    believed = replace(own, unknown=replace(own.unknown, centre=centre, prior=prior))
+    costs = [evaluate(each, factors, origin(each)).objective for each in (own, believed)]
+    assert costs[1] - costs[0] == pytest.approx((0.4 / 0.5) ** 2 + (0.1 / 0.25) ** 2)
 
 
 def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:

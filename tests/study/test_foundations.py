@@ -83,6 +83,28 @@ def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Reco
     assert len(left) == 4 * 41 + 30
 
 
+def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of 40 s that start 30 s after one another on one clock: rows that the test shares are not handed over."""
+    plan, dataset = study(recorded, BOTH)
+    frame = dataset.frame.copy()
+    frame["t"] += 30.0 * (frame["run"].str[0].map(ord) - ord("a"))
+    prepared = prepare(plan, Dataset(frame, {**dataset.metadata, "clock": "shared"}))
+    given: list[tuple[Dataset, tuple[str, ...]]] = []
+
+    def identify(_: Any, data: Dataset, runs: tuple[str, ...], __: Any) -> Any:
+        given.append((data, runs))
+        return SimpleNamespace(status="failed", sentence="", seconds=0.0, values={})
+
+    monkeypatch.setattr(solve, "identify", identify)
+    predictions(plan, prepared, plan.batches[0], "cpu")
+    ((data, runs),) = given
+    assert runs == prepared.runs(plan, plan.batches[0])
+    ((first, last),) = prepared.test.spans.values()
+    overlapping = frame["t"].between(first, last) & (frame["run"] != "f")
+    assert overlapping.any()
+    assert not data.frame["t"].between(first, last).any()
+
+
 def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     """Compensated, identified alone, identified then compensated: rows, stored predictors and the report's paths."""
     plan, _ = study(recorded, BOTH)

@@ -21,7 +21,16 @@ from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
 from shipid.study.envelope import envelope
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import Prepared, constant_motion, instants_of, obtain, prepare, window_memory
+from shipid.study.prepare import (
+    Prepared,
+    all_windows,
+    constant_motion,
+    estimates_of,
+    instants_of,
+    obtain,
+    prepare,
+    window_memory,
+)
 from shipid.study.run import run_batch
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import draw, resolve
@@ -269,6 +278,29 @@ def test_perturbed_lags_have_hidden_states_of_their_own(
         predictor = Predictor(Physics(vessel, 5, 1.0), "alone", Unchanged({}))
         paths = predictor.predict(instants_of(plan, vessel, dataset, prepared.test))
         np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
+
+
+def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(
+    recorded: Callable[..., tuple[Plan, Dataset]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Speeds interpolated between fixes: another fix at 12 s changes no input up to 11 s, past and observer too."""
+    t, fixes = np.arange(31.0), np.arange(0.0, 31.0, 3.0)
+    speeds = 2.0 + np.random.default_rng(2).normal(size=(2, len(fixes)))
+    speeds[1, fixes < 11.0] = speeds[0, fixes < 11.0]
+    data = [logged({name: {"u": np.interp(t, fixes, one)} for name in "abcd"}, t) for one in speeds]
+    causal = {"dataset": "log.parquet", "causal": ["u"]}
+    plan, _ = recorded(data[0], data=causal, split={"test": 1}, prediction={"ahead": 5.0, "past": 4.0})
+    one, other = (all_windows(plan, dataset) for dataset in data)
+    early = one.t <= 11.0
+    assert early.sum() == 4 * 8
+    assert not np.array_equal(data[0].frame["u"][10:11], data[1].frame["u"][10:11])  # row 10 s is on the way to 12 s
+    np.testing.assert_array_equal(one.columns["u"][early], other.columns["u"][early])
+    np.testing.assert_array_equal(one.past["u"][:, early], other.past["u"][:, early])
+    monkeypatch.setattr("shipid.study.prepare.observe", lambda _, dataset, __: dataset.frame)
+    frames = [estimates_of(plan, plan.foundations[0], dataset) for dataset in data]
+    rows = data[0].frame["t"] <= 11.0
+    assert frames[0][rows].equals(frames[1][rows])  # type: ignore[index]
+    assert not frames[0].equals(frames[1])  # type: ignore[attr-defined]
 
 
 def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
