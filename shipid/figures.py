@@ -241,3 +241,7 @@ def _manoeuvre(source: Measured | ManoeuvreContent) -> ManoeuvreContent:
     from shipid.simulation.measured import manoeuvre_content
 
     return manoeuvre_content(source)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

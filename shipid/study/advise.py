@@ -37,6 +37,10 @@ def answer(results: Results) -> list[tuple[str, str]]:
     claims, every_model = results.plan.study.claims, by_model(results)
     table = every_model[~every_model["family"].isin(results.plan.aside)]
     sentences = [(text, "cells") for text in _caveats(results)]
+    learning = [way.name for way in results.plan.methods if way.method.compensates]
+    if len(learning) > 1:
+        spoken = f"The study has {len(learning)} methods that learn from data; these sentences speak of "
+        sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
     largest = int(table["N_D"].max()) if len(table) else 0
     top = table[table["N_D"] == largest]
     physics = top[top["family"] != NO_MODEL]
@@ -55,8 +59,9 @@ def answer(results: Results) -> list[tuple[str, str]]:
     known = physics[physics["A"] > 0]  # an exact model has no error that could be left
     if len(known):
         left = known["H"] / known["A"]
+        share = f"{left.min():.0%}" + (f" to {left.max():.0%}" if len(known) > 1 else "")
         text = (
-            f"Compensation with {runs(largest)} leaves {left.min():.0%} to {left.max():.0%} of the error of physics "
+            f"Compensation with {runs(largest)} leaves {share} of the error of physics "
             f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
         )
         sentences.append((text, "horizon"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,7 @@ MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 INSTANTS = 7  # windows of a test run in the browser
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Results:
     """A run's folder, read: the plan, one row per cell, models, test windows, and errors (T, S) of every cell.
 
@@ -48,6 +49,10 @@ class Results:
     dataset: Dataset
     provenance: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        done = f"{len(self.cells)} of {self.plan.cells} cells"
+        return f"<Results of {self.plan.name!r} in {self.folder}: {done}, {len(self.test)} test windows>"
+
     @property
     def rows(self) -> list[dict[str, Any]]:
         """One plain dict per cell."""
@@ -59,8 +64,9 @@ class Results:
         return len(self.cells) == self.plan.cells
 
 
-def read_results(folder: Path) -> Results:
+def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
+    folder = Path(folder)
     plan = store.stored_plan(folder)
     cells = store.read_rows(folder)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
