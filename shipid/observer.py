@@ -1,4 +1,4 @@
-"""Observer: a ship's motion without the waves', and what slowly pushes her, along a run and never looking ahead.
+"""Observer: the motion without the waves', slow forces and current, along a run and never looking ahead.
 
 A bank of extended Kalman filters on the vessel's equations of motion. The state x of each is
 
@@ -127,7 +127,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another."""
     settings, model = settings or Observer(), dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
-        message = f"{vessel.name} moves in {model.num_dof}: the observer takes 3, such as the model that she extends"
+        message = f"{vessel.name} moves in {model.num_dof}: the observer takes 3, such as the model that it extends"
         raise DocumentError(message, file=vessel.file, path="dof")
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:
@@ -284,9 +284,11 @@ def _rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: SX, 
     through = ca.vertcat(low[:3], low[3] - u_c, low[4] - v_c, r)
     still = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in model.drawn}
     inputs = [through, memory, commands, ca.vertcat(SX(0, 1), *names.values()), parameters]
-    own = summed_rates(model, inputs, SX.zeros(3), still)
+    forced = summed_rates(model, inputs, SX.zeros(3), still)
     turning = ca.vertcat(r * v_c, -r * u_c, 0)
-    return ca.vertcat(c * low[3] - s * low[4], s * low[3] + c * low[4], r, own[3:6] + turning + low[6:9], SX.zeros(5))
+    return ca.vertcat(
+        c * low[3] - s * low[4], s * low[3] + c * low[4], r, forced[3:6] + turning + low[6:9], SX.zeros(5)
+    )
 
 
 def _growth(number: Mapping[str, SX], psi: SX, restless: SX, dt: SX) -> SX:

@@ -212,9 +212,10 @@ SHIFT = Rule(
 
 def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
     """Shift of x_G [m] of each member of a study's family that says so."""
+    orders = {"n_rpm": [50.0, 200.0], "alpha_deg": [-50.0, 50.0]}
     document = {
         "question": "What if the centre of gravity is elsewhere?",
-        "truth": {"vessel": "gunnerus-28.9", "manoeuvres": 8, "duration": 20.0},
+        "truth": {"vessel": "gunnerus-28.9", "manoeuvres": 8, "duration": 20.0, "manoeuvre": [orders]},
         "split": {"test": 2},
         "prediction": {"ahead": 5.0},
         "grid": {"N_D": [4]},

@@ -223,7 +223,7 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
 
     Returns
     -------
-    dict : name of each feature that stays -> all the columns it stands for, itself first.
+    dict : name of each feature that stays -> all the columns equal to it, itself first.
 
     Raises
     ------

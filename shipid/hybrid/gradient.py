@@ -1,4 +1,4 @@
-"""Tuning by gradients: an Optuna study per model, asked and told in step; equal architectures train as one stack."""
+"""Tuning by gradients: an Optuna study per model; models with equal architectures train as one stack."""
 
 from __future__ import annotations
 
@@ -6,23 +6,42 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import optuna
 from optuna.trial import Trial, TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
-from shipid.hybrid.features import Inputs, choose_features
+from shipid.hybrid.features import Inputs, Memory, choose_features
 from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
-from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.training import Settings, train
 
 Parameters = dict[str, float]
 
 
-def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
+class Trained(Protocol):
+    """Settings of the search, see `shipid.hybrid.path_trained.PathTrained`."""
+
+    SEARCHED: ClassVar[tuple[str, ...]]
+    COUNTS: ClassVar[tuple[str, ...]]
+    LOGARITHMIC: ClassVar[tuple[str, ...]]
+
+    @property
+    def trials(self) -> int: ...  # noqa: D102
+    @property
+    def epochs(self) -> int: ...  # noqa: D102
+    @property
+    def batch(self) -> int: ...  # noqa: D102
+    @property
+    def patience(self) -> int: ...  # noqa: D102
+    @property
+    def memory(self) -> Memory: ...  # noqa: D102
+    def ranges(self) -> dict[str, tuple[float, float]]: ...  # noqa: D102
+
+
+def tune_gradient(task: Task, method: Trained) -> dict[str, Fitted]:
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
@@ -37,7 +56,7 @@ def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
     for number in range(method.trials):
         trials = {key: run.study.ask() for key, run in runs.items()}
         asked = {key: _suggest(trial, method) for key, trial in trials.items()}
-        for stack in _stacks(asked, tables):
+        for stack in _stacks(asked, tables, method.COUNTS):
             start = time.perf_counter()
             some = next(iter(stack))
             results = [
@@ -121,7 +140,7 @@ def _fit(
     data: _Data,
     targets: Mapping[str, Array],
     stack: Mapping[str, Parameters],
-    recipe: PathTrained,
+    method: Trained,
     entropy: tuple[int, ...],
     device: str,
 ) -> dict[str, _Result]:
@@ -134,9 +153,9 @@ def _fit(
         weight_decay=tuple(p["weight_decay"] for p in stack.values()),
         input_dropout=tuple(p["input_dropout"] for p in stack.values()),
         hidden_dropout=tuple(p["hidden_dropout"] for p in stack.values()),
-        epochs=recipe.epochs,
-        batch=recipe.batch,
-        patience=recipe.patience,
+        epochs=method.epochs,
+        batch=method.batch,
+        patience=method.patience,
     )
     outputs = np.stack([targets[key] for key in stack])
     basis = np.eye(outputs.shape[-1] // 2)
@@ -161,11 +180,13 @@ def _fit(
     }
 
 
-def _stacks(asked: Mapping[str, Parameters], tables: Mapping[str, Mapping[str, Array]]) -> list[dict[str, Parameters]]:
+def _stacks(
+    asked: Mapping[str, Parameters], tables: Mapping[str, Mapping[str, Array]], counts: Sequence[str]
+) -> list[dict[str, Parameters]]:
     """Group models by inputs and architecture, in the order of their first member."""
     stacks: dict[tuple[object, ...], dict[str, Parameters]] = {}
     for key, parameters in asked.items():
-        alike = (same_table(tables[key]), *(parameters[name] for name in PathTrained.COUNTS))
+        alike = (same_table(tables[key]), *(parameters[name] for name in counts))
         stacks.setdefault(alike, {})[key] = parameters
     return list(stacks.values())
 
@@ -177,12 +198,12 @@ def _study(seed: int) -> optuna.Study:
     return optuna.create_study(direction="minimize", sampler=sampler)
 
 
-def _suggest(trial: Trial, recipe: PathTrained) -> Parameters:
-    """Take each hyperparameter from the trial where the recipe has a range, else from the recipe."""
-    parameters: Parameters = {name: getattr(recipe, name) for name in recipe.SEARCHED}
-    for name, (low, high) in recipe.ranges().items():
-        if name in recipe.COUNTS:
+def _suggest(trial: Trial, method: Trained) -> Parameters:
+    """Take each hyperparameter from the trial where the method has a range, else from the method."""
+    parameters: Parameters = {name: getattr(method, name) for name in method.SEARCHED}
+    for name, (low, high) in method.ranges().items():
+        if name in method.COUNTS:
             parameters[name] = trial.suggest_int(name, int(low), int(high))
         else:
-            parameters[name] = trial.suggest_float(name, low, high, log=name in recipe.LOGARITHMIC)
+            parameters[name] = trial.suggest_float(name, low, high, log=name in method.LOGARITHMIC)
     return parameters

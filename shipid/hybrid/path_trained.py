@@ -40,8 +40,8 @@ class PathTrained(Searched):
         "learning_rate",
         "weight_decay",
     )
-    COUNTS: ClassVar = ("layers", "units")
-    LOGARITHMIC: ClassVar = ("learning_rate", "weight_decay")
+    COUNTS: ClassVar[tuple[str, ...]] = ("layers", "units")
+    LOGARITHMIC: ClassVar[tuple[str, ...]] = ("learning_rate", "weight_decay")
     corrector: ClassVar[type[Any]] = Compensator
 
     layers: PositiveInt | tuple[PositiveInt, PositiveInt] = (1, 3)

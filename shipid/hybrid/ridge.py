@@ -16,21 +16,38 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
-from shipid.hybrid.features import Inputs, choose_features, group_of
+from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.settings import seed_of
 from shipid.physics.signals import mirror_sign, orders_thrust, steers
 
 SIDES = {"port": "starboard", "starboard": "port", "left": "right", "right": "left"}  # words in names of components
 ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
+
+
+class Drawn(Protocol):
+    """Settings that the closed form takes, see `shipid.hybrid.path_drawn.PathDrawn`."""
+
+    @property
+    def units(self) -> int: ...  # noqa: D102
+    @property
+    def terms(self) -> int: ...  # noqa: D102
+    @property
+    def averaged(self) -> int: ...  # noqa: D102
+    @property
+    def trials(self) -> int: ...  # noqa: D102
+    @property
+    def memory(self) -> Memory: ...  # noqa: D102
+    def path(self) -> list[float]: ...  # noqa: D102
+    def points(self) -> list[dict[str, float]]: ...  # noqa: D102
+    def left_out(self, point: Mapping[str, float]) -> frozenset[str]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -96,7 +113,7 @@ class _Group:
     mirrored: _Inputs | None
 
 
-def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
+def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -173,7 +190,7 @@ def _groups(
     return found
 
 
-def _unsolvable(method: PathDrawn) -> Fitted:
+def _unsolvable(method: Drawn) -> Fitted:
     """The result where targets are not numbers: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
     return Fitted(None, [{"number": i, "params": point, **blank} for i, point in enumerate(method.points())], 0.0)
@@ -222,7 +239,7 @@ def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
 
 def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
     """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image."""
-    standing = {column: name for name, columns in features.items() for column in columns}
+    kept = {column: name for name, columns in features.items() for column in columns}
     names = list(features)
     matrix = np.zeros((len(names), len(names)))
     for column, values in table.items():
@@ -233,9 +250,9 @@ def _reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ..
             return None
         partner = ".".join(filter(None, ("".join(SIDES.get(word, word) for word in words), signal)))
         sign = mirror_sign(column)
-        if column in standing and partner in standing:
-            matrix[names.index(standing[partner]), names.index(standing[column])] = sign
-        elif column in standing or partner not in table or not np.allclose(values, sign * table[partner]):
+        if column in kept and partner in kept:
+            matrix[names.index(kept[partner]), names.index(kept[column])] = sign
+        elif column in kept or partner not in table or not np.allclose(values, sign * table[partner]):
             return None
     return matrix if (np.abs(matrix).sum(axis=0) == 1).all() and (np.abs(matrix).sum(axis=1) == 1).all() else None
 
@@ -305,8 +322,8 @@ def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], 
 
 def _many_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
     """The same by solving for the output weights without each block, (M, M)."""
-    own, product = rows.mT @ rows, part.product - rows.mT @ targets
-    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - own, product)
+    block, product = rows.mT @ rows, part.product - rows.mT @ targets
+    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - block, product)
 
 
 def _network(

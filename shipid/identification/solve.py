@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
+from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import BLOCK, Identify
 from shipid.identification.start import by_inverse_dynamics, grown
-from shipid.identification.statistics import inverted
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]

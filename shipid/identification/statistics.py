@@ -33,7 +33,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import UNSEEN, Collinearity, collinearity, listed, short
+from shipid.identification.collinearity import Collinearity, collinearity, listed, short
+from shipid.identification.covariance import inverted
 
 if TYPE_CHECKING:
     from shipid.identification.solve import Solution
@@ -296,17 +297,6 @@ class _Basis:
         inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian + np.diag(prior))
         leverage = np.einsum("mi,ij,mj->m", fit.jacobian, inverse, fit.jacobian)
         return cls(inverse, prior, leverage, unseen, prior > 0)
-
-
-def inverted(information: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Pseudo-inverse (n, n) of an information matrix, and a mask (n,) of parameters along its null directions."""
-    scale = np.sqrt(np.diag(information))
-    scale = np.where(scale > 0, scale, 1.0)
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    silent = values <= UNSEEN * max(float(values[-1]), UNSEEN)
-    kept = vectors[:, ~silent]
-    inverse = (kept / values[~silent]) @ kept.T / np.outer(scale, scale)
-    return inverse, np.asarray((np.abs(vectors[:, silent]) > np.sqrt(UNSEEN)).any(axis=1))
 
 
 def whiteness(fit: LinearFit, leverage: Array | None = None) -> dict[str, Whiteness]:

@@ -116,7 +116,7 @@ def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
     """Which physics models do no better than none, at the largest and at the smallest amount of data."""
     largest, smallest = int(table["N_D"].max()), int(table["N_D"].min())
     if largest not in pure.index:
-        return f"There is no result without physics at {runs(largest)}, so whether physics harms there cannot be told."
+        return f"There is no result without physics at {runs(largest)}, so it is unknown whether physics harms there."
 
     def harming(amount: int) -> list[str]:
         rows = table[(table["N_D"] == amount) & (table["family"] != NO_MODEL)]
@@ -167,7 +167,7 @@ def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
         return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
     first = table[(table["model"] == best["model"]) & (table["N_D"] == fewest)]
     if first.empty:
-        return f"{best['model']} has no result at {runs(fewest)}, so its worth in runs cannot be told."
+        return f"{best['model']} has no result at {runs(fewest)}, so its worth in runs is unknown."
     level = float(first["H"].iloc[0])
     here = f"with {runs(fewest)} {best['model']} has {metres(level)}"
     enough, last = pure[pure["H"] <= level], int(pure.index.max())

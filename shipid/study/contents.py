@@ -10,7 +10,7 @@ import pandas as pd
 
 from shipid.files import write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
-from shipid.study import advise
+from shipid.study import advise, memory
 from shipid.study import results as parts
 from shipid.study.findings import findings
 from shipid.study.results import Results, read_results
@@ -19,7 +19,12 @@ from shipid.study.store import write_results
 log = logging.getLogger(__name__)
 
 ANSWER, SUMMARY, REPORT = "answer.txt", "summary.md", "report.html"
-FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {}
+FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
+    "observer": memory.observer_frame,
+    "orders": memory.orders_frame,
+    "memory": memory.memory_frame,
+    "memory_over_time": memory.memory_time_frame,
+}
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
 

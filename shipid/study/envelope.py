@@ -30,17 +30,17 @@ def envelope(plan: Plan, pool: Windows, test: Windows, commands: Sequence[str]) 
         {"set": name, "quantity": quantity, "min": values.min(), "mean": values.mean(), "max": values.max()}
         for name, table in tables.items()
         for quantity, values in table.items()
-        if quantity in alike  # equal commands are one input: the first stands for all
+        if quantity in alike  # equal commands are one input: the first represents all
     ]
 
 
 def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | None) -> pd.DataFrame:
     """The envelope in degrees and rpm, a row per set and quantity; what is published is the set of that name."""
-    own = []
+    shown = []
     for row in rows:
         unit, factor = read_unit(row["quantity"])
-        own.append({**row, "unit": unit, **{name: row[name] * factor for name in LIMITS}})
-    return pd.DataFrame([*own, *_published(published, [row["quantity"] for row in own])])
+        shown.append({**row, "unit": unit, **{name: row[name] * factor for name in LIMITS}})
+    return pd.DataFrame([*shown, *_published(published, [row["quantity"] for row in shown])])
 
 
 def _published(published: Published | None, quantities: Sequence[str]) -> list[dict[str, Any]]:

@@ -17,8 +17,8 @@ S4 : at the largest N_D at least one high member beats pure data-driven and at l
 S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 gives S1-S4 the same verdicts; refuted if
     it is below 0.8 or H_90 turns a confirmed finding into a refuted one, or the other way round.
 S6 : a moderate member with a small N_D (at most half of the largest) beats pure data-driven with a larger one, and one
-    beats physics alone that is more accurate than its own. Confirmed if a pair of each kind holds in every seed,
-    undecided if only for the mean, else refuted.
+    beats physics alone that is more accurate than that member's physics. Confirmed if a pair of each kind holds in
+    every seed, undecided if only for the mean, else refuted.
 S7 : at the smallest N_D the roughness of pure data-driven paths is more than 1.5 times that of the true paths, and
     that of the cooperative models in the median is not.
 
@@ -348,28 +348,30 @@ def _small(grid: Grid) -> list[int]:
 
 def _against_data(grid: Grid, model: str) -> Pair | None:
     """The pair of amounts with which a model saves most runs against pure data-driven."""
-    own, pure, found = grid.H[model], grid.H[NO_MODEL], []
+    errors, pure, found = grid.H[model], grid.H[NO_MODEL], []
     for i in _small(grid):
         for j in range(i + 1, len(grid.amounts)):
-            if own[i].mean() < pure[j].mean():
-                text = f"{model} with {grid.amounts[i]} runs {metres(own[i].mean())} beats "
+            if errors[i].mean() < pure[j].mean():
+                text = f"{model} with {grid.amounts[i]} runs {metres(errors[i].mean())} beats "
                 text += f"{grid.amounts[j]} runs without physics, {metres(pure[j].mean())}"
-                saved = grid.amounts[j] - grid.amounts[i] + 1 - own[i].mean() / pure[j].mean()  # ties: the wider margin
-                found.append(Pair(bool((own[i] < pure[j]).all()), saved, text))
+                saved = (
+                    grid.amounts[j] - grid.amounts[i] + 1 - errors[i].mean() / pure[j].mean()
+                )  # ties: the wider margin
+                found.append(Pair(bool((errors[i] < pure[j]).all()), saved, text))
     return next(iter(_best(found)), None)
 
 
 def _against_physics(grid: Grid, model: str) -> Pair | None:
-    """The most accurate physics alone, better than the model's own, that a model beats with few runs."""
+    """The most accurate physics alone, better than the model's physics alone, that a model beats with few runs."""
     found = []
     for i in _small(grid):
-        own = grid.H[model][i]
+        errors = grid.H[model][i]
         for other in grid.physics:
-            if own.mean() < grid.A[other] < grid.A[model]:
-                text = f"{model} ({metres(grid.A[model])} alone) with {grid.amounts[i]} runs {metres(own.mean())} "
+            if errors.mean() < grid.A[other] < grid.A[model]:
+                text = f"{model} ({metres(grid.A[model])} alone) with {grid.amounts[i]} runs {metres(errors.mean())} "
                 text += f"beats {other} alone, {metres(grid.A[other])}"
                 gain = grid.A[model] / grid.A[other] + 1e-6 / grid.amounts[i]  # ties: the fewest runs
-                found.append(Pair(bool((own < grid.A[other]).all()), gain, text))
+                found.append(Pair(bool((errors < grid.A[other]).all()), gain, text))
     return next(iter(_best(found)), None)
 
 

@@ -114,8 +114,8 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
     wanted = LENGTHS_AHEAD * length / speed
     chosen = min(possible, key=lambda seconds: abs(np.log(seconds / wanted)))
     why = (
-        f"{chosen:g} s, in which she runs {chosen * speed / length:.2g} ship lengths at {speed:.3g} m/s "
-        f"(L/U = {length / speed:.3g} s): over about {LENGTHS_AHEAD:g} her dynamics decide, later the next orders"
+        f"{chosen:g} s, in which the ship runs {chosen * speed / length:.2g} ship lengths at {speed:.3g} m/s "
+        f"(L/U = {length / speed:.3g} s): over about {LENGTHS_AHEAD:g} its dynamics decide, later the next orders"
     )
     short = f"; no longer than a third of the median run, {3 * longest:.3g} s" if wanted > longest else ""
     return chosen, why + short
@@ -295,7 +295,7 @@ def _wrong_helm(vessel: Vessel, dataset: Dataset) -> Iterator[str]:
     try:
         expected = Controls.of(vessel).helm
     except ShipidError:
-        return  # nothing drives or turns her on her own
+        return  # nothing drives or turns the ship
     for name, sign in expected.items():
         if sign * seen.get(name, 0.0) < -LEAST_SENSE:
             yield (
@@ -331,7 +331,7 @@ def _folds(total: int) -> Choice:
 
 def _grid(amounts: list[int]) -> Iterator[Choice]:
     yield Choice("grid.N_D", amounts, "runs for training and validation: from the fewest to all, the learning curve")
-    yield Choice("grid.seeds", [0, 1, 2], "three draws of which runs come first: with fewer no range can be told")
+    yield Choice("grid.seeds", [0, 1, 2], "three draws of which runs come first: with fewer there is no range")
 
 
 def _claims(families: Sequence[str]) -> Iterator[Choice]:
@@ -358,14 +358,14 @@ def _families(vessels: Mapping[str, Vessel]) -> list[Any]:
         found.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
     named, vessel = next(iter(vessels.items()))
     blocks = _inaccurate(vessel)
-    words = f"{found[0]['name']} made wrong on purpose: what does it cost to know her less well?"
+    words = f"{found[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
     if blocks:
         found.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
     return found
 
 
 def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:
-    """Higher-order damping removed and steering derivatives times 0.6 (method, section 5), as far as she has them."""
+    """Higher-order damping removed, steering derivatives times 0.6 (method, section 5), as far as there are any."""
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
     steering = [path for path in hull if path.rpartition(".")[2] in STEERING]
     blocks: list[dict[str, Any]] = []
@@ -378,12 +378,12 @@ def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:
 
 def _softer(families: list[Any]) -> list[list[Any]]:
     """The families, then without removing, then without the inaccurate one."""
-    *standing, last = families
+    *first, last = families
     if "perturb" not in last:
         return [families]
     scaled = [block for block in last["perturb"] if "factor" in block]
-    milder = [[*standing, {**last, "perturb": scaled}]] if scaled and scaled != last["perturb"] else []
-    return [families, *milder, standing]
+    milder = [[*first, {**last, "perturb": scaled}]] if scaled and scaled != last["perturb"] else []
+    return [families, *milder, first]
 
 
 def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
@@ -408,7 +408,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice(
             "question", f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {horizon:g} s?"
         ),
-        Choice("description", f"simulated: {vessel.name} as she is makes the truth, and degraded models predict her"),
+        Choice("description", f"simulated: {vessel.name} as it is makes the truth, and degraded models predict it"),
         *_truth(named, vessel, service, rpm, horizon, step, past),
         Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
@@ -462,7 +462,7 @@ def _truth(
     if past:
         yield Choice("truth.run_up", past, "s before the first instant of prediction: the past of the memory")
     yield Choice("truth.duration", float(f"{horizon + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
-    yield Choice("truth.step", fine, f"s: she takes {length / service:.3g} s for her length")
+    yield Choice("truth.step", fine, f"s: the ship takes {length / service:.3g} s for its length")
     yield Choice("truth.interval", step, "s between logged rows")
     weather = dynamics(vessel).environment
     if "V_w" in weather:

@@ -148,7 +148,7 @@ class Claims(Strict):
 
 
 class Published(Strict):
-    """`[published]`: the input envelope that others report, to be shown beside the study's own."""
+    """`[published]`: the input envelope that others report, to be shown beside that of the study."""
 
     source: Annotated[str, Field(min_length=3)]
     envelope: dict[str, list[FiniteFloat]] = Field(description="key -> [min, mean, max]")
@@ -169,7 +169,7 @@ class MethodBlock(BaseModel):
     model_config = ConfigDict(extra="allow")
     name: Annotated[str, Field(pattern=NAME)]
     kind: str
-    families: Annotated[list[str], Field(min_length=1, description="families that it meets; * stands for any text")] = [
+    families: Annotated[list[str], Field(min_length=1, description="families that it meets; * matches any text")] = [
         "*"
     ]
 
@@ -428,7 +428,7 @@ def mapping_of(data: Data, file: Path) -> str | None:
 
 
 def _sources(data: Data, file: Path) -> dict[str, str]:
-    """Digests of what the runs come from; a file that is not there is told when it is read."""
+    """Digests of what the runs come from; a missing file is reported when it is read."""
     mapping = mapping_of(data, file)
     found = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
     for key, name in (("log", data.log), ("dataset", data.dataset)):
@@ -455,7 +455,7 @@ def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
 
 
 def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
-    """The vessel that makes the truth, with the blocks that the study adds: what is wrong there is told there."""
+    """The vessel that makes the truth, with the blocks that the study adds: an error there names its path."""
     vessel = _vessel(truth.vessel, file, "truth.vessel", known)
     try:
         return vessel.with_values(truth.set) if truth.set else vessel
@@ -528,7 +528,7 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
 def _root(families: Sequence[Family], index: int, file: Path) -> int:
     """Place of the family whose members an identified or observed family takes, as far up as it extends.
 
-    DocumentError unless the families on the way only extend: no base, perturbations or members of their own.
+    DocumentError unless the families on the way only extend: no base, perturbations or members.
     """
     by_name = {family.name: place for place, family in enumerate(families)}
     while families[index].identify is not None or families[index].observer is not None:

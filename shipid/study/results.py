@@ -172,10 +172,10 @@ def time_frame(results: Results) -> pd.DataFrame:
                 row["N_D"],
                 "cooperative",
             )
-    return _with_gaps(pd.concat(parts, ignore_index=True), ["run", "model", "N_D", "source"])
+    return with_gaps(pd.concat(parts, ignore_index=True), ["run", "model", "N_D", "source"])
 
 
-def _with_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+def with_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """A row without numbers wherever time jumps within a group, so that no line is drawn across what is not there."""
     step = frame.groupby(keys, sort=False)["t"].diff()
     hole = step > 1.5 * step.median()
@@ -202,7 +202,7 @@ def commands_frame(results: Results) -> pd.DataFrame:
     for name, components in shown.items():
         unit, factor = read_unit(name)
         result[f"{components} {SIGNALS[signal_of(name)].word} [{unit}]"] = frame[name].to_numpy() * factor
-    return _with_gaps(result, ["run"])
+    return with_gaps(result, ["run"])
 
 
 def snapshots(results: Results) -> list[dict[str, Any]]:

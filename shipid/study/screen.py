@@ -26,7 +26,7 @@ Array = np.ndarray
 MEMBERS = 64  # of a block
 NUMBERS = 4_000_000  # that a block keeps, a sum per window and a tally per member: fewer members where windows are many
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
-OWN = ("family", "member", "A", "A_90", "diverged")
+FIXED = ("family", "member", "A", "A_90", "diverged")
 
 
 def families(plan: Plan, name: str | None = None) -> list[Family]:
@@ -113,7 +113,7 @@ def _equal_lags(base: Vessel, values: Array) -> list[Array]:
 def joined(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """All rows as one frame; a parameter that a family leaves alone has the factor 1."""
     frame = pd.concat(blocks, ignore_index=True)
-    drawn = [name for name in frame.columns if name not in OWN]
+    drawn = [name for name in frame.columns if name not in FIXED]
     return frame.fillna(dict.fromkeys(drawn, 1.0))
 
 
@@ -135,7 +135,7 @@ def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
         A, alike = part["A"].to_numpy(), dict[bytes, list[str]]()
-        for path in frame.columns.difference(list(OWN), sort=False):
+        for path in frame.columns.difference(list(FIXED), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
         for paths in alike.values():

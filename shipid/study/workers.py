@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 
 
 def import_for_workers() -> None:
-    """Let a process of its own import all that workers need, while this one goes on; they fork from it.
+    """Let a separate process import all that workers need, while this one goes on; they fork from it.
 
     Once per process. The workers ignore Ctrl-C, as their source does: this process stops them. Nothing happens where
     workers are not forked, or in a thread, which cannot set signals; then each worker imports for itself.

@@ -269,6 +269,7 @@ def test_a_sum_counts_every_component(what: str, draw_inputs: Draw) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # PyTorch's compiler uses what PyTorch deprecates
 @pytest.mark.skipif(compiler() is None, reason="no C++ compiler on this machine")
 def test_a_family_compiles_once(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,17 +1,122 @@
-"""Learned force: what it is trained on and what it is judged by, without a rollout."""
+"""The learned force: bounds by hand, what the ridge does, what it learns, and what is refused."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from shipid.hybrid.learned_force import LearnedForce, _Trainer
+from shipid.data.windows import Windows, cut_windows
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.learned_force import BLOCK, HIDDEN, OUTPUT, ForceCorrector, LearnedForce, _Trainer, limits, plain
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import load_vessel
+from tests.study.test_commands import weaving
 from tests.test_predictor_fit import HORIZON, turns
+
+SHIP = load_vessel("gunnerus-28.9")
+WRONG = Physics(SHIP.with_values({"hull.derivatives.X_u|u|": 2 * SHIP.parameters["hull.derivatives.X_u|u|"]}), 5, 1.0)
+CHEAP = {"trials": 2, "units": 3, "iterations": 25}
+
+
+@pytest.fixture(scope="module")
+def windows() -> Windows:
+    """Windows of the right ship."""
+    return cut_windows(weaving("abc"), horizon=5, interval=3.0)
+
+
+def task(windows: Windows, physics: Physics = WRONG, seed: int = 1) -> Task:
+    """One foundation whose resistance is wrong, commands known, every run left out in turn."""
+    folds = [(np.flatnonzero(windows.run != run), np.flatnonzero(windows.run == run)) for run in windows.spans]
+    case = Case(physics, physics.paths(windows.instants(known=True)))
+    commands = tuple(name for name in windows.columns if "." in name)
+    return Task({"wrong": case}, windows, folds, commands, known=True, seed=seed)
+
+
+def error(paths: np.ndarray, windows: Windows) -> float:
+    """Mean distance [m]."""
+    return float(np.linalg.norm(paths - windows.future, axis=-1).mean())
+
+
+def test_it_learns_most_of_a_wrong_resistance(windows: Windows) -> None:
+    given = task(windows)
+    found = LearnedForce(**CHEAP, ridge=(1e-4, 1e-2)).fit(given)["wrong"]
+    assert found.corrector is not None
+    learned = found.corrector.predict(WRONG, given.instants("wrong"), given.cases["wrong"].paths)
+    assert error(learned, windows) < 0.3 * error(given.cases["wrong"].paths, windows)
+    best = min(found.trials, key=lambda row: row["value"])
+    assert found.corrector.hyperparameters == best["params"]
+    assert [row["params"]["ridge"] for row in found.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
+
+
+def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
+    given = task(windows)
+    found = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector
+    assert found is not None
+    paths = given.cases["wrong"].paths
+    np.testing.assert_allclose(found.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
+
+
+def test_the_force_is_bounded_by_what_the_ship_is() -> None:
+    document = SHIP.document
+    m, I_z, length = document["inertia"]["m"], document["inertia"]["I_z"], document["particulars"]["L_pp"]
+    found = limits(SHIP, 4.0, 0.5)
+    assert found["X_max"][0] == found["Y_max"][0] == pytest.approx(0.5 * m * 16.0 / length)
+    assert found["N_max"][0] == pytest.approx(0.5 * I_z * 16.0 / length**2)
+    assert limits(SHIP, 0.0, 1.0)["X_max"][0] > 0
+
+
+def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
+    """Numbers of a force."""
+    rng = np.random.default_rng(0)
+    found = {name: np.array([1.0]) for name in ("u_scale", "v_scale", "r_scale")} | limits(SHIP, 3.0, 1.0)
+    return found | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
+
+
+def test_it_survives_its_header_and_arrays() -> None:
+    corrector = ForceCorrector(block(), {"ridge": 0.1})
+    again = ForceCorrector.from_arrays(corrector.header(), corrector.arrays())
+    assert again.hyperparameters == {"ridge": 0.1}
+    vessel = again.with_force(WRONG).vessel
+    assert vessel is not None
+    assert vessel.document["hull"]["learned"] == plain(corrector.block)
+    assert again.past == 0.0
+
+
+def test_damaged_arrays_are_refused() -> None:
+    corrector = ForceCorrector(block(), {"ridge": 0.1})
+    header, arrays = corrector.header(), corrector.arrays()
+    with pytest.raises(ResultError, match="c_Y: missing in the saved force"):
+        ForceCorrector.from_arrays(header, {name: x for name, x in arrays.items() if name != "c_Y"})
+    with pytest.raises(ResultError, match="differ in length"):
+        ForceCorrector.from_arrays(header, arrays | {"w_0": np.zeros(2)})
+
+
+def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
+    already = WRONG.with_values({BLOCK: plain(block())})
+    with pytest.raises(DataError, match="has a learned force already") as caught:
+        LearnedForce(**CHEAP).fit(task(windows, already))
+    assert caught.value.path == BLOCK
+
+
+def test_no_more_windows_than_asked_for(windows: Windows) -> None:
+    """Of many training windows some are drawn by the seed: fewer windows, other numbers, the same bounds."""
+    few = LearnedForce(**{**CHEAP, "iterations": 2}, ridge=0.1, samples=6)
+    one, again, other = (few.fit(task(windows, seed=seed))["wrong"].corrector for seed in (1, 1, 2))
+    assert one is not None
+    assert again is not None
+    assert other is not None
+    for name, values in one.arrays().items():
+        np.testing.assert_array_equal(values, again.arrays()[name])
+    assert not np.array_equal(one.arrays()["c_X"], other.arrays()["c_X"])
+    assert one.arrays()["X_max"] == other.arrays()["X_max"]
+    diverged = replace(task(windows), cases={"wrong": Case(WRONG, np.full((5, len(windows), 2), np.nan))})
+    lost = few.fit(diverged)["wrong"]
+    assert lost.corrector is None
+    assert [row["state"] for row in lost.trials] == ["diverged"]
 
 
 def test_a_trial_is_judged_by_windows_that_its_force_has_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:

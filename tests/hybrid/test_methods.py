@@ -1,147 +1,137 @@
+"""Laws of all methods: names, one seed one result, company, what is saved, and failures that are values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
-import torch
 
-from shipid.errors import DataError
-from shipid.hybrid.features import Inputs
-from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.training import train
-from tests.hybrid.tasks import compensation, tune
+from shipid.data.windows import cut_windows
+from shipid.errors import DocumentError
+from shipid.hybrid.method import Case, Fitted, Method, Task
+from shipid.hybrid.methods import METHODS, kind_of, method_of
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import load_vessel
+from tests.study.test_whole import EVERYTHING, SMALL, windy
 
-torch.set_num_threads(1)
-COMMANDS = ("port.n", "port.delta", "starboard.n", "starboard.delta")
-SMALL = PathTrained(trials=3, units=16, layers=1, learning_rate=1e-2, epochs=40, patience=0)
-SEARCHED = PathTrained(trials=3, epochs=20)
-DRAWN = PathDrawn(trials=3, units=32, terms=4)
-FOLD = (np.arange(40, 200), np.arange(40))
+SHIP = load_vessel("gunnerus-28.9")
+Make = Callable[..., Task]
 
 
-@pytest.fixture
-def columns():
-    rng = np.random.default_rng(0)
-    columns = {name: rng.normal(size=240) for name in ("psi", "u", "v", "r", "V_w", "beta_w", "port.n", "port.delta")}
-    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.delta": columns["port.delta"].copy()}
+@pytest.fixture(scope="module")
+def make() -> Make:
+    """A task with foundations of some derivatives, `slow={"N_ur": -3e5}`, or without physics, `none=None`."""
+    windows = cut_windows(windy("abc"), horizon=4, interval=3.0, past=6)
+    folds = [(np.flatnonzero(windows.run != run), np.flatnonzero(windows.run == run)) for run in windows.spans]
+    commands = tuple(name for name in windows.columns if "." in name)
+
+    def made(seed: int = 1, **foundations: Mapping[str, float] | None) -> Task:
+        cases = {}
+        for name, values in foundations.items():
+            changed = {f"hull.derivatives.{key}": value for key, value in (values or {}).items()}
+            physics = Physics(None if values is None else SHIP.with_values(changed), 4, 1.0)
+            cases[name] = Case(physics, physics.paths(windows.instants()))
+        return Task(cases, windows, folds, commands, seed=seed)
+
+    return made
 
 
-@pytest.fixture
-def targets(columns):
-    """What two models miss (6, 240, 2): a smooth function of the inputs that grows along the horizon."""
-    steps = np.arange(1.0, 7.0)[:, None]
-    x = steps * columns["u"] + 0.1 * steps**2 * np.tanh(columns["port.n"])
-    y = steps * columns["v"] + 0.2 * steps**2 * columns["r"] * columns["port.delta"]
-    return {"high-1": np.stack([x, y], axis=-1), "none": np.stack([5.0 * x, -3.0 * y], axis=-1)}
+@pytest.fixture(params=list(METHODS))
+def method(request: pytest.FixtureRequest) -> Method:
+    """Every method in turn, cheap, with all the memory that it can have."""
+    kind = request.param
+    memory = {"memory": EVERYTHING} if "memory" in METHODS[kind].model_fields else {}
+    return method_of(kind, {**SMALL.get(kind, {}), **memory})
 
 
-def same(a, b):
-    return a.header() == b.header() and all(np.array_equal(v, b.arrays()[k]) for k, v in a.arrays().items())
+SLOW, OTHER = {"N_ur": -3e5}, {"N_uv": -2e5}
 
 
-@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
-def test_the_same_seed_gives_the_same_numbers(columns, targets, method):
-    first, again = (tune(columns, COMMANDS, targets, [FOLD], method, seed=4) for _ in range(2))
-    other = tune(columns, COMMANDS, targets, [FOLD], method, seed=5)
-    for key in targets:
-        assert same(first[key].corrector, again[key].corrector)
-        assert not same(first[key].corrector, other[key].corrector)
-        assert [row["value"] for row in first[key].trials] == [row["value"] for row in again[key].trials]
+def same(one: Fitted, other: Fitted) -> bool:
+    """Whether two results hold the very same numbers."""
+    assert one.corrector is not None
+    assert other.corrector is not None
+    arrays, others = one.corrector.arrays(), other.corrector.arrays()
+    equal = all(np.array_equal(values, others[name]) for name, values in arrays.items())
+    return one.corrector.header() == other.corrector.header() and arrays.keys() == others.keys() and equal
 
 
-@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
-def test_a_model_does_not_notice_its_company(columns, targets, method):
-    together = tune(columns, COMMANDS, targets, [FOLD], method, seed=4)
-    alone = tune(columns, COMMANDS, {"none": targets["none"]}, [FOLD], method, seed=4)
-    np.testing.assert_allclose(
-        compensation(alone["none"].corrector, columns), compensation(together["none"].corrector, columns), atol=0.05
+def predicted(task: Task, name: str, found: Fitted) -> Any:
+    """Paths of a result on the windows of its task."""
+    assert found.corrector is not None
+    return found.corrector.predict(task.cases[name].physics, task.instants(name), task.cases[name].paths)
+
+
+def test_a_name_and_its_class(method: Method) -> None:
+    assert type(method_of(kind_of(method), method.model_dump())) is type(method)
+    assert method_of(kind_of(method), method.model_dump()) == method
+
+
+def test_an_unknown_kind_is_told_the_names() -> None:
+    with pytest.raises(DocumentError, match="did you mean 'path-drawn'") as caught:
+        method_of("path-draw", {}, "method.2")
+    assert caught.value.path == "method.2.kind"
+
+
+def test_the_same_seed_gives_the_same_numbers(make: Make, method: Method) -> None:
+    first, again = (method.fit(make(slow=SLOW))["slow"] for _ in range(2))
+    assert same(first, again)
+    if first.trials:  # what has nothing to draw has no use for a seed
+        assert [row["value"] for row in first.trials] == [row["value"] for row in again.trials]
+        assert not same(first, method.fit(make(seed=2, slow=SLOW))["slow"])
+
+
+def test_a_foundation_does_not_notice_its_company(make: Make, method: Method) -> None:
+    none = {"none": None} if method.meets_none else {}
+    together, alone = make(slow=SLOW, other=OTHER, **none), make(slow=SLOW)
+    found, single = method.fit(together), method.fit(alone)
+    assert list(found) == ["slow", "other", *none]
+    one, other = predicted(together, "slow", found["slow"]), predicted(alone, "slow", single["slow"])
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-4)  # networks that train together round otherwise
+
+
+def test_what_is_saved_is_what_is_rebuilt(make: Make, method: Method) -> None:
+    task = make(slow=SLOW)
+    found = method.fit(task)["slow"]
+    assert found.corrector is not None
+    header = json.loads(json.dumps(found.corrector.header()))
+    again = type(method).corrector.from_arrays(header, dict(found.corrector.arrays()))
+    assert isinstance(found.corrector, type(method).corrector)
+    assert again.past == found.corrector.past <= method.past
+    np.testing.assert_array_equal(
+        predicted(task, "slow", replace(found, corrector=again)), predicted(task, "slow", found)
     )
 
 
-def test_the_residual_is_learned(columns, targets):
-    kept = {"trials": 1, "input_dropout": 0.0, "hidden_dropout": 0.0, "learning_rate": 0.03, "epochs": 400}
-    for key, tuned in tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=kept), seed=0).items():
-        unseen = np.arange(200, 240)
-        predicted = compensation(tuned.corrector, {name: values[unseen] for name, values in columns.items()})
-        left = np.square(predicted - targets[key][:, unseen]).mean()
-        assert left < 0.5 * np.square(targets[key][:, unseen]).mean()
+def test_paths_that_are_no_numbers_are_a_value_and_harm_nobody(make: Make, method: Method) -> None:
+    task = make(slow=SLOW, other=OTHER)
+    lost = Case(task.cases["other"].physics, np.full_like(task.cases["other"].paths, np.nan))
+    found = method.fit(replace(task, cases={**task.cases, "other": lost}))
+    if method.compensates:
+        assert found["other"].corrector is None
+        assert {row["state"] for row in found["other"].trials} == {"diverged"}
+    single = method.fit(make(slow=SLOW))["slow"]
+    one, other = predicted(task, "slow", found["slow"]), predicted(task, "slow", single)
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-4)
 
 
-def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
-    stacks = []
-
-    def counted(inputs, targets, *args, **kwargs):
-        stacks.append(len(targets))
-        return train(inputs, targets, *args, **kwargs)
-
-    monkeypatch.setattr("shipid.hybrid.gradient.train", counted)
-    tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
-    assert stacks == [2] * 3
-    stacks.clear()
-    tune(columns, COMMANDS, targets, [FOLD], SEARCHED.model_copy(update={"epochs": 2}), seed=4)
-    assert stacks == [1] * 6
-
-
-def test_the_objective_is_the_mean_loss_of_the_folds(columns, targets):
-    folds = [(np.arange(80, 240), np.arange(80)), (np.arange(160), np.arange(160, 240))]
-    tuned = tune(columns, COMMANDS, targets, folds, SMALL, seed=1)["none"]
-    best = min(tuned.trials, key=lambda row: row["value"])
-    assert tuned.corrector.hyperparameters == best["params"]
-    losses = []
-    for network, (_, validation) in zip(tuned.corrector.networks, folds, strict=True):
-        one_fold = type(tuned.corrector)(Inputs(COMMANDS), (network,), {})
-        predicted = compensation(one_fold, {name: values[validation] for name, values in columns.items()})
-        losses.append(np.square(predicted - targets["none"][:, validation]).mean())
-    assert best["value"] == pytest.approx(np.mean(losses), rel=1e-4)
-
-
-def test_the_statistics_are_those_of_the_training_windows(columns, targets):
-    before = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].corrector.networks[0]
-    columns["u"][3] = 1e6  # a validation window
-    columns["starboard.n"][5] = -40.0  # equal to port in training all the same
-    targets["none"][:, 7] = 1e4
-    after = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].corrector.networks[0]
-    np.testing.assert_array_equal(after.normaliser.mean, before.normaliser.mean)
-    np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
-    assert after.features == before.features
-    assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
-
-
-def test_a_trained_path_keeps_metres(columns, targets):
-    method = PathTrained(trials=1, epochs=2)
-    (network,) = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)["none"].corrector.networks
-    np.testing.assert_array_equal(network.basis, np.eye(6))  # an output per step
-    assert list(network.features) == ["u", "v", "r", "port.n", "port.delta", "u_rw", "v_rw"]  # (13)
-
-
-@pytest.mark.parametrize("method", [DRAWN, SMALL])
-def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets, method):
-    good = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
-    targets["high-1"] = np.full_like(targets["high-1"], np.nan)
-    bad = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
-    assert bad["high-1"].corrector is None
-    assert [row["state"] for row in bad["high-1"].trials] == ["diverged"] * 3
-    np.testing.assert_allclose(
-        compensation(bad["none"].corrector, columns), compensation(good["none"].corrector, columns), atol=0.05
-    )
-
-
-@pytest.mark.parametrize(("method", "epochs"), [(DRAWN, 0), (SMALL, 40)])
-def test_rows_seconds_and_progress(columns, targets, method, epochs):
-    calls = []
-    tuned = tune(
-        columns, COMMANDS, targets, [FOLD], method, 1, on_trial=lambda done, total: calls.append((done, total))
-    )
-    assert calls == [(1, 3), (2, 3), (3, 3)]
-    for one in tuned.values():
-        assert [row["number"] for row in one.trials] == [0, 1, 2]
-        assert {row["state"] for row in one.trials} == {"complete"}
-        assert set(one.trials[0]["params"]) == set(one.corrector.hyperparameters)
-        assert set(one.trials[0]) == {"number", "params", "value", "seconds", "epochs", "state"}
-        assert one.seconds == pytest.approx(sum(row["seconds"] for row in one.trials))
-        assert one.seconds > 0
-        assert {row["epochs"] for row in one.trials} == {epochs}
-
-
-@pytest.mark.parametrize("method", [PathDrawn(), PathTrained()])
-def test_a_fold_without_windows_is_refused(columns, targets, method):
-    with pytest.raises(DataError, match="manoeuvres"):
-        tune(columns, COMMANDS, targets, [(np.arange(9), np.arange(0))], method, seed=1)
+def test_every_trial_is_a_row(make: Make, method: Method) -> None:
+    calls: list[tuple[int, int]] = []
+    task = replace(make(slow=SLOW), on_trial=lambda done, total: calls.append((done, total)))
+    found = method.fit(task)["slow"]
+    count = len(found.trials)
+    assert calls == [(number, count) for number in range(1, count + 1)]
+    assert [row["number"] for row in found.trials] == list(range(count))
+    for row in found.trials:
+        assert row.keys() == {"number", "params", "value", "seconds", "epochs", "state"}
+        assert set(method.varied()) <= row["params"].keys()
+        assert row["state"] == "complete"
+    if found.trials:
+        assert found.corrector is not None
+        best = min(found.trials, key=lambda row: row["value"])
+        assert found.corrector.hyperparameters == best["params"]
+    assert bool(found.trials) == method.compensates

@@ -1,20 +1,134 @@
-"""The physics of a predictor: its gradient is that of its paths, in moving water too."""
+"""The physics of a predictor: paths in the frame of the instant, their slopes, and what is refused."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from shipid.data.windows import Instants
-from shipid.hybrid.physics import Physics
-from shipid.observer import MEASURED, Observer
+from shipid.data.windows import Instants, Windows, cut_windows, to_frame
+from shipid.engine.rollout import rollout
+from shipid.errors import DataError, ShipidError
+from shipid.hybrid.physics import Physics, assumed, check_columns
+from shipid.observer import MEASURED, Observer, observe
+from shipid.study.prepare import at_instants
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
+from tests.study.test_commands import weaving
+from tests.study.test_whole import windy
 
 SHIP = load_vessel("gunnerus-28.9")
-NAME = "hull.derivatives.X_u|u|"
+RIGHT = Physics(SHIP, 5, 1.0)
+WRONG = RIGHT.with_values({"hull.derivatives.N_ur": -3e5})
 
 
-def instants(count: int = 4) -> Instants:
+@pytest.fixture(scope="module")
+def windows() -> Windows:
+    """Windows of runs in wind."""
+    return cut_windows(windy("ab"), horizon=5, interval=4.0)
+
+
+def test_paths_are_the_rollout_seen_from_the_instant(windows: Windows) -> None:
+    columns, model = windows.columns, dynamics(SHIP)
+    start, orders, weather = (
+        {name: columns[name] for name in names} for names in (model.state, model.commands, model.environment)
+    )
+    path = rollout(SHIP, start, orders, weather, step=1.0, num_steps=5)
+    north, east = (path[name][1:, 0] for name in ("north", "east"))
+    x, y = to_frame(north, east, columns["north"], columns["east"], columns["psi"])
+    np.testing.assert_allclose(RIGHT.paths(windows.instants()), np.stack([x, y], axis=-1), atol=1e-9)
+
+
+def test_known_commands_lead_the_ship_along_its_own_run() -> None:
+    windows = cut_windows(weaving("ab"), horizon=5)
+    np.testing.assert_allclose(RIGHT.paths(windows.instants(known=True)), windows.future, atol=1e-9)
+    assert np.abs(RIGHT.paths(windows.instants()) - windows.future).max() > 0.1
+
+
+def test_states_are_those_of_the_paths(windows: Windows) -> None:
+    states = RIGHT.states(windows.instants())
+    assert set(states) == {"x", "y", "u", "v", "r", "psi"}
+    np.testing.assert_allclose(
+        np.stack([states["x"], states["y"]], axis=-1), RIGHT.paths(windows.instants()), atol=1e-9
+    )
+    pushed = RIGHT.states(windows.instants(), np.tile([1e4, 0.0, 0.0], (5, len(windows), 1)))
+    assert (pushed["u"] > states["u"]).all()
+
+
+def test_no_physics_stays_where_it_is(windows: Windows) -> None:
+    none = Physics(None, 5, 1.0)
+    np.testing.assert_array_equal(none.paths(windows.instants()), np.zeros((5, len(windows), 2)))
+    assert none.with_values({"inertia.m": 1.0}) is none
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_the_slope_of_the_error_is_that_of_differences(seen: bool) -> None:
+    dataset = windy("ab")
+    windows = cut_windows(dataset, horizon=5, interval=4.0)
+    physics = replace(WRONG, observer=Observer()) if seen else WRONG
+    known = at_instants(dataset, windows, observe(SHIP, dataset, Observer()) if seen else None)
+    instants, names = windows.instants(estimates=known), ["hull.derivatives.N_ur", "inertia.m"]
+    values = np.array(list(SHIP.with_values({"hull.derivatives.N_ur": -3e5}).parameters.values()))
+    places = [list(SHIP.parameters).index(name) for name in names]
+    value, slope = physics.gradient(instants, windows.future, names)
+    error = np.square(physics.paths(instants) - windows.future).sum(axis=-1)
+    assert value == pytest.approx(error.mean(), rel=1e-9)
+    for place, each in zip(places, slope, strict=True):
+        step = 1e-4 * abs(values[place])
+        losses = []
+        for sign in (-1, 1):
+            moved = values.copy()
+            moved[place] += sign * step
+            losses.append(physics.gradient(instants, windows.future, names, moved)[0])
+        assert each == pytest.approx((losses[1] - losses[0]) / (2 * step), rel=1e-4)
+
+
+def test_distances_are_those_of_the_paths(windows: Windows) -> None:
+    instants = windows.instants()
+    found = WRONG.distances(instants, windows.future)
+    apart = np.linalg.norm(WRONG.paths(instants) - windows.future, axis=-1)
+    np.testing.assert_allclose(found.total[0], apart.sum(axis=0), rtol=1e-9)
+    assert found.tally.sum() == apart.size
+    assert not found.diverged.any()
+
+
+def test_an_observer_needs_its_estimates_and_takes_no_screening(windows: Windows) -> None:
+    physics = replace(RIGHT, observer=Observer())
+    with pytest.raises(DataError, match="instants must hold its estimates"):
+        physics.paths(windows.instants())
+    with pytest.raises(ShipidError, match="screening takes no observer"):
+        physics.distances(windows.instants(), windows.future)
+
+
+def test_still_water_and_a_right_start_leave_the_physics_as_it_is(windows: Windows) -> None:
+    """An observer that has seen no force, no current and no waves changes nothing."""
+    zero = np.zeros(len(windows))
+    known = {f"observer.{name}": windows.columns[name] for name in ("north", "east", "psi", "u", "v", "r")}
+    known |= {f"observer.{name}": zero for name in ("X", "Y", "N", "current_north", "current_east")}
+    seen = replace(RIGHT, observer=Observer()).paths(windows.instants(estimates=known))
+    np.testing.assert_allclose(seen, RIGHT.paths(windows.instants()), atol=1e-9)
+
+
+def test_what_is_not_measured_is_zero_and_said() -> None:
+    columns = {name: np.full(3, 0.5) for name in ("u", "v", "psi", *dynamics(SHIP).commands)}
+    assert assumed(SHIP, columns) == ["north", "east", "r", "V_w", "beta_w"]
+    zero = dict.fromkeys(assumed(SHIP, columns), np.zeros(3))
+    np.testing.assert_array_equal(RIGHT.paths(Instants(columns)), RIGHT.paths(Instants(columns | zero)))
+
+
+def test_a_missing_command_is_one_line_with_those_there_are() -> None:
+    with pytest.raises(DataError, match=r"the data have rudder\.delta") as caught:
+        check_columns(SHIP, {"u": np.zeros(1), "rudder.delta": np.zeros(1)}, "log.csv")
+    assert caught.value.path == "port.n"
+    assert "\n" not in str(caught.value)
+
+
+GUNNERUS = load_vessel("gunnerus-28.9")
+DRAG = "hull.derivatives.X_u|u|"
+
+
+def afloat(count: int = 4) -> Instants:
     """Instants anywhere on the chart, with what an observer knows: another filtered state, forces and a current."""
     rng = np.random.default_rng(7)
     spread = {"north": 50.0, "east": 50.0, "psi": 2.0, "u": 0.3, "v": 0.1, "r": 0.01}
@@ -30,24 +144,24 @@ def instants(count: int = 4) -> Instants:
 
 @pytest.mark.parametrize("observer", [None, Observer()])
 def test_the_error_of_a_gradient_is_that_of_the_paths(observer: Observer | None) -> None:
-    physics, here = Physics(SHIP, 6, 1.0, "euler", observer), instants()
+    physics, here = Physics(GUNNERUS, 6, 1.0, "euler", observer), afloat()
     future = physics.paths(here) + np.random.default_rng(1).normal(size=(6, len(here), 2))
-    value, slope = physics.gradient(here, future, [NAME])
+    value, slope = physics.gradient(here, future, [DRAG])
     assert value == pytest.approx(np.square(physics.paths(here) - future).sum(axis=-1).mean(), rel=1e-9)
-    number, step = SHIP.parameters[NAME], 1e-4 * SHIP.parameters[NAME]
-    moved = [physics.with_values({NAME: number + sign * step}).gradient(here, future, [])[0] for sign in (1, -1)]
+    number, step = GUNNERUS.parameters[DRAG], 1e-4 * GUNNERUS.parameters[DRAG]
+    moved = [physics.with_values({DRAG: number + sign * step}).gradient(here, future, [])[0] for sign in (1, -1)]
     assert slope[0] == pytest.approx((moved[0] - moved[1]) / (2 * step), rel=1e-5)
 
 
 def test_water_and_air_that_move_together_carry_the_path_along() -> None:
     """Heading north in still water and air, or in a stream to the east with its air: the stream's way apart."""
-    here, zero = instants(1), np.zeros(1)
+    here, zero = afloat(1), np.zeros(1)
     still = {f"observer.{name}": zero for name in ("psi", "v", "X", "Y", "N", "current_north", "current_east")}
     still = {**here.estimates, **still}
     stream = {**still, "observer.current_east": zero + 0.4, "observer.v": zero + 0.4}
     calm = {**here.columns, "psi": zero, "V_w": zero, "beta_w": zero}
     windy = {**calm, "V_w": zero + 0.4, "beta_w": zero + np.pi / 2}
-    physics = Physics(SHIP, 6, 1.0, "euler", Observer())
+    physics = Physics(GUNNERUS, 6, 1.0, "euler", Observer())
     one = physics.paths(Instants(calm, estimates=still))
     other = physics.paths(Instants(windy, estimates=stream))
     np.testing.assert_allclose((other - one)[:, 0], 0.4 * np.arange(1, 7)[:, None] * [0.0, 1.0], atol=1e-9)

@@ -8,22 +8,6 @@ from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.settings import spread
 
 
-def test_the_trained_path_is_what_the_method_pins():
-    assert PathTrained().model_dump() == {
-        "trials": 50,
-        "layers": (1, 3),
-        "units": (10, 500),
-        "input_dropout": (0.0, 1.0),
-        "hidden_dropout": (0.0, 1.0),
-        "learning_rate": (1e-5, 1e-1),
-        "weight_decay": 0.0,  # Adam
-        "epochs": 3000,
-        "batch": 0,  # full
-        "patience": 200,
-        "memory": {"history": (), "turned": (), "error": (), "observer": False},
-    }
-
-
 def test_a_field_can_be_changed_in_either_method():
     assert PathTrained(trials=4, learning_rate=[1e-3, 1e-2]).ranges()["learning_rate"] == (1e-3, 1e-2)
     assert PathTrained(trials=3, units=20).units == 20

@@ -20,6 +20,7 @@ def one(phi: float = 0.0, seed: int = 3, **more: object) -> LinearFit:
     return fitted(JACOBIAN, noise(np.random.default_rng(seed), RUNS, SAMPLES, phi), CLUSTERS, NAMES, **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (8, 60, 0.8), (4, 200, 0.8)])
 def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, phi: float) -> None:
     """200 replicates: 95 % on average within 92..98, no parameter below 90."""

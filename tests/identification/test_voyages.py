@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from shipid.identification.free_run import ALL
 from shipid.identification.outcome import run_identification
 from tests.identification.voyages import SETTINGS, guess, voyages
 
 
+@pytest.mark.slow
 def test_a_first_guess_becomes_a_ship_that_predicts() -> None:
     data = voyages(6, 40.0, 80.0)
     settings = SETTINGS.model_copy(update={"step": 0.5})

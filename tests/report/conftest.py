@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 from shipid.report import Finding, ReportContent, Sentence, Snapshot
+from shipid.report.section import Drawn, drawn
+from shipid.report.sections import SECTIONS
 
 NASTY = "<script>alert('x')</script>"
 OUTLINE = np.array([[14.5, 0.0], [9.0, 4.8], [-14.4, 4.8], [-14.4, -4.8], [9.0, -4.8]])
@@ -262,4 +264,22 @@ def away() -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
 
 @pytest.fixture(scope="session", params=["simulation", "full_scale"])
 def content(request: pytest.FixtureRequest) -> ReportContent:
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="session")
+def simulation_drawn(simulation: ReportContent) -> list[Drawn]:
+    """Every section of the simulation, drawn once; not to be changed."""
+    return drawn(SECTIONS, simulation)
+
+
+@pytest.fixture(scope="session")
+def full_scale_drawn(full_scale: ReportContent) -> list[Drawn]:
+    """Every section of the full scale, drawn once; not to be changed."""
+    return drawn(SECTIONS, full_scale)
+
+
+@pytest.fixture(params=["simulation_drawn", "full_scale_drawn"])
+def sections(request: pytest.FixtureRequest) -> list[Drawn]:
+    """The sections of each study in turn."""
     return request.getfixturevalue(request.param)

@@ -156,17 +156,17 @@ def test_structure_for_those_who_listen(page):
     assert all(a["role"] == "img" and len(a["aria-label"]) > 40 for a in plots)
 
 
-def test_every_figure_speaks(content):
-    for section in drawn(SECTIONS, content):
+def test_every_figure_speaks(sections):
+    for section in sections:
         for item in section.items:
             if isinstance(item, Figure):
                 assert re.search(r"\d.*\.$", item.takeaway), item.id
                 assert re.fullmatch(r"(\S+ )+\S+\.", item.how), item.id
 
 
-def test_axes_have_units(content):
+def test_axes_have_units(sections):
     seen = 0
-    for section in drawn(SECTIONS, content):
+    for section in sections:
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
                 for name, drawn_axis in panel.figure.layout.to_plotly_json().items():
@@ -177,9 +177,9 @@ def test_axes_have_units(content):
     assert seen > 20
 
 
-def test_a_line_of_a_model_has_its_colour_everywhere(content):
+def test_a_line_of_a_model_has_its_colour_everywhere(sections):
     found: dict[str, set[str]] = {}
-    for section in drawn(SECTIONS, content):
+    for section in sections:
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
                 for trace in panel.figure.data:
@@ -193,8 +193,8 @@ def test_a_line_of_a_model_has_its_colour_everywhere(content):
     assert {key: colours for key, colours in found.items() if len(colours) > 1} == {}
 
 
-def test_views_exist_for_every_choice(content):
-    for section in drawn(SECTIONS, content):
+def test_views_exist_for_every_choice(sections):
+    for section in sections:
         for item in section.items:
             if isinstance(item, Figure) and item.views and item.controls:
                 shape = [len(control.options) for control in item.controls]

@@ -16,11 +16,11 @@ PAGES = {
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_every_item_drawn_is_declared_and_no_id_twice(page, simulation):
+def test_every_item_drawn_is_declared_and_no_id_twice(page, simulation_drawn):
     """What a section draws, its anchors name: a sentence may link to it."""
     sections, make = PAGES[page]
     seen = []
-    for one in drawn(sections, make() if make else simulation):
+    for one in drawn(sections, make()) if make else simulation_drawn:
         ids = [item.id for item in one.items]
         assert set(ids) <= set(sections[one.id].anchors), one.id
         seen += ids
@@ -28,8 +28,8 @@ def test_every_item_drawn_is_declared_and_no_id_twice(page, simulation):
     assert not set(seen) & set(sections), "a section and an item need different ids" if page == "study" else ""
 
 
-def test_a_full_study_draws_every_declared_item(simulation):
-    for one in drawn(SECTIONS, simulation):
+def test_a_full_study_draws_every_declared_item(simulation_drawn):
+    for one in simulation_drawn:
         assert [item.id for item in one.items] == list(SECTIONS[one.id].anchors)
 
 

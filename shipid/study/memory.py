@@ -1,0 +1,271 @@
+"""What the past tells: the observer along test runs, and what memory and observer bought, paired over test runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from shipid.hybrid.features import NOTHING
+from shipid.metrics import over_time, position_error
+from shipid.observer import bank, observe
+from shipid.predictor import Predictor
+from shipid.study import store
+from shipid.study.plan import Foundation, Plan, Way
+from shipid.study.results import Results, shown_runs, with_gaps
+
+Array = np.ndarray
+Added = Literal["memory", "observer", "both"]
+ALONE = "physics alone"
+RESAMPLES, SEED = 2000, 0  # of the bootstrap over test runs
+ORDER = 0.05  # share of a command's range in a run that counts as a new order
+NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
+ALONG = [
+    *("u", "v", "r", "observer.u", "observer.v", "observer.r", "observer.X", "observer.Y", "observer.N"),
+    *("observer.current_north", "observer.current_east", "observer.test"),
+]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two ways to predict that differ in what they take from the past.
+
+    added : what the second takes beside the first. comparison : the same in words, for all models alike.
+    without, remembering : foundation and method of both; the method is `physics alone` where there is none.
+    differs : settings in which the methods differ beside those of memory.
+    """
+
+    added: Added
+    comparison: str
+    without: tuple[str, str]
+    remembering: tuple[str, str]
+    differs: tuple[str, ...] = ()
+
+
+def pairs(plan: Plan) -> list[Pair]:
+    """Every pair of a study: the same foundation with and without memory, and every observed one with its original.
+
+    Methods are compared with others of their kind alone: between kinds, memory is not all that differs.
+    """
+    found = []
+    for one in plan.foundations:
+        found += [_memory_pair(one, one, way, rival) for way, rival in _rivals(plan, one, one)]
+    for observed, original in _observed(plan):
+        if observed.identify is None:
+            label = f"observer: {ALONE}"
+            found.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
+        for way in plan.methods:
+            if observed.name in way.foundations and original.name in way.foundations:
+                label = f"observer: {way.name}"
+                found.append(Pair("observer", label, (original.name, way.name), (observed.name, way.name)))
+        found += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(plan, original, observed)]
+    order: dict[Added, int] = {"memory": 0, "observer": 1, "both": 2}
+    return sorted(found, key=lambda pair: order[pair.added])
+
+
+def taken(way: Way, foundation: Foundation) -> frozenset[str]:
+    """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
+    memory = getattr(way.method, "memory", NOTHING)
+    found = {"history"} if memory.history or memory.turned else set()
+    found |= {"error"} if memory.error and foundation.base is not None else set()
+    if not found and not memory.past and way.method.past > 0:
+        found = {"past"}
+    return frozenset(found | ({"observer"} if memory.observer and foundation.observer is not None else set()))
+
+
+def _rivals(plan: Plan, original: Foundation, observed: Foundation) -> Iterator[tuple[Way, Way]]:
+    """Each method with memory on one foundation, and the method of its kind that takes least on the other."""
+    for way in plan.methods:
+        if observed.name not in way.foundations:
+            continue
+        mine = taken(way, observed)
+        others = [one for one in plan.methods if one.kind == way.kind and original.name in one.foundations]
+        fewer = [one for one in others if one is not way and taken(one, original) < mine]
+        if original is not observed and not mine - {"observer"}:
+            continue  # the observer alone: compared with the same method
+        if fewer:
+            yield way, min(fewer, key=lambda one: (len(taken(one, original)), len(_differing(way, one))))
+
+
+def _memory_pair(original: Foundation, observed: Foundation, way: Way, rival: Way) -> Pair:
+    added: Added = "memory" if original is observed else "both"
+    words = "memory" if original is observed else "observer and memory"
+    names = (original.name, rival.name), (observed.name, way.name)
+    return Pair(added, f"{words}: {way.name} against {rival.name}", *names, _differing(way, rival))
+
+
+def _differing(one: Way, other: Way) -> tuple[str, ...]:
+    """Settings, memory's apart, that differ between two methods of a kind."""
+    mine, theirs = one.method.model_dump(mode="json"), other.method.model_dump(mode="json")
+    return tuple(name for name in mine if name not in NOT_COMPARED and mine[name] != theirs.get(name))
+
+
+def _observed(plan: Plan) -> Iterator[tuple[Foundation, Foundation]]:
+    """Every foundation with an observer and the same without one, where the study has it."""
+    for one in plan.foundations:
+        if one.observer is None or one.variant is None:
+            continue
+        for other in plan.foundations:
+            same = other.variant is not None and other.variant.name == one.variant.name
+            if same and other.observer is None and other.identify == one.identify:
+                yield one, other
+
+
+def paired_interval(difference: Array, counts: Array) -> tuple[float, float]:
+    """95 % interval of a mean difference over windows by a bootstrap over test runs.
+
+    Runs are drawn whole, with replacement, because windows of one run are alike. No number from a single run.
+
+    Parameters
+    ----------
+    difference : (R,) sum of the differences over the windows of each run.
+    counts : (R,) number of windows of each run.
+    """
+    if len(counts) < 2:
+        return np.nan, np.nan
+    drawn = np.random.default_rng(SEED).integers(0, len(counts), (RESAMPLES, len(counts)))
+    means = difference[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def memory_frame(results: Results) -> pd.DataFrame:
+    """H [m] of both members of every pair at every N_D, and their difference with its paired 95 % interval.
+
+    Columns: comparison, added, model (the foundation without), without, with, N_D (0: physics alone), A [m] of the
+    foundation without, H_without, H_with, difference, low, high [m], runs, better (test runs with a lower error), seeds
+    (that both have), differs.
+    """
+    rows = []
+    runs, place = np.unique(results.test.run, return_inverse=True)
+    counts = np.bincount(place).astype(float)
+    for pair, N_D, before, after, seeds in _errors(results):
+        sums = np.bincount(place, after - before)
+        low, high = paired_interval(sums, counts)
+        rows.append(
+            _names(results.plan, pair)
+            | {"N_D": N_D, "A": _accuracy(results, pair.without[0], N_D)}
+            | {"H_without": before.mean(), "H_with": after.mean(), "difference": (after - before).mean()}
+            | {"low": low, "high": high, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
+            | {"differs": ", ".join(pair.differs)}
+        )
+    return pd.DataFrame(rows)
+
+
+def memory_time_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon [m] at each instant of the shown test runs, of both members of every pair.
+
+    Columns: comparison, model, without, with, N_D, run, t [s], error_without, error_with [m]; mean over seeds; the
+    largest N_D alone.
+    """
+    shown = np.isin(results.test.run, shown_runs(results))
+    parts, largest = [], int(results.cells["N_D"].max())
+    for pair, N_D, before, after, _ in _errors(results):
+        if N_D in (0, largest):
+            names = {key: value for key, value in _names(results.plan, pair).items() if key != "added"}
+            columns = {"run": results.test.run[shown], "t": results.test.t[shown]}
+            columns |= {"error_without": before[shown], "error_with": after[shown]}
+            parts.append(pd.DataFrame({**names, "N_D": N_D, **columns}))
+    if not parts:
+        return pd.DataFrame()
+    return with_gaps(pd.concat(parts, ignore_index=True), ["comparison", "model", "without", "with", "N_D", "run"])
+
+
+def _names(plan: Plan, pair: Pair) -> dict[str, Any]:
+    words = [
+        f"{name}, {ALONE}" if method == ALONE else plan.label(name, method)
+        for name, method in (pair.without, pair.remembering)
+    ]
+    named = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
+    return named | {"without": words[0], "with": words[1]}
+
+
+def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array, int]]:
+    """Pair, N_D, mean error over the horizon (S,) [m] of both over the seeds that both have, and how many these are."""
+    cells: dict[tuple[str, str, int], dict[int, str]] = {}
+    for row in results.rows:
+        if row["cell"] in results.paths:
+            key = str(row["foundation"]), str(row["method"]), int(row["N_D"])
+            cells.setdefault(key, {})[int(row["seed"])] = str(row["cell"])
+    amounts = sorted({key[2] for key in cells})
+    known: dict[str, Array] = {}
+
+    def error(cell: str) -> Array:
+        if cell not in known:
+            known[cell] = over_time(position_error(results.paths[cell], results.test.future))
+        return known[cell]
+
+    for pair in pairs(results.plan):
+        if pair.without[1] == ALONE:
+            alone = [results.physics.get(name) for name, _ in (pair.without, pair.remembering)]
+            finite = [path for path in alone if path is not None and np.isfinite(path).all()]
+            if len(finite) == 2:
+                before, after = (over_time(position_error(path, results.test.future)) for path in finite)
+                yield pair, 0, before, after, 1
+            continue
+        for N_D in amounts:
+            first, second = cells.get((*pair.without, N_D), {}), cells.get((*pair.remembering, N_D), {})
+            seeds = sorted(first.keys() & second.keys())
+            if seeds:
+                both = [np.mean([error(one[seed]) for seed in seeds], axis=0) for one in (first, second)]
+                yield pair, N_D, both[0], both[1], len(seeds)
+
+
+def _accuracy(results: Results, foundation: str, N_D: int) -> float:
+    """A [m] of a foundation; of the numbers identified at this N_D, where they are."""
+    cells = results.cells[results.cells["foundation"] == foundation]
+    here = cells[cells["N_D"] == N_D] if N_D else cells
+    return float(here["A"].astype(float).mean())
+
+
+def observer_frame(results: Results) -> pd.DataFrame:
+    """What the observer of one foundation thinks along the shown test runs; no rows in a study without observers.
+
+    Columns: run, t [s]; u, v, r as measured; `observer.u`, ... as filtered; `observer.X`, `.Y` [m/s^2], `.N` [rad/s^2];
+    `observer.current_north`, `.current_east` [m/s]; `observer.test` [1]; model; fade [s], the time constant of the
+    force ahead; ahead [s], the horizon.
+    """
+    predictor = _exemplar(results)
+    if predictor is None or predictor[1].vessel is None:
+        return pd.DataFrame()
+    name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
+    frame = results.dataset.frame
+    frame = frame[frame["run"].isin(shown_runs(results))].reset_index(drop=True)
+    part = replace(results.dataset, frame=frame)
+    known = observe(vessel, part, settings)
+    begins = np.isnan(known.innovation).all(axis=1)
+    table = pd.DataFrame({**frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
+    table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
+    table = table.assign(model=name, fade=bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step)
+    return with_gaps(table, ["run", "model", "fade", "ahead"])
+
+
+def orders_frame(results: Results) -> pd.DataFrame:
+    """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
+    found = []
+    for run, rows in results.dataset.frame.groupby("run", sort=False):
+        if run in shown_runs(results):
+            values = rows[results.dataset.commands].to_numpy(dtype=float)
+            steps = np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9
+            moved = steps.any(axis=1)
+            begins = moved & ~np.concatenate([[False], moved[:-1]])
+            found += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
+    return pd.DataFrame(found, columns=["run", "t"])
+
+
+def _exemplar(results: Results) -> tuple[str, Predictor] | None:
+    """The observed foundation that is shown and a predictor on it: of the first family, the one of middle A."""
+    observed = [one for one in results.plan.foundations if one.observer is not None]
+    observed.sort(key=lambda one: one.identify is not None)
+    good = results.cells[results.cells["cell"].isin(list(results.paths))]
+    known = [one for one in observed if (good["foundation"] == one.name).any()]
+    if not known:
+        return None
+    family = [one.name for one in known if one.family == known[0].family]
+    A = good[good["foundation"].isin(family)].groupby("foundation")["A"].mean().sort_values(kind="stable")
+    name = str(A.index[(len(A) - 1) // 2])
+    cells = good[good["foundation"] == name].sort_values(["N_D", "seed"], ascending=[False, True], kind="stable")
+    return name, Predictor.load(store.cell_file(results.folder, str(cells["cell"].iloc[0])))

@@ -1,0 +1,30 @@
+"""Physics alone: the path of the foundation, whatever the data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.data.windows import Instants
+from shipid.errors import DocumentError
+from shipid.hybrid.alone import Alone, Unchanged
+from shipid.hybrid.methods import method_of
+from shipid.hybrid.physics import Physics
+
+
+def test_the_path_of_the_physics_is_the_prediction() -> None:
+    paths = np.random.default_rng(0).normal(size=(5, 7, 2))
+    assert Unchanged({}).predict(Physics(None, 5, 1.0), Instants({"u": np.zeros(7)}), paths) is paths
+
+
+def test_it_learns_nothing_and_needs_physics() -> None:
+    assert not Alone.compensates
+    assert not Alone.meets_none
+    assert Alone().varied() == ()
+    assert Alone().past == 0.0
+    assert Unchanged.from_arrays({}, {}) == Unchanged({})
+
+
+def test_it_has_no_settings() -> None:
+    with pytest.raises(DocumentError, match=r"method\.trials: unknown key"):
+        method_of("alone", {"trials": 3})

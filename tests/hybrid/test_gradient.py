@@ -1,0 +1,142 @@
+"""Tuning by gradients, beside the drawn path where both promise the same."""
+
+import numpy as np
+import pytest
+import torch
+
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.training import train
+from tests.hybrid.tasks import compensation, tune
+
+torch.set_num_threads(1)
+COMMANDS = ("port.n", "port.delta", "starboard.n", "starboard.delta")
+SMALL = PathTrained(trials=3, units=16, layers=1, learning_rate=1e-2, epochs=40, patience=0)
+SEARCHED = PathTrained(trials=3, epochs=20)
+DRAWN = PathDrawn(trials=3, units=32, terms=4)
+FOLD = (np.arange(40, 200), np.arange(40))
+
+
+@pytest.fixture
+def columns():
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=240) for name in ("psi", "u", "v", "r", "V_w", "beta_w", "port.n", "port.delta")}
+    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.delta": columns["port.delta"].copy()}
+
+
+@pytest.fixture
+def targets(columns):
+    """What two models miss (6, 240, 2): a smooth function of the inputs that grows along the horizon."""
+    steps = np.arange(1.0, 7.0)[:, None]
+    x = steps * columns["u"] + 0.1 * steps**2 * np.tanh(columns["port.n"])
+    y = steps * columns["v"] + 0.2 * steps**2 * columns["r"] * columns["port.delta"]
+    return {"high-1": np.stack([x, y], axis=-1), "none": np.stack([5.0 * x, -3.0 * y], axis=-1)}
+
+
+def same(a, b):
+    return a.header() == b.header() and all(np.array_equal(v, b.arrays()[k]) for k, v in a.arrays().items())
+
+
+@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
+def test_the_same_seed_gives_the_same_numbers(columns, targets, method):
+    first, again = (tune(columns, COMMANDS, targets, [FOLD], method, seed=4) for _ in range(2))
+    other = tune(columns, COMMANDS, targets, [FOLD], method, seed=5)
+    for key in targets:
+        assert same(first[key].corrector, again[key].corrector)
+        assert not same(first[key].corrector, other[key].corrector)
+        assert [row["value"] for row in first[key].trials] == [row["value"] for row in again[key].trials]
+
+
+@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
+def test_a_model_does_not_notice_its_company(columns, targets, method):
+    together = tune(columns, COMMANDS, targets, [FOLD], method, seed=4)
+    alone = tune(columns, COMMANDS, {"none": targets["none"]}, [FOLD], method, seed=4)
+    np.testing.assert_allclose(
+        compensation(alone["none"].corrector, columns), compensation(together["none"].corrector, columns), atol=0.05
+    )
+
+
+def test_the_residual_is_learned(columns, targets):
+    kept = {"trials": 1, "input_dropout": 0.0, "hidden_dropout": 0.0, "learning_rate": 0.03, "epochs": 400}
+    for key, tuned in tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=kept), seed=0).items():
+        unseen = np.arange(200, 240)
+        predicted = compensation(tuned.corrector, {name: values[unseen] for name, values in columns.items()})
+        left = np.square(predicted - targets[key][:, unseen]).mean()
+        assert left < 0.5 * np.square(targets[key][:, unseen]).mean()
+
+
+def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
+    stacks = []
+
+    def counted(inputs, targets, *args, **kwargs):
+        stacks.append(len(targets))
+        return train(inputs, targets, *args, **kwargs)
+
+    monkeypatch.setattr("shipid.hybrid.gradient.train", counted)
+    tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
+    assert stacks == [2] * 3
+    stacks.clear()
+    tune(columns, COMMANDS, targets, [FOLD], SEARCHED.model_copy(update={"epochs": 2}), seed=4)
+    assert stacks == [1] * 6
+
+
+def test_the_objective_is_the_mean_loss_of_the_folds(columns, targets):
+    folds = [(np.arange(80, 240), np.arange(80)), (np.arange(160), np.arange(160, 240))]
+    tuned = tune(columns, COMMANDS, targets, folds, SMALL, seed=1)["none"]
+    best = min(tuned.trials, key=lambda row: row["value"])
+    assert tuned.corrector.hyperparameters == best["params"]
+    losses = []
+    for network, (_, validation) in zip(tuned.corrector.networks, folds, strict=True):
+        one_fold = type(tuned.corrector)(Inputs(COMMANDS), (network,), {})
+        predicted = compensation(one_fold, {name: values[validation] for name, values in columns.items()})
+        losses.append(np.square(predicted - targets["none"][:, validation]).mean())
+    assert best["value"] == pytest.approx(np.mean(losses), rel=1e-4)
+
+
+def test_the_statistics_are_those_of_the_training_windows(columns, targets):
+    before = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].corrector.networks[0]
+    columns["u"][3] = 1e6  # a validation window
+    columns["starboard.n"][5] = -40.0  # equal to port in training all the same
+    targets["none"][:, 7] = 1e4
+    after = tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=1)["none"].corrector.networks[0]
+    np.testing.assert_array_equal(after.normaliser.mean, before.normaliser.mean)
+    np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
+    assert after.features == before.features
+    assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
+
+
+@pytest.mark.parametrize("method", [DRAWN, SMALL])
+def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets, method):
+    good = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
+    targets["high-1"] = np.full_like(targets["high-1"], np.nan)
+    bad = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
+    assert bad["high-1"].corrector is None
+    assert [row["state"] for row in bad["high-1"].trials] == ["diverged"] * 3
+    np.testing.assert_allclose(
+        compensation(bad["none"].corrector, columns), compensation(good["none"].corrector, columns), atol=0.05
+    )
+
+
+@pytest.mark.parametrize(("method", "epochs"), [(DRAWN, 0), (SMALL, 40)])
+def test_rows_seconds_and_progress(columns, targets, method, epochs):
+    calls = []
+    tuned = tune(
+        columns, COMMANDS, targets, [FOLD], method, 1, on_trial=lambda done, total: calls.append((done, total))
+    )
+    assert calls == [(1, 3), (2, 3), (3, 3)]
+    for one in tuned.values():
+        assert [row["number"] for row in one.trials] == [0, 1, 2]
+        assert {row["state"] for row in one.trials} == {"complete"}
+        assert set(one.trials[0]["params"]) == set(one.corrector.hyperparameters)
+        assert set(one.trials[0]) == {"number", "params", "value", "seconds", "epochs", "state"}
+        assert one.seconds == pytest.approx(sum(row["seconds"] for row in one.trials))
+        assert one.seconds > 0
+        assert {row["epochs"] for row in one.trials} == {epochs}
+
+
+def test_a_trained_path_keeps_metres(columns, targets):
+    method = PathTrained(trials=1, epochs=2)
+    (network,) = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)["none"].corrector.networks
+    np.testing.assert_array_equal(network.basis, np.eye(6))  # an output per step
+    assert list(network.features) == ["u", "v", "r", "port.n", "port.delta", "u_rw", "v_rw"]  # (13)

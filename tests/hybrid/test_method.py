@@ -1,0 +1,75 @@
+"""The skeleton of a method: what a task holds, and inputs that foundations share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.data.windows import cut_windows
+from shipid.errors import DataError
+from shipid.hybrid.features import Inputs, Memory
+from shipid.hybrid.method import Case, Method, Task, same_table, shared_tables
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import load_vessel
+from tests.study.test_whole import windy
+
+SHIP = load_vessel("gunnerus-28.9")
+
+
+def task(**options: object) -> Task:
+    """Two ships and no physics on a few windows."""
+    windows = cut_windows(windy("ab"), horizon=3, interval=5.0, past=4)
+    wrong = SHIP.with_values({"hull.derivatives.N_ur": -3e5})
+    every = {"right": Physics(SHIP, 3, 1.0), "wrong": Physics(wrong, 3, 1.0), "none": Physics(None, 3, 1.0)}
+    cases = {name: Case(physics, physics.paths(windows.instants())) for name, physics in every.items()}
+    folds = [(np.flatnonzero(windows.run == "a"), np.flatnonzero(windows.run == "b"))]
+    commands = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
+    return Task(cases, windows, options.pop("folds", folds), commands, **options)  # type: ignore[arg-type]
+
+
+def test_targets_are_what_the_physics_misses() -> None:
+    given = task()
+    np.testing.assert_array_equal(given.targets["none"], given.windows.future)
+    np.testing.assert_allclose(given.targets["wrong"] + given.cases["wrong"].paths, given.windows.future, atol=1e-12)
+
+
+def test_instants_hold_what_belongs_to_the_foundation() -> None:
+    count = len(task().windows)
+    given = task(estimates={"wrong": {"observer.u": np.ones(count)}}, hidden={"right": {"port.n": np.zeros(count)}})
+    assert set(given.instants("wrong").estimates) == {"observer.u"}
+    assert given.instants("wrong").hidden is None
+    assert given.instants("right").hidden is not None
+    assert not given.instants("right").estimates
+    assert given.instants("none").planned is None
+    assert task(known=True).instants("none").planned is not None
+
+
+@pytest.mark.parametrize("empty", [0, 1])
+def test_a_fold_without_windows_is_refused(empty: int) -> None:
+    fold = [np.arange(4), np.arange(4, 8)]
+    fold[empty] = np.arange(0)
+    with pytest.raises(DataError, match="use more manoeuvres") as caught:
+        task(folds=[tuple(fold)])
+    assert "\n" not in str(caught.value)
+
+
+def test_inputs_without_physics_are_one_array_for_all() -> None:
+    given = task()
+    inputs = Inputs(given.commands, Memory(history=(2.0,), error=(4.0,)))
+    tables = shared_tables(given, inputs)
+    assert tables["right"]["past-2.u"] is tables["none"]["past-2.u"]
+    assert "error-4.x" not in tables["none"]
+    assert np.abs(tables["right"]["error-4.x"] - tables["wrong"]["error-4.x"]).max() > 0
+    assert len({same_table(table) for table in tables.values()}) == 3
+    plain = shared_tables(given, Inputs(given.commands))
+    assert len({same_table(table) for table in plain.values()}) == 1
+    for name, table in tables.items():
+        alone = inputs.table(given.cases[name].physics, given.instants(name))
+        assert table.keys() == alone.keys()
+        for key, values in alone.items():
+            np.testing.assert_array_equal(table[key], values)
+
+
+def test_a_method_without_a_fit_says_so() -> None:
+    with pytest.raises(NotImplementedError):
+        Method().fit(task())

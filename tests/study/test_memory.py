@@ -1,0 +1,158 @@
+"""What the past tells: pairs, intervals over test runs, and the frames of a small study with memory and observer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.metrics import position_error
+from shipid.report.section import drawn
+from shipid.report.sections import SECTIONS
+from shipid.study import memory
+from shipid.study.contents import report_content
+from shipid.study.results import Results, read_results
+from tests.study.tiny import run_here, tiny_plan
+
+SMALL: dict[str, Any] = {"kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
+CHANGES: dict[str, Any] = {
+    "truth.run_up": 4.0,
+    "method": [
+        {"name": "drawn", **SMALL},
+        {"name": "remembers", **SMALL, "memory": {"history": [2.0], "error": 4.0}},
+        {"name": "alone", "kind": "alone", "families": ["wrong*"]},
+    ],
+    "family": [
+        {"name": "wrong", "base": "gunnerus-28.9", "members": 2,
+         "perturb": [{"parameters": ["hull.derivatives.*"], "factor": [0.4, 1.6]}]},
+        {"name": "seen", "extends": "wrong", "observer": {"fade": 6.0}},
+    ],
+}  # fmt: skip
+COMPARED = {
+    "memory: remembers against drawn": {"wrong-1", "wrong-2", "seen-1", "seen-2", "none"},
+    "observer: physics alone": {"wrong-1", "wrong-2"},
+    "observer: drawn": {"wrong-1", "wrong-2"},
+    "observer: remembers": {"wrong-1", "wrong-2"},
+    "observer and memory: remembers against drawn": {"wrong-1", "wrong-2"},
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("past")
+    run_here(tiny_plan(folder, CHANGES), folder / "run")
+    return read_results(folder / "run")
+
+
+def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
+    found: dict[str, set[str]] = {}
+    for pair in memory.pairs(results.plan):
+        found.setdefault(pair.comparison, set()).add(pair.without[0])
+        assert pair.differs == ()
+        same = pair.without[0] == pair.remembering[0]
+        assert same == (pair.added == "memory")
+    assert found == COMPARED
+
+
+def test_what_differs_beside_memory_is_named(tmp_path: Path) -> None:
+    uneven = [CHANGES["method"][0], {**CHANGES["method"][1], "trials": 2}]
+    plan = tiny_plan(tmp_path, {**CHANGES, "method": uneven})
+    assert {pair.differs for pair in memory.pairs(plan) if pair.added != "observer"} == {("trials",)}
+
+
+def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
+    other = [{"name": "trained", "kind": "path-trained", "trials": 1}, CHANGES["method"][1]]
+    plan = tiny_plan(tmp_path, {**CHANGES, "method": other})
+    assert {pair.added for pair in memory.pairs(plan)} == {"observer"}
+
+
+def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:
+    results = read_results(tiny_run)
+    assert memory.memory_frame(results).empty
+    assert memory.memory_time_frame(results).empty
+    assert memory.observer_frame(results).empty
+    assert "the-past" not in {one.id for one in drawn(SECTIONS, report_content(results))}
+
+
+def test_the_frame_holds_the_mean_errors_of_both(results: Results) -> None:
+    frame = memory.memory_frame(results)
+    assert set(frame["N_D"]) == {0, 4, 6}
+    row = frame[frame["comparison"].eq("observer and memory: remembers against drawn") & frame["N_D"].eq(6)].iloc[0]
+    H = results.cells.set_index("cell")["H"]
+    assert row["H_without"] == pytest.approx(H["wrong-1+drawn-N0006-s0"])
+    assert row["H_with"] == pytest.approx(H["seen-1+remembers-N0006-s0"])
+    assert row["difference"] == pytest.approx(row["H_with"] - row["H_without"])
+    assert row["low"] <= row["difference"] <= row["high"]
+    assert row["without"] == "wrong-1 + drawn"
+    alone = frame[frame["N_D"] == 0].set_index("model")
+    for member in (1, 2):
+        A = [
+            position_error(results.physics[f"{name}-{member}"], results.test.future).mean()
+            for name in ("wrong", "seen")
+        ]
+        assert alone.loc[f"wrong-{member}", ["H_without", "H_with"]].tolist() == pytest.approx(A)
+        assert alone.loc[f"wrong-{member}", "A"] == pytest.approx(A[0])
+
+
+def test_window_by_window_means_what_the_whole_does(results: Results) -> None:
+    """All four test runs of this study are shown, so the mean over windows is H at the largest N_D."""
+    frame, sums = memory.memory_time_frame(results), memory.memory_frame(results)
+    means = frame.groupby(["comparison", "model"])[["error_without", "error_with"]].mean()
+    whole = sums[sums["N_D"].isin([0, 6])].set_index(["comparison", "model"])
+    assert set(means.index) == set(whole.index)
+    for key, row in means.iterrows():
+        assert row.tolist() == pytest.approx(whole.loc[key, ["H_without", "H_with"]].tolist())
+
+
+def test_the_observer_frame_holds_every_row_of_the_shown_runs(results: Results) -> None:
+    frame = memory.observer_frame(results)
+    rows = results.dataset.frame
+    rows = rows[rows["run"].isin(set(results.test.run))]
+    assert frame["t"].tolist() == rows["t"].tolist()
+    assert frame["u"].tolist() == rows["u"].tolist()
+    assert frame["model"].iloc[0] in {"seen-1", "seen-2"}
+    assert frame["fade"].iloc[0] == pytest.approx(6.0 * np.sqrt(28.9 / 9.81), rel=0.05)
+    assert frame["ahead"].iloc[0] == 5.0
+    first = frame.groupby("run").head(1)
+    assert first["observer.test"].isna().all()
+    assert frame.drop(first.index)["observer.test"].notna().all()
+
+
+def test_an_order_is_marked_once(results: Results) -> None:
+    frame = results.dataset.frame.copy()
+    run = str(results.test.run[0])
+    place = frame.index[frame["run"] == run][10]
+    name = results.dataset.commands[0]
+    frame.loc[(frame["run"] == run) & (frame.index >= place), name] += 0.3
+    frame.loc[place, name] -= 0.1  # a ramp of two rows is one order
+    changed = type(results.dataset)(frame, results.dataset.metadata)
+    before = memory.orders_frame(results)
+    after = memory.orders_frame(type(results)(**{**vars(results), "dataset": changed}))
+    assert len(after) == len(before) + 1
+    assert after[after["run"] == run]["t"].tolist() == [frame["t"][place]]
+
+
+def test_interval_of_one_run_is_no_number() -> None:
+    assert np.isnan(memory.paired_interval(np.array([1.0]), np.array([5.0]))).all()
+
+
+def test_interval_of_equal_runs_has_no_width() -> None:
+    counts = np.array([2.0, 3.0, 7.0])
+    assert memory.paired_interval(-0.4 * counts, counts) == pytest.approx((-0.4, -0.4))
+
+
+def test_interval_covers_as_often_as_it_says() -> None:
+    """Of 300 studies with 20 test runs each and a true difference of 0, some 5 % have an interval free of it."""
+    random, missed = np.random.default_rng(5), 0
+    for _ in range(300):
+        counts = random.integers(20, 60, 20).astype(float)
+        low, high = memory.paired_interval(counts * random.normal(0, 1, 20), counts)
+        missed += not low <= 0 <= high
+    assert 0.02 < missed / 300 < 0.12
+
+
+def test_the_page_shows_it(results: Results) -> None:
+    sections = {one.id: one for one in drawn(SECTIONS, report_content(results))}
+    assert [item.id for item in sections["the-past"].items] == list(SECTIONS["the-past"].anchors)

@@ -1,0 +1,42 @@
+"""No module of the package imports itself by way of others."""
+
+import grimp
+
+
+def cycles(graph: grimp.ImportGraph) -> list[set[str]]:
+    """Sets of two modules or more that reach each other (Tarjan's strongly connected components)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    result: list[set[str]] = []
+
+    def visit(module: str) -> None:
+        index[module] = low[module] = len(index)
+        stack.append(module)
+        for other in graph.find_modules_directly_imported_by(module):
+            if other not in index:
+                visit(other)
+                low[module] = min(low[module], low[other])
+            elif other in stack:
+                low[module] = min(low[module], index[other])
+        if low[module] == index[module]:
+            place = stack.index(module)
+            component, stack[place:] = set(stack[place:]), []
+            if len(component) > 1:
+                result.append(component)
+
+    for module in sorted(graph.modules):
+        if module not in index:
+            visit(module)
+    return result
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    assert cycles(grimp.build_graph("shipid", cache_dir=None)) == []
+
+
+def test_a_planted_circle_is_seen() -> None:
+    graph = grimp.build_graph("shipid", cache_dir=None)
+    graph.add_import(importer="shipid.units", imported="shipid.predictor")
+    graph.add_import(importer="shipid.predictor", imported="shipid.units")
+    assert any({"shipid.units", "shipid.predictor"} <= circle for circle in cycles(graph))
