@@ -12,7 +12,7 @@ from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Case, Task
-from shipid.hybrid.path_drawn import MEMORIES, PathDrawn
+from shipid.hybrid.path_drawn import CHOICES, PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.ridge import _reflection
 from shipid.observer import Observer, observe
@@ -112,10 +112,10 @@ def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: st
     best = min(found.trials, key=lambda row: row["value"])
     assert found.corrector is not None
     assert found.corrector.hyperparameters == best["params"]
-    assert group in MEMORIES[int(best["params"]["memory"])]
-    without = [row["value"] for row in found.trials if group not in MEMORIES[int(row["params"]["memory"])]]
+    assert group in CHOICES[int(best["params"]["memory"])]
+    without = [row["value"] for row in found.trials if group not in CHOICES[int(row["params"]["memory"])]]
     assert best["value"] < 0.9 * min(without)
-    assert kinds(found.corrector) & {"history", "error"} == set(MEMORIES[int(best["params"]["memory"])])
+    assert kinds(found.corrector) & {"history", "error"} == set(CHOICES[int(best["params"]["memory"])])
 
 
 @pytest.mark.parametrize("known", [False, True])
