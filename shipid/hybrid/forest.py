@@ -66,7 +66,8 @@ class Trees:
 
     def predict(self, inputs: Array) -> Array:
         """Mean over the trees (S, outputs) for inputs (S, d), which scikit-learn compares in single precision."""
-        seen = inputs.astype(np.float32)
+        largest = float(np.finfo(np.float32).max)
+        seen = np.clip(inputs, -largest, largest).astype(np.float32)
         total = np.zeros((len(seen), self.value.shape[1]))
         rows = np.arange(len(seen))
         for root in self.first:

@@ -49,7 +49,7 @@ GROWING = 1.2  # times as far apart after twice the time: less is jitter
 UNTRUE_PATHS = 0.25  # of the runs whose positions leave their velocities
 FEW_RUNS, FOLDS = 6, 3
 MANOEUVRES, TESTS, INSTANTS, MEMBERS = 60, 10, 50, {"moderate": 3, "high": 2}
-PAST, LAGS, LEAST_PAST = 11.6, (0.1, 0.2, 0.4, 0.5, 1.0), 10  # sqrt(L / g): 20 s of a ship of 29 m; shares; steps
+PAST, LAGS, LEAST_PAST = 11.6, (0.1, 0.2, 0.4, 0.5, 1.0), 8  # sqrt(L / g): 20 s of a ship of 29 m; shares; steps
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150
 STEERING = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed: products with u or scaled by U
 HIGHER = "hull.*[order >= 3]"
@@ -568,6 +568,11 @@ def _family_lines(families: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 def _pairs(block: Mapping[str, Any]) -> Iterator[str]:
     for key, value in block.items():
+        if isinstance(value, Mapping):
+            table = tomlkit.inline_table()
+            table.update(value)
+            yield f"{key} = {table.as_string()}"
+            continue
         yield f"{key} = {tomlkit.item(value).as_string()}"
 
 

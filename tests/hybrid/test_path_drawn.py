@@ -12,7 +12,7 @@ from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Case, Task
-from shipid.hybrid.path_drawn import CHOICES, PathDrawn
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.ridge import _reflection
 from shipid.observer import Observer, observe
@@ -106,16 +106,17 @@ def target(dataset: Dataset, foundation: Physics, group: str) -> Array:
 def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: str) -> None:
     """What is missed is a function of one kind of memory: the trials that take it validate best, and are taken."""
     foundation = physics(N_ur=-3e5)
-    method = PathDrawn(**{**SMALL, "trials": 9, "averaged": 1, "choose": True, "mirror": 0.0, "ridge": 1e-4})
+    method = PathDrawn(**{**SMALL, "trials": 15, "averaged": 1, "choose": True, "mirror": 0.0, "ridge": 1e-4})
     found = method.fit(task(dataset, {"one": foundation}, target(dataset, foundation, group)))["one"]
-    assert [row["params"]["memory"] for row in found.trials] == [float(k % 3) for k in range(9)]
+    assert [row["params"]["memory"] for row in found.trials] == [float(k % len(method.memories)) for k in range(15)]
     best = min(found.trials, key=lambda row: row["value"])
     assert found.corrector is not None
     assert found.corrector.hyperparameters == best["params"]
-    assert group in CHOICES[int(best["params"]["memory"])]
-    without = [row["value"] for row in found.trials if group not in CHOICES[int(row["params"]["memory"])]]
+    assert group in method.memories[int(best["params"]["memory"])]
+    without = [row["value"] for row in found.trials if group not in method.memories[int(row["params"]["memory"])]]
     assert best["value"] < 0.9 * min(without)
-    assert kinds(found.corrector) & {"history", "error"} == set(CHOICES[int(best["params"]["memory"])])
+    seen = {"history", "error"}  # without an observer its estimates are no inputs
+    assert kinds(found.corrector) & seen == seen & set(method.memories[int(best["params"]["memory"])])
 
 
 @pytest.mark.parametrize("known", [False, True])

@@ -136,7 +136,7 @@ def test_nothing_can_be_said(made: Any) -> None:
 def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     H = {"good": (0.1, 0.1), "bad": (3.0, 1.5), "none": (9.0, 4.0)}
     said = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
-    assert "leaves 25% to 25% of the error of physics alone (over 1 model)" in said
+    assert "leaves 25% of the error of physics alone (over 1 model)" in said
 
 
 def test_the_map_carries_what_needs_it(made: Any) -> None:

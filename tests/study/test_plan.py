@@ -24,8 +24,6 @@ from tests.study.tiny import tiny_plan
         ("full-scale", 4 + 1 + 1, 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 0, 10),
         ("simulation-small", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
-        ("constant-orders", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
-        ("changing-orders", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
         ("zigzags", 1 + 2 + 1, 0, 3),
     ],
 )
@@ -54,8 +52,22 @@ def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None
     assert constant.truth.run_up == 20.0
     assert constant.truth.model_copy(update={"manoeuvre": changing.truth.manoeuvre}) == changing.truth
     small = read_plan("simulation-small").study
-    for name in ("family", "grid", "split", "prediction"):
-        assert getattr(constant, name) == getattr(changing, name) == getattr(small, name), name
+    for name in ("family", "method", "grid", "split", "prediction"):
+        assert getattr(constant, name) == getattr(changing, name), name
+    for name in ("grid", "split", "prediction"):
+        assert getattr(constant, name) == getattr(small, name), name
+
+
+@pytest.mark.parametrize("name", ["constant-orders", "changing-orders"])
+def test_worlds_of_memory_have_every_member_with_and_without_an_observer(name: str) -> None:
+    plan = read_plan(name)
+    plain = [one for one in plan.foundations if one.base is not None and one.observer is None]
+    observed = [one for one in plan.foundations if one.observer is not None]
+    assert [one.variant for one in plain] == [one.variant for one in observed]
+    assert len(plan.foundations) == 2 * 5 + 1
+    assert plan.past == 20
+    assert plan.judged == "memory"
+    assert plan.cells == (3 * 11 - 1) * 3 * 2  # physics alone does not meet `none`
 
 
 def test_the_first_instant_comes_after_the_run_up() -> None:

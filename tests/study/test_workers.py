@@ -82,7 +82,8 @@ def test_closing_ends_busy_workers() -> None:
 def test_workers_end_with_their_parent_and_without_noise(sent: signal.Signals) -> None:
     """Ctrl-C goes to all processes of a terminal, a kill to one; what all inherited is closed when all have ended."""
     program = """
-import time
+import signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background of a shell ignore it
 from shipid.study.workers import on_workers
 try:
     for task, _ in on_workers(time.sleep, [0, 3600, 3600], 2):
