@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from shipid.errors import DataError
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
@@ -140,3 +141,9 @@ def test_a_trained_path_keeps_metres(columns, targets):
     (network,) = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)["none"].corrector.networks
     np.testing.assert_array_equal(network.basis, np.eye(6))  # an output per step
     assert list(network.features) == ["u", "v", "r", "port.n", "port.delta", "u_rw", "v_rw"]  # (13)
+
+
+@pytest.mark.parametrize("method", [PathDrawn(), PathTrained()])
+def test_a_fold_without_windows_is_refused(columns, targets, method):
+    with pytest.raises(DataError, match="manoeuvres"):
+        tune(columns, COMMANDS, targets, [(np.arange(9), np.arange(0))], method, seed=1)
