@@ -78,7 +78,13 @@ class Predictor:
 
     @overload
     def predict(
-        self, instants: Instants, paths: Array | None = None, *, level: float, pointwise: bool = False
+        self,
+        instants: Instants,
+        paths: Array | None = None,
+        *,
+        level: float,
+        pointwise: bool = False,
+        kind: str | None = None,
     ) -> Banded: ...
 
     def predict(
@@ -88,6 +94,7 @@ class Predictor:
         *,
         level: float | None = None,
         pointwise: bool = False,
+        kind: str | None = None,
     ) -> Array | Banded:
         """Return paths (T, S, 2) [m] in the frame (11); with a level, also the band around them.
 
@@ -98,31 +105,38 @@ class Predictor:
         level : share of the true paths that the band is to hold whole, such as 0.9.
         pointwise : the band holds that share of the positions at each step alone: it is narrower, and a whole path
             leaves it more often.
+        kind : kind of manoeuvre under way, one of `bands.kinds`: the share then holds for runs of this kind.
 
         Raises
         ------
         DataError : planned commands, a column or a part of the past is missing; there were too few runs for the level.
         """
         if level is not None:
-            self.check_level(level)
+            self.check_level(level, kind)
         instants = self._known(instants)
         alone = self.physics.paths(instants) if paths is None else paths
         predicted = self.corrector.predict(self.physics, instants, alone)
         if level is None:
             return predicted
-        return Banded(predicted, self.band(predicted, instants, level, pointwise), self.outside(instants.columns))
+        return Banded(
+            predicted,
+            self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
+            self.outside(instants.columns),
+        )
 
-    def band(self, paths: Array, instants: Instants, level: float, pointwise: bool = False) -> Region:
+    def band(
+        self, paths: Array, instants: Instants, level: float, *, pointwise: bool = False, kind: str | None = None
+    ) -> Region:
         """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
-        bands = self.check_level(level)
-        return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise)
+        bands = self.check_level(level, kind)
+        return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
 
-    def check_level(self, level: float) -> Bands:
+    def check_level(self, level: float, kind: str | None = None) -> Bands:
         """Return the bands; DataError, one sentence, where there are none of this level."""
         if self.bands is None:
             reason = self.provenance.get("no_band", "it was made without")
             raise DataError(f"this predictor has no band: {reason}")
-        self.bands.check(level)
+        self.bands.check(level, kind)
         return self.bands
 
     def alone(self, instants: Instants) -> Array:
@@ -223,6 +237,7 @@ def fit(
     commands: Commands = "held",
     seed: int = 0,
     refits: int = 0,
+    kinds: Mapping[str, str] | None = None,
 ) -> Predictor:
     """Fit a method on windows and return a predictor that is ready to predict and to save.
 
@@ -240,6 +255,7 @@ def fit(
     seed : of all that is random.
     refits : of methods that have no errors on runs left out for nothing (all but `alone` and `path-drawn`), fit so many
         times more, each without a share of the runs, to calibrate a band; 0 makes such predictors without a band.
+    kinds : kind of manoeuvre by run, for bands that hold their share for runs of a kind.
 
     Raises
     ------
@@ -283,7 +299,7 @@ def fit(
             part = windows.select(judged)
             other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
             left_out[:, judged] = part.future - other.predict(part.instants(known=commands == "known"))
-    bands, reason = bands_of(left_out, windows, limits)
+    bands, reason = bands_of(left_out, windows, limits, kinds)
     if bands is None:
         provenance["no_band"] = reason
     return Predictor(physics, kind_of(method), corrector, limits, provenance, commands, bands=bands)
@@ -293,12 +309,15 @@ NO_REFITS = "its errors on runs left out need further fits: set `refits`, such a
 
 
 def bands_of(
-    left_out: Array | None, windows: Windows, limits: Mapping[str, tuple[float, float]]
+    left_out: Array | None,
+    windows: Windows,
+    limits: Mapping[str, tuple[float, float]],
+    kinds: Mapping[str, str] | None = None,
 ) -> tuple[Bands | None, str]:
     """Bands from errors (T, S, 2) [m] on windows by models that did not see their runs, and why there are none."""
     if left_out is None:
         return None, NO_REFITS
-    bands = calibrated(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step)
+    bands = calibrated(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
     return bands, "" if bands is not None else "fewer than 3 runs have errors of models that did not see them"
 
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError, ResultError, choices
 
 Array = NDArray[np.float64]
 LEVELS = np.arange(1, 100) / 100
@@ -56,7 +56,7 @@ class Region:
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
-        inside: NDArray[np.bool_] = (self.reach(errors) <= 1).all(axis=0)
+        inside: NDArray[np.bool_] = np.all(self.reach(errors) <= 1, axis=0)
         return inside
 
     def scaled(self, factor: float | Array) -> Region:
@@ -80,6 +80,8 @@ class Bands:
     middle, deviation, low, high : (5,) mean, standard deviation, least and greatest value of each of `TRAITS`.
     slopes : (5,) growth per standard deviation of each trait, as the logarithm.
     length : mean length [m] of the predicted paths of calibration.
+    kinds : kinds of manoeuvre of the runs of calibration -> number of runs, where they were known.
+    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind.
     """
 
     runs: int
@@ -97,23 +99,37 @@ class Bands:
     high: Array
     slopes: Array
     length: float
+    kinds: Mapping[str, int]
+    by_kind: Array
 
     def region(
-        self, paths: Array, columns: Mapping[str, Array], step: float, level: float, *, pointwise: bool = False
+        self,
+        paths: Array,
+        columns: Mapping[str, Array],
+        step: float,
+        level: float,
+        *,
+        pointwise: bool = False,
+        kind: str | None = None,
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] in the frame (11).
 
         Parameters
         ----------
         columns : measured columns at the instants, name -> (S,). step : of the path [s].
-        level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of the positions at each step.
+        level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of positions at each step.
+        kind : kind of manoeuvre of the run, if it is known: the share then holds for runs of this kind, and not only
+            for all kinds together as they were mixed in calibration.
 
         Raises
         ------
-        DataError : the level is not between 0 and 0.99, or there were too few runs for it.
+        DataError : the level is not between 0 and 0.99, or there were too few runs for it, or of the kind.
         """
-        self.check(level)
-        radius = at_level(self.steps if pointwise else self.whole, level)
+        self.check(level, kind)
+        if kind is not None and pointwise:
+            raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
+        table = self.steps if pointwise else self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
+        radius = at_level(table, level)
         size = self.growth(paths, columns, step)
         ahead = track(paths)
         return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
@@ -125,20 +141,24 @@ class Bands:
         size: Array = np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
         return size
 
-    def check(self, level: float) -> None:
+    def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
         if not 0 < level <= LEVELS[-1]:
             raise DataError(f"{level:g} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
-        if self.runs < needed(level):
-            raise DataError(too_few(level, self.runs))
+        if kind is not None and kind not in self.kinds:
+            raise DataError(f"no run of the kind {kind!r} calibrated this band: {choices(kind, self.kinds)}")
+        if not self.promises(level, kind):
+            raise DataError(too_few(level, self.runs if kind is None else self.kinds[kind], kind))
 
-    def promises(self, level: float) -> bool:
-        """Whether there were enough runs for a level."""
-        return 0 < level <= LEVELS[-1] and self.runs >= needed(level)
+    def promises(self, level: float, kind: str | None = None) -> bool:
+        """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
+        runs = self.runs if kind is None else self.kinds.get(kind, 0)
+        return 0 < level <= LEVELS[-1] and runs >= needed(level)
 
     def header(self) -> dict[str, Any]:
         """Return all that is not an array."""
-        return {"runs": self.runs, "names": list(self.names), "far": self.far, "length": self.length}
+        plain = {"runs": self.runs, "names": list(self.names), "far": self.far, "length": self.length}
+        return {**plain, "kinds": dict(self.kinds)}
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by name."""
@@ -147,7 +167,7 @@ class Bands:
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
         """Rebuild what `header` and `arrays` gave; ResultError where a part is missing."""
-        names = [one.name for one in fields(cls) if one.name not in ("runs", "names", "far", "length")]
+        names = [one.name for one in fields(cls) if one.name not in ("runs", "names", "far", "length", "kinds")]
         missing = next((name for name in names if name not in arrays), None)
         if missing is not None:
             raise ResultError(f"damaged: the band lacks {missing!r}")
@@ -156,6 +176,7 @@ class Bands:
             names=tuple(header["names"]),
             far=float(header["far"]),
             length=float(header["length"]),
+            kinds={str(kind): int(count) for kind, count in header["kinds"].items()},
             **{name: np.asarray(arrays[name], dtype=float) for name in names},
         )
 
@@ -169,10 +190,10 @@ def needed(level: float) -> int:
     return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
 
 
-def too_few(level: float, runs: int) -> str:
-    """One sentence where there are too few runs for a level."""
-    have = "1 run" if runs == 1 else f"{runs} runs"
-    return f"a band that holds {level:.3g} of the paths needs {needed(level)} runs or more to calibrate: here is {have}"
+def too_few(level: float, runs: int, kind: str | None = None) -> str:
+    """One sentence where there are too few runs for a level, or too few of a kind of manoeuvre."""
+    of = "" if kind is None else f" of the kind {kind!r}"
+    return f"a band of {100 * level:g} % needs {needed(level)} runs or more{of} to calibrate it: there are {runs}"
 
 
 def at_level(table: Array, level: float) -> Array:

@@ -54,18 +54,19 @@ def calibrated(
     columns: Mapping[str, Array],
     names: Sequence[str],
     step: float,
+    kinds: Mapping[str, str] | None = None,
 ) -> Bands | None:
     """Calibrate bands; None where fewer than three runs have errors.
 
     Parameters
     ----------
-    left_out : errors (T, S, 2) [m], true less predicted, of models that saw the run of the window neither in training nor
-        in any choice. Windows with values that are not finite are left out.
+    left_out : errors (T, S, 2) [m], true less predicted, of models that saw the run of the window neither in training
+        nor in any choice. Windows with values that are not finite are left out.
     future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
-    step : of the path [s].
+    step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
     """
-    chosen = _spread_over_runs(run, np.isfinite(left_out).all(axis=(0, 2)))
+    chosen = _spread_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
     runs = _runs(run[chosen])
     if runs.count < FEWEST:
         return None
@@ -92,6 +93,10 @@ def calibrated(
             best = size, fitted, whole
     assert best is not None
     _, fitted, whole = best
+    of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
+    known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind and (of == kind).sum() >= FEWEST}
+    reach, of = fitted.scores.max(axis=0), of[runs.place]
+    by_kind = [radii(reach[of == kind], np.unique(runs.place[of == kind], return_inverse=True)[1]) for kind in known]
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],
@@ -108,6 +113,8 @@ def calibrated(
         high=seen.max(axis=0),
         slopes=fitted.slopes,
         length=length,
+        kinds=known,
+        by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
     )
 
 
@@ -122,7 +129,7 @@ def radii(scores: Array, place: NDArray[np.int64]) -> Array:
     order = np.argsort(ranks, kind="stable")
     at = np.cumsum(runs.weight[order]) - runs.weight[order] / 2
     wanted = np.interp(LEVELS, at, ranks[order])
-    # Where the windows of a run are nearly one window, the new run may also fall between two others: as in (G + 1) level.
+    # Where windows of a run are nearly one window, the new run may also fall between two others: (G + 1) level.
     wanted = np.clip(wanted + _alike(ranks, runs) ** 2 * (LEVELS - 0.5) / (count - 1), 0.0, 1.0)
     order = np.argsort(scores, kind="stable")
     weights = runs.weight[order]
@@ -182,8 +189,7 @@ def _fitted(runs: _Runs, apart: Array, normal: Array, circle: bool) -> _Fit:
 def _floored(scale: Array) -> Array:
     """Scales (..., T, 2) [m] that are nowhere below a share of the greatest, nor zero."""
     most = scale.max(axis=-2, keepdims=True)
-    floored: Array = np.maximum(scale, np.maximum(FLOOR * most, 1e-9))
-    return floored
+    return np.asarray(np.maximum(scale, np.maximum(FLOOR * most, 1e-9)), dtype=float)
 
 
 def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
@@ -200,13 +206,11 @@ def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
     penalty = np.diag([0.0, *[noise / PRIOR**2] * len(TRAITS)])
 
     def solved(product: Array, right: Array) -> Array:
-        found = np.linalg.solve(product + penalty + 1e-9 * np.eye(len(right)), right)
-        if found[-1] < 0:
-            kept = np.arange(len(right) - 1)
-            part = np.linalg.solve((product + penalty + 1e-9 * np.eye(len(right)))[np.ix_(kept, kept)], right[kept])
-            found = np.append(part, 0.0)
-        slopes: Array = found[1:]
-        return slopes
+        normal_equations = product + penalty + 1e-9 * np.eye(len(right))
+        slopes: Array = np.linalg.solve(normal_equations, right)
+        if slopes[-1] < 0:
+            slopes = np.append(np.linalg.solve(normal_equations[:-1, :-1], right[:-1]), 0.0)
+        return slopes[1:]
 
     product, right = products.sum(axis=0), rights.sum(axis=0)
     without = [solved(product - products[i], right - rights[i]) for i in range(runs.count)]
@@ -231,7 +235,8 @@ def _evenly(indices: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """At most `count` of some indices, evenly spread."""
     if len(indices) <= count:
         return indices
-    return indices[np.round((np.arange(count) + 0.5) / count * len(indices) - 0.5).astype(int)]
+    chosen: NDArray[np.int64] = indices[np.round((np.arange(count) + 0.5) / count * len(indices) - 0.5).astype(int)]
+    return chosen
 
 
 def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -27,7 +27,6 @@ from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_
 from shipid.hybrid.mirror import reflection as _reflection
 from shipid.hybrid.settings import seed_of
 
-
 SPARE = 4  # further trials whose errors without each run are kept
 
 
@@ -183,8 +182,8 @@ def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
                 network = partial(_network, seen, hidden, parts, mine, ridge, basis)
-                left_out = partial(_chosen_without, by_fold[:, :, k], kept[..., mine], blocks)
-                searches[key].record(number, params, value, network, left_out)
+                without = partial(_chosen_without, by_fold[:, :, k], kept[..., mine], blocks)
+                searches[key].record(number, params, value, network, without)
             seconds = (time.perf_counter() - start) / len(group.names)
             for key in group.names:
                 searches[key].rows[-1] |= {"seconds": seconds, "epochs": 0}
@@ -197,9 +196,8 @@ def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
             found[key] = _unsolvable(method)
             continue
         errors = np.full_like(targets[key], np.nan)
-        without = np.tensordot(basis, searches[key].without(rows), (1, 2)).transpose(0, 2, 1)
-        seen_paths = targets[key][:, windows]
-        errors[:, windows] = seen_paths - np.tensordot(basis, paths[key], 1) + without
+        missed = np.tensordot(basis, searches[key].without(rows), (1, 2)).transpose(0, 2, 1)
+        errors[:, windows] = targets[key][:, windows] - np.tensordot(basis, paths[key], 1) + missed
         found[key] = searches[key].fitted(inputs, errors)
     return found
 

@@ -122,8 +122,8 @@ class BandsBlock(Strict):
     level: Annotated[FiniteFloat, Field(gt=0, le=0.99, description="share of true paths that a band holds whole")] = 0.9
     refits: Annotated[int, Field(ge=0)] = Field(
         default=0,
-        description="further fits of methods and identified families that need them for a band, each without a share of "
-        "the runs; 5 is enough, 0: no band for those",
+        description="further fits, each without a share of the runs, of methods and identified families that need them "
+        "for a band; 5 is enough, 0: no band for those",
     )
 
 
