@@ -128,11 +128,14 @@ class Bands:
         self.check(level, kind)
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
-        table = self.steps if pointwise else self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
-        radius = at_level(table, level)
+        radius = at_level(self.steps if pointwise else self.table(kind), level)
         size = self.growth(paths, columns, step)
         ahead = track(paths)
         return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
+
+    def table(self, kind: str | None = None) -> Array:
+        """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind if one is given."""
+        return self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
 
     def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""

@@ -10,7 +10,7 @@ import pandas as pd
 
 from shipid.files import write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
-from shipid.study import advise, memory
+from shipid.study import advise, bands, memory
 from shipid.study import results as parts
 from shipid.study.findings import findings
 from shipid.study.results import Results, read_results
@@ -24,6 +24,10 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "orders": memory.orders_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
+    "coverage": bands.coverage_frame,
+    "coverage_groups": bands.groups_frame,
+    "coverage_runs": bands.worst_frame,
+    "no_band": bands.refused_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 

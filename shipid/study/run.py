@@ -146,7 +146,7 @@ def run_batch(
             predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
             if one.foundation.identify is None and result.left_out is not None:
                 errors = result.left_out  # fair: these numbers were not taken from these runs
-            bands, reason = bands_of(errors, windows, predictor.limits)
+            bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
             known_why = {} if bands is not None else {"no_band": reason}
             predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
             outcome = _judged(plan, prepared, one, predictor, way)
