@@ -209,7 +209,7 @@ def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
         normal_equations = product + penalty + 1e-9 * np.eye(len(right))
         slopes: Array = np.linalg.solve(normal_equations, right)
         if slopes[-1] < 0:
-            slopes = np.append(np.linalg.solve(normal_equations[:-1, :-1], right[:-1]), 0.0)
+            slopes = np.array([*np.linalg.solve(normal_equations[:-1, :-1], right[:-1]), 0.0])
         return slopes[1:]
 
     product, right = products.sum(axis=0), rights.sum(axis=0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 import plotly.graph_objects as go
@@ -71,11 +73,11 @@ def coverage(content: ReportContent) -> Figure | None:
         id="coverage",
         title="What bands promise, and what they hold",
         takeaway=_takeaway(frame, counts[-1]),
-        how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It is "
-        "calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, and "
-        "counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % intervals "
-        f"for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one run are "
-        "alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less, see below.",
+        how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
+        "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
+        "and counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % "
+        f"intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one "
+        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less, see below.",
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
         "numbers are in the table below.",
         height=420,
@@ -85,7 +87,7 @@ def coverage(content: ReportContent) -> Figure | None:
     )
 
 
-def _words(row: dict[str, float]) -> str:
+def _words(row: dict[Hashable, Any]) -> str:
     inside = (
         f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}] of {_percent(row['level'])}"
     )
@@ -98,7 +100,8 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
     if mine.empty:
         return f"No band is promised at N_D = {size}."
     below = mine[mine.high < level]
-    least, most = mine.loc[mine.width.idxmin()], mine.loc[mine.width.idxmax()]
+    by_width = mine.sort_values("width")
+    least, most = by_width.iloc[0], by_width.iloc[-1]
     said = (
         f"With N_D = {size}, bands of {_percent(level)} hold {_percent(float(mine.coverage.mean()))} of the test paths "
     )
@@ -121,9 +124,9 @@ def width_map(content: ReportContent) -> Figure | None:
         id="width-map",
         title="Better physics, narrower promise",
         scale="mean radius of the band [m]",
-        how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is the mean radius "
-        "of its band over the horizon and all test windows, mean over seeds. Hatched: not narrower than the band of pure "
-        "data-driven at the same N_D. Cells with too few runs for the level are left out.",
+        how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is the mean "
+        "radius of its band over the horizon and all test windows, mean over seeds. Hatched: not narrower than the "
+        "band of pure data-driven at the same N_D. Cells with too few runs for the level are left out.",
     )
 
 
@@ -156,7 +159,7 @@ def table(content: ReportContent) -> Table | None:
     return Table("coverage-table", "Bands by model", _refused(content), columns, [False, *[True] * 6], rows)
 
 
-def _share(row: dict[str, float]) -> Cell:
+def _share(row: dict[Hashable, Any]) -> Cell:
     return Cell(f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}]", row["coverage"])
 
 
@@ -198,7 +201,7 @@ def _lowest(frame: pd.DataFrame) -> str:
     kinds = frame[frame.by.isin(["kind", "speed"])]
     if kinds.empty:
         return ""
-    worst = kinds.loc[kinds.coverage.idxmin()]
+    worst = kinds.sort_values("coverage").iloc[0]
     return (
         f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}. A band that is told the kind of "
         "manoeuvre holds its share for that kind."

@@ -46,9 +46,10 @@ def predict_log(
     level : share of whole paths that the columns of the band hold; None: no such columns. kind : of the manoeuvre.
     rate : with one, the band adapts along each run at this rate, see `shipid.hybrid.bands.adapted`.
 
-    Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m],
-    outside; with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from
-    north, of the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the training's limits. Pure data-driven cells have NaN for physics.
+    Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m], outside;
+    with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
+    the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
+    training's limits. Pure data-driven cells have NaN for physics.
     """
     check_table(out)
     predictor = Predictor.load(_known_cell(folder, cell))
@@ -73,7 +74,7 @@ def predict_log(
 
 @dataclass(frozen=True)
 class Band:
-    """What a band along a log is to be: its level, the kind of manoeuvre, and the rate at which it adapts, if it does."""
+    """What a band along a log is to be: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
 
     level: float
     kind: str | None = None

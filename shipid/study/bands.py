@@ -11,6 +11,7 @@ import pandas as pd
 from shipid.hybrid.bands import Region
 from shipid.study.prepare import kinds_of_runs
 from shipid.study.results import Results
+from shipid.study.verdict import metres
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -23,25 +24,26 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
     """95 % interval of a share of windows, by Clopper and Pearson for so many windows as those of few runs are worth.
 
     Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
-    never below the number of runs. Source: Korn and Graubard (1998), without their factor for degrees of freedom. For
-    one window a run it is the exact interval.
+    never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
+    the exact interval.
 
     Parameters
     ----------
     held : (S,) whether each window lies in its band. run : its run, (S,).
     """
-    from scipy.stats import beta
+    from scipy.stats import beta, t
 
     _, place = np.unique(run, return_inverse=True)
     sizes = np.bincount(place)
     runs, windows = len(sizes), len(held)
     share = float(np.mean(held))
-    count = float(runs)
+    count, tail = float(runs), (1 - CONFIDENCE) / 2
     if runs > 1 and 0 < share < 1:
         excess = np.bincount(place, held - share)
         variance = runs / (runs - 1) * float((excess**2).sum()) / windows**2
-        count = float(np.clip(share * (1 - share) / max(variance, 1e-12), runs, windows))
-    tail, inside = (1 - CONFIDENCE) / 2, share * count
+        freedom = (t.ppf(tail, max(windows - 1, 1)) / t.ppf(tail, runs - 1)) ** 2
+        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
+    inside = share * count
     low = 0.0 if inside == 0 else float(beta.ppf(tail, inside, count - inside + 1))
     high = 1.0 if inside >= count else float(beta.ppf(1 - tail, inside + 1, count - inside))
     return low, high
@@ -123,6 +125,30 @@ def groups_frame(results: Results) -> pd.DataFrame:
             add("ahead", f"{(step + 1) * test.step:g} s", every, reach[step], wide)
     columns = ["model", "by", "group", "coverage", "low", "high", "width", "runs", "note"]
     return pd.DataFrame(found, columns=columns)
+
+
+def answer(results: Results) -> list[tuple[str, str]]:
+    """What bands promise and held, and which kinds of manoeuvre had too few runs, each with the anchor of its figure.
+
+    Means over the models at the largest N_D that has bands.
+    """
+    level, frame = results.plan.study.bands.level, coverage_frame(results)
+    mine = frame[frame["level"].eq(level)]
+    if mine.empty:
+        reasons = refused_frame(results)["reason"].unique()
+        return [(f"No band is promised: {reasons[0]}.", "cells")] if len(reasons) else []
+    top = mine[mine["N_D"] == mine["N_D"].max()]
+    share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
+    said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
+    said += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
+    said += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
+    found = [(said, "coverage")]
+    groups = groups_frame(results)
+    few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
+    if few:
+        text = f"Too few runs calibrate a band of {level:.0%} for one kind of manoeuvre alone: {', '.join(few)}."
+        found.append((text, "coverage-groups"))
+    return found
 
 
 def worst_frame(results: Results) -> pd.DataFrame:

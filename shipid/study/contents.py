@@ -37,7 +37,7 @@ def report_content(results: Results) -> ReportContent:
     return ReportContent(
         title=results.plan.study.question,
         name=results.plan.name,
-        answer=[Sentence(text, figure) for text, figure in advise.answer(results)],
+        answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=parts.naive_summary(results),
