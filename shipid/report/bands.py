@@ -77,7 +77,7 @@ def coverage(content: ReportContent) -> Figure | None:
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % "
         f"intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one "
-        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less, see below.",
+        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less.",
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
         "numbers are in the table below.",
         height=420,

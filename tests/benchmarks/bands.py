@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,10 @@ from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.predictor import limits_of
 from shipid.simulation.truth import Truth, draw_manoeuvres, simulate
+from shipid.study.bands import share_interval
+from shipid.study.plan import Batch, read_plan
+from shipid.study.prepare import instants_of, obtain, partition, prepare
+from shipid.study.run import run_batch
 from shipid.vessel.load import Vessel, load_vessel
 
 Array = np.ndarray
@@ -271,9 +277,66 @@ def _of_band(beside: pd.DataFrame, part: pd.DataFrame) -> Array:
     return np.array([band[key] for key in zip(part["world"], part["method"], strict=True)])
 
 
+FAMILIES = [
+    {"name": "accurate", "base": "gunnerus-28.9"},
+    {"name": "template", "base": "gunnerus-33.9-template"},
+]
+WAYS = [
+    {"name": "drawn", "kind": "path-drawn"},
+    {"name": "alone", "kind": "alone"},
+    {"name": "memory", "kind": "path-drawn", "memory": {"history": [2, 4, 8], "error": 8}},
+]
+
+
+def recorded(folder: Path, commands: str) -> pd.DataFrame:
+    """Every zigzag of the real log in turn, all other runs train: a row per window and model, with its bands."""
+    log = folder / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
+    changes = {"family": FAMILIES, "method": WAYS, "claims": None, "data.log": str(log)}
+    plan = read_plan("full-scale", {**changes, "prediction.commands": commands, "grid.seeds": [0]})
+    dataset = obtain(plan)
+    parts = []
+    for test in (run for run in dataset.runs if str(run).startswith("ZZ")):
+        split = plan.study.split.model_copy(update={"test": [test], "folds": 1})
+        least = plan.study.model_copy(update={"split": split, "grid": plan.study.grid.model_copy(update={"N_D": [2]})})
+        amount = len(partition(replace(plan, study=least, batches=()), dataset)[0].spans)
+        study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
+        turn = replace(plan, study=study, batches=(Batch(amount, 0),))
+        prepared = prepare(turn, dataset)
+        for row, predictor in run_batch(turn, prepared, turn.batches[0], "cpu"):
+            assert predictor is not None
+            instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
+            frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},
+                                 index=range(len(prepared.test)))  # fmt: skip
+            for level in (0.8, 0.9):
+                found = predictor.predict(instants, level=level)
+                frame[f"held {level}"] = found.region.holds(prepared.test.future - found.paths)
+                frame[f"end {level}"] = found.region.radius[-1]
+            parts.append(frame)
+    return pd.concat(parts, ignore_index=True)
+
+
+def recorded_figures(folder: Path) -> dict[str, Any]:
+    """Coverage over the zigzags with its exact interval, clustered by run, and the radius 15 s ahead."""
+    found: dict[str, Any] = {}
+    for commands in ("held", "known"):
+        for model, part in recorded(folder, commands).groupby("model", sort=False):
+            for level in (0.8, 0.9):
+                held, wide = part[f"held {level}"].to_numpy(), part[f"end {level}"].mean()
+                low, high = share_interval(held, part["test"].to_numpy())
+                least = part.groupby("test")[f"held {level}"].mean().min()
+                words = (
+                    f"{held.mean():.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
+                )
+                found[f"real log, {commands}, {model}, {level:.0%}"] = words
+    return found
+
+
 def run(replicates: int = 200) -> dict[str, Any]:
     """Everything that docs/bands.md shows."""
     begun = time.perf_counter()
     found = figures(*worlds(replicates, show=True))
+    data = os.environ.get("SHIPID_DATA")
+    if data:
+        found |= recorded_figures(Path(data))
     found["seconds"] = round(time.perf_counter() - begun, 1)
     return found

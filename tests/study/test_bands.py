@@ -163,7 +163,8 @@ def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
 
     file.write_text(
         TINY.read_text()
-        + '\n[[family]]\nname = "fitted"\nextends = "wrong"\n[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
+        + '\n[[family]]\nname = "fitted"\nextends = "wrong"\n'
+        + '[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
     )
     run_here(read_plan(file, changes), tmp_path / "run")
     results = read_results(tmp_path / "run")
