@@ -25,6 +25,12 @@ from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.method import Case, Corrector, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
+from shipid.identification.bands import bands as of_manoeuvres
+from shipid.identification.bands import refusal
+from shipid.identification.outcome import COMPARED, _measured
+from shipid.identification.settings import Identify
+from shipid.identification.solve import identify
+from shipid.identification.statistics import LinearFit, statistics
 from shipid.predictor import limits_of
 from shipid.simulation.truth import Truth, draw_manoeuvres, simulate
 from shipid.study.bands import share_interval
@@ -32,6 +38,7 @@ from shipid.study.plan import Batch, read_plan
 from shipid.study.prepare import instants_of, obtain, partition, prepare
 from shipid.study.run import run_batch
 from shipid.vessel.load import Vessel, load_vessel
+from tests.benchmarks import coverage
 
 Array = np.ndarray
 SHARES = (0.5, 0.8, 0.9, 0.95)
@@ -331,10 +338,65 @@ def recorded_figures(folder: Path) -> dict[str, Any]:
     return found
 
 
+def identified_figures(replicates: int = 30) -> dict[str, Any]:
+    """Whether bands of 90 % on overshoots and circles hold the truth: simulated trials, fitted to whole runs and to 20 s.
+
+    The measures are linear about the truth here, because a thousand zigzags would take hours.
+    """
+    ship = load_vessel(VESSEL)
+    paths = [f"hull.derivatives.{name}" for name in coverage.DERIVATIVES]
+    slopes, truth = _slopes(ship, paths)
+
+    def measure(one: Vessel) -> dict[str, float]:
+        away = np.array([one.parameters[path] / ship.parameters[path] - 1 for path in paths])
+        return {name: truth[name] + float(slope @ away) for name, slope in slopes.items()}
+
+    found: dict[str, Any] = {}
+    for label, strength, horizon in (("white noise", 0.0, 0.0), ("process noise", 1.0, 0.0), ("doubled", 2.0, 0.0),
+                                     ("doubled, 20 s", 2.0, 20.0), ("doubled, 10 s", 2.0, 10.0)):  # fmt: skip
+        held: list[Array] = []
+        refused = 0
+        for seed in range(replicates):
+            data = coverage._noisy(ship, seed, strength)
+            settings = Identify(parameters=paths, weights=coverage.NOISE, horizon=horizon,
+                                nuisance=["initial_state"], start="base")  # fmt: skip
+            solution = identify(ship, data, data.runs, settings)
+            judged = statistics(LinearFit.of(solution))
+            if refusal(solution, judged, 1.0):
+                refused += 1
+                continue
+            rows = of_manoeuvres(ship, solution, judged, [("all", measure)], 0.9)
+            right = rows["measure"].map(truth)
+            held.append(((rows["low"] <= right) & (right <= rows["high"])).to_numpy())
+        text = f"{np.mean(held):.3f}, worst measure {np.mean(held, axis=0).min():.3f}" if held else "-"
+        found[f"identified, {label}: coverage of 90%"] = text
+        found[f"identified, {label}: refused"] = f"{refused} of {replicates}"
+    return found
+
+
+def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[str, float]]:
+    """Change of each measure with each factor, and the measures of the truth."""
+
+    def measure(one: Vessel) -> dict[str, float]:
+        found = {}
+        for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
+            rows = _measured(one, kind, angles)
+            found |= {
+                name: float(rows[name]["value"]) for name in (label.replace("_", " ") for label in COMPARED[kind])
+            }
+        return found
+
+    truth = measure(ship)
+    ends = [[measure(ship.with_values({path: ship.parameters[path] * (1 + side)})) for side in (0.02, -0.02)]
+            for path in paths]  # fmt: skip
+    return {name: np.array([(up[name] - down[name]) / 0.04 for up, down in ends]) for name in truth}, truth
+
+
 def run(replicates: int = 200) -> dict[str, Any]:
     """Everything that docs/bands.md shows."""
     begun = time.perf_counter()
     found = figures(*worlds(replicates, show=True))
+    found |= identified_figures()
     data = os.environ.get("SHIPID_DATA")
     if data:
         found |= recorded_figures(Path(data))

@@ -154,7 +154,7 @@ def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
         "bands": {"level": 0.7, "refits": 3},
         "method": [
             {"name": "alone", "kind": "alone"},
-            {"name": "steps", "kind": "one-step", "trials": 1, "epochs": 1, "families": ["wrong"]},
+            {"name": "steps", "kind": "one-step", "trials": 1, "families": ["wrong"]},
         ],
         "grid.N_D": [6],
     }
