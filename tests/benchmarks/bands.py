@@ -339,7 +339,7 @@ def recorded_figures(folder: Path) -> dict[str, Any]:
 
 
 def identified_figures(replicates: int = 30) -> dict[str, Any]:
-    """Whether bands of 90 % on overshoots and circles hold the truth: simulated trials, fitted to whole runs and to 20 s.
+    """Whether bands of 90 % on overshoots and circles hold the truth: simulated trials, whole runs and short horizons.
 
     The measures are linear about the truth here, because a thousand zigzags would take hours.
     """
