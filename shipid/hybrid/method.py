@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, Self
@@ -119,7 +120,7 @@ class Fitted:
     seconds: float
 
 
-class Method(BaseModel):
+class Method(BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
@@ -147,9 +148,9 @@ class Method(BaseModel):
         """Number of the best trials that make the corrector, at most."""
         return 1
 
+    @abstractmethod
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Fit every foundation of a task; name of the foundation -> result."""
-        raise NotImplementedError
 
 
 def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:
