@@ -168,6 +168,7 @@ class HankelDMD(Searched):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
     RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: tuple[PositiveFloat, ...] = (2.0, 4.0, 8.0)

@@ -126,6 +126,7 @@ class Method(BaseModel, ABC):
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
     compensates : whether anything is learned from data.
     meets_none : whether it works without physics.
+    meets_observer : whether it starts from the filtered state of physics with an observer, under the slow force.
     corrector : the class that a saved predictor is rebuilt with.
     """
 
@@ -133,6 +134,7 @@ class Method(BaseModel, ABC):
     validation: ClassVar[str] = "share"
     compensates: ClassVar[bool] = True
     meets_none: ClassVar[bool] = True
+    meets_observer: ClassVar[bool] = True
     corrector: ClassVar[type[Any]]
 
     @property

@@ -218,6 +218,7 @@ class Modules(Searched):
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6

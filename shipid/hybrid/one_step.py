@@ -134,6 +134,7 @@ class OneStep(Searched):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12

@@ -243,12 +243,17 @@ class Foundation:
 
 @dataclass(frozen=True)
 class Way:
-    """A method of the study under its name, with the foundations that it meets."""
+    """A method of the study under its name.
+
+    foundations : those that it meets, by name. left_out : those with an observer that its families would include, but
+        that its kind cannot take.
+    """
 
     name: str
     kind: str
     method: Method
     foundations: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -584,7 +589,11 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
         met: set[str] = set()
+        refused = set() if method.meets_observer else {f.family for f in foundations if f.observer is not None}
         for pattern in block.families:
+            if pattern in refused:
+                message = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
+                raise DocumentError(message, file=file, path=f"{path}.families")
             matching = documents.match(pattern, families)
             if not matching:
                 message = f"{pattern!r} is no family: {choices(pattern, families)}"
@@ -592,11 +601,15 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
             met.update(matching)
         if not method.meets_none:
             met -= {NO_MODEL}
-        ways.append(Way(block.name, block.kind, method, tuple(f.name for f in foundations if f.family in met)))
+        left_out = tuple(f.name for f in foundations if f.family in met & refused)
+        taken = tuple(f.name for f in foundations if f.family in met - refused)
+        ways.append(Way(block.name, block.kind, method, taken, left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:
-        raise DocumentError(f"no method meets {idle!r}: name its family in `families`", file=file, path="method")
+        observed = any(idle in way.left_out for way in ways)
+        remedy = "add one that takes an observer, such as alone" if observed else "name its family in `families`"
+        raise DocumentError(f"no method meets {idle!r}: {remedy}", file=file, path="method")
     return tuple(ways)
 
 
