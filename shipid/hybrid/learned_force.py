@@ -123,7 +123,9 @@ class LearnedForce(Searched):
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        measured = replace(case, physics=replace(case.physics, observer=None))  # single steps start from measured states
+        measured = replace(
+            case, physics=replace(case.physics, observer=None)
+        )  # single steps start from measured states
         everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
         trials: list[dict[str, Any]] = []
         best = (np.inf, self.ridges()[0])
