@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from shipid.cli.options import Changes, Device, Folder, Scheduler, Workers, parsed, stem
-from shipid.cli.terminal import counted, digits, draw, show, table
+from shipid.cli.terminal import counted, digits, draw, show, show_reasons, table
 
 if TYPE_CHECKING:
     from shipid.study.plan import Plan
@@ -45,8 +45,7 @@ def study_new(
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
     write_new(draft.text, file, "study")
-    rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
-    show(table(["choice", "value", "because"], rows))
+    show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
     names = ", ".join(model.name for model in draft.plan.foundations)
