@@ -230,7 +230,7 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     last = np.floor((t[-1] - first - ahead + slack) / interval)
     wanted = first + interval * np.arange(int(last) + 1)
     rows = np.unique(np.searchsorted(t, wanted + slack, side="right") - 1)
-    return t[rows[t[rows] >= first - slack]]
+    return np.asarray(t[rows[t[rows] >= first - slack]])
 
 
 def past_of(

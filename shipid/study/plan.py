@@ -392,7 +392,8 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
 
 def _beyond(document: Document, path: str) -> str:
     """Which list of a document a path leaves, and how long the list is."""
-    keys, value = documents.parts(path), document
+    keys = documents.parts(path)
+    value: Any = document
     for place, key in enumerate(keys):
         if isinstance(value, list) and int(key) >= len(value):
             name = ".".join(keys[:place])
