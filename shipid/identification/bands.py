@@ -1,9 +1,10 @@
 """Bands on standard manoeuvres of an identified vessel: what the uncertainty of its numbers leaves open.
 
 The covariance of the factors is split into its principal axes. The vessel performs each manoeuvre with its factors one
-standard deviation to either side along each axis; half the difference of a measure is its standard deviation by that
-axis, and the axes add up as squares (a central difference as wide as the uncertainty itself, so that a bend within it
-counts). A band is the measure of the estimate and Student's quantile of so many of these.
+standard deviation to either side along each axis. Half the difference of a measure is its linear part by that axis,
+the mean of both sides less the estimate its bend. A normal error has the variance of the linear part squared and twice
+the bend squared, and shifts the mean by the bend; the axes add up. A band reaches Student's quantile of so many
+standard deviations to both sides of the measure of the estimate, and further by the shift on its side.
 
 A band says what noise in the trials leaves open. It does not hold what the structure of the equations cannot follow.
 """
@@ -109,10 +110,11 @@ def bands(
             continue
         for name, value in centre.items():
             ends = np.array([one.get(name, np.nan) for one in around]).reshape(-1, 2)
-            deviation = float(np.sqrt((np.diff(ends, axis=1)[:, 0] ** 2).sum())) / 2
+            slopes, bends = (ends[:, 0] - ends[:, 1]) / 2, ends.mean(axis=1) - value
+            deviation, shift = float(np.sqrt((slopes**2 + 2 * bends**2).sum())), float(bends.sum())
             wide, note = quantile * deviation, "" if np.isfinite(deviation) else "not reached on both sides of an axis"
             row = {"manoeuvre": title, "measure": name, "value": value, "deviation": deviation, "note": note}
-            rows.append({**row, "low": value - wide, "high": value + wide})
+            rows.append({**row, "low": value - wide + min(shift, 0.0), "high": value + wide + max(shift, 0.0)})
     return pd.DataFrame(rows, columns=["manoeuvre", "measure", "value", "deviation", "low", "high", "note"])
 
 

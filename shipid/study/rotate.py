@@ -130,11 +130,6 @@ def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
 
 def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
     """Means over the seeds of every turn, foundation and method; cells that failed are left out."""
-    good = frame[frame["status"] == "ok"]
-    return (
-        good.groupby(["test", "foundation", "family", "method"], sort=False)[
-            ["A", "H", "H_90", "coverage", "width", "naive"]
-        ]
-        .mean()
-        .reset_index()
-    )
+    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
+    keys, numbers = ["test", "foundation", "family", "method"], ["A", "H", "H_90", "coverage", "width", "naive"]
+    return good.groupby(keys, sort=False)[numbers].mean().reset_index()

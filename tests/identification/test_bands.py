@@ -49,7 +49,8 @@ def test_of_a_linear_measure_it_is_the_propagated_covariance(found: tuple[Soluti
     solution, known = found
     rows = bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
     best = known.covariances[known.chosen]
-    deviation = np.sqrt(SLOPES @ best.matrix @ SLOPES)
+    slopes = SLOPES[[FEW.index(path) for path in solution.paths]]
+    deviation = np.sqrt(slopes @ best.matrix @ slopes)
     half = deviation * stats.t.ppf(0.9, np.median(best.freedom))
     assert rows["deviation"]["one"] == pytest.approx(deviation, rel=1e-3)
     assert (rows["high"]["one"] - rows["low"]["one"]) / 2 == pytest.approx(half, rel=1e-3)
