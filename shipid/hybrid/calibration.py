@@ -207,11 +207,11 @@ def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
 
     def solved(product: Array, right: Array) -> Array:
         normal_equations = product + penalty + 1e-9 * np.eye(len(right))
-        slopes: Array = np.linalg.solve(normal_equations, right)
+        slopes: Array = np.asarray(np.linalg.solve(normal_equations, right), dtype=float)
         if slopes[-1] >= 0:
             return slopes[1:]
-        without_distance: Array = np.linalg.solve(normal_equations[:-1, :-1], right[:-1])
-        return np.append(without_distance[1:], 0.0)
+        slopes[:-1], slopes[-1] = np.linalg.solve(normal_equations[:-1, :-1], right[:-1]), 0.0
+        return slopes[1:]
 
     product, right = products.sum(axis=0), rights.sum(axis=0)
     without = [solved(product - products[i], right - rights[i]) for i in range(runs.count)]
