@@ -21,11 +21,13 @@ from shipid.errors import ResultError
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
 from shipid.hybrid.units import (
     Seen,
     Units,
+    best_of,
     diverged,
     mean_square,
     part_of,
@@ -155,35 +157,35 @@ class OneStep(Searched):
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
         found = {}
         for count, name in enumerate(task.cases):
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
+            found[name] = self._fit(task, name) if sound(task, name) else diverged(self, points_of(self))
             if task.on_trial is not None:
                 task.on_trial(count + 1, len(task.cases))
         return found
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin = time.perf_counter()
+        search = Search(task, [name], self)
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         table = feature_table(steps.at.columns, task.commands)
-        rows: list[dict[str, Any]] = []
-        for number, point in enumerate(points_of(self)):
-            start = time.perf_counter()
+        for number, point in search.left(points_of(self)):
+            start = time.process_time()
             errors = np.zeros(len(ridges))
             for fold, (training, validation) in enumerate(task.folds):
                 head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
                 errors += self._errors(task, name, head, some_of(validation, self.samples, seed_of(task.seed, fold)))
             best = int(errors.argmin())
             value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
-        kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
+            search.record({name: row_of(number, {**point, "ridge": ridges[best]}, value, start)})
+        rows = search.rows[name]
+        kept = best_of(rows)
         if not kept:
-            return Fitted(None, rows, time.perf_counter() - begin)
+            return Fitted(None, rows, search.seconds)
         everything, heads = steps.of(used(task)), []
         for row in kept[: self.averaged]:
             params = row["params"]
             head = self._head(steps, table, everything, params, row["number"], [params["ridge"]], task.seed)
             heads.append(Head(head.units, head.surge[0], head.sway_yaw[0]))
         corrector = OneStepCorrector(task.commands, tuple(heads), kept[0]["params"])
-        return Fitted(corrector, rows, time.perf_counter() - begin)
+        return Fitted(corrector, rows, search.seconds)
 
     def _head(
         self,

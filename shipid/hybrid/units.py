@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import exp, log
 from typing import Any, Self
 
@@ -121,15 +122,18 @@ def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Arr
     return np.stack([axes @ (product / (values + ridge)[:, None]) / scale[:, None] for ridge in ridges])
 
 
-def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> list[dict[str, float]]:
-    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm."""
+def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm.
+
+    They never end where a budget says how many are made; there is one where nothing is searched.
+    """
     ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
-    return [
-        {**fixed, **{n: exp(log(a) + s * (log(b) - log(a))) for s, (n, (a, b)) in zip(at, ranges.items(), strict=True)}}
-        for at in spread(max(len(ranges), 1), method.trials if ranges else 1)
-        for at in [at[: len(ranges)]]
-    ]
+    most = None if method.budget else method.trials
+    for shares in spread(max(len(ranges), 1), most if ranges else 1):
+        logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
+        found = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
+        yield {**fixed, **found}
 
 
 def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
@@ -137,20 +141,26 @@ def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
     return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
 
 
-def diverged(points: Sequence[Mapping[str, float]]) -> Fitted:
+def diverged(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
     """The result where the physics is not finite: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(points)], 0.0)
+    some = islice(points, 1 if method.budget else None)
+    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
 def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
-    """The row of a trial that began at `start` by `time.perf_counter`."""
-    state = "complete" if np.isfinite(value) else "diverged"
-    seconds = time.perf_counter() - start
+    """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
+    complete = bool(np.isfinite(value))
     return {
-        **{"number": number, "params": dict(params), "value": value},
-        **{"seconds": seconds, "epochs": epochs, "state": state},
+        **{"number": number, "params": dict(params), "value": value if complete else np.nan},
+        **{"seconds": time.process_time() - start, "epochs": epochs},
+        "state": "complete" if complete else "diverged",
     }
+
+
+def best_of(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Trials that ended with a value, the best first; of equal ones the earlier."""
+    return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
 
 
 def used(task: Task) -> Index:

@@ -309,7 +309,7 @@ class Plan:
 
     def _digest(self, document: Document) -> str:
         vessels = sorted({vessel.digest for vessel in self.used_vessels})
-        methods = [{"kind": way.kind, **way.method.model_dump(mode="json")} for way in self.methods]
+        methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
         depends = {"vessels": vessels, "sources": dict(self.sources), "methods": methods}
         return documents.digest({"study": document, **depends})
 

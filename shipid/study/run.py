@@ -20,6 +20,7 @@ from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Windows, covered
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
@@ -70,7 +71,8 @@ def run_study(
 ) -> Iterator[Event]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
-    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again whole.
+    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again, its searches go on
+    from the journal of trials.
 
     Parameters
     ----------
@@ -103,7 +105,9 @@ def run_study(
     left = [batch for batch in plan.batches if batch not in done]
     cells = len(done) * len(plan.pairs)
     yield Event("start", done=cells, total=plan.cells)
-    for batch, results in _compute(plan, prepared, left, workers, scheduler, device):
+    trials = (folder / store.TRIALS).absolute()
+    Journal(trials)
+    for batch, results in _compute(plan, prepared, left, workers, scheduler, device, trials):
         rows = []
         for row, predictor in results:
             if predictor is not None:
@@ -123,16 +127,20 @@ def run_study(
 
 
 def run_batch(
-    plan: Plan, prepared: Prepared, batch: Batch, device: str
+    plan: Plan, prepared: Prepared, batch: Batch, device: str, trials: Path | None = None
 ) -> list[tuple[dict[str, Any], Predictor | None]]:
-    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker."""
+    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker.
+
+    trials : the journal in which searches go on; on a machine that does not see the file, they are kept in memory.
+    """
     use_threads(1)
     check_device(device)
+    journal = Journal(trials) if trials is not None and trials.is_file() else None
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     known = predictions(plan, prepared, batch, device)
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
-    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device) for way in plan.methods}
+    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device, journal) for way in plan.methods}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for name, way in plan.pairs:
         one, result = known[name], fitted[way.name][name]
@@ -155,6 +163,7 @@ def _fitted(
     known: Mapping[str, Prediction],
     way: Way,
     device: str,
+    journal: Journal | None,
 ) -> dict[str, Fitted]:
     """Results of one method for the foundations that it meets."""
     mine = {name: known[name] for name in way.foundations}
@@ -173,6 +182,8 @@ def _fitted(
         },
         estimates={name: at_instants(prepared.data, windows, one.estimates) for name, one in mine.items()},
         device=device,
+        journal=journal,
+        cells={name: batch.cell(name, way.name) for name in mine},
     )
     return way.method.fit(task)
 
@@ -257,18 +268,24 @@ def _predictor(
 
 
 def _compute(
-    plan: Plan, prepared: Prepared, batches: list[Batch], workers: int | None, scheduler: str | None, device: str
+    plan: Plan,
+    prepared: Prepared,
+    batches: list[Batch],
+    workers: int | None,
+    scheduler: str | None,
+    device: str,
+    trials: Path,
 ) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
     """Batches and their results in the order in which they finish."""
     if scheduler is not None:
-        yield from _on_dask(plan, prepared, batches, scheduler, device)
+        yield from _on_dask(plan, prepared, batches, scheduler, device, trials)
         return
-    work = partial(run_batch, plan, prepared, device=device)
+    work = partial(run_batch, plan, prepared, device=device, trials=trials)
     yield from on_workers(work, batches, workers or os.cpu_count() or 1)
 
 
 def _on_dask(
-    plan: Plan, prepared: Prepared, batches: list[Batch], scheduler: str, device: str
+    plan: Plan, prepared: Prepared, batches: list[Batch], scheduler: str, device: str, trials: Path
 ) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
     """The same on the cluster of an existing scheduler."""
     if not batches:
@@ -286,7 +303,7 @@ def _on_dask(
             shared = client.scatter([plan, prepared], broadcast=True)
             futures = {
                 client.submit(
-                    run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
+                    run_batch, *shared, batch, device, trials, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
                 ): batch
                 for batch in batches
             }

@@ -19,7 +19,7 @@ from shipid.study.plan import Batch, Foundation, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
-DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
+DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
 
