@@ -8,7 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -83,6 +83,9 @@ def run_study(
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
+    if plan.parts:
+        yield from _run_parts(plan, folder, workers, scheduler, device)
+        return
     if scheduler is None:
         import_for_workers()
     if not (folder / store.DATASET).exists():
@@ -124,6 +127,26 @@ def run_study(
     write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder))
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
+
+
+def _run_parts(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> Iterator[Event]:
+    """Run every part of a study in a folder of its own, one after the other; events count the cells of all."""
+    total = sum(part.plan.cells for part in plan.parts.values())
+    folders = {name: store.part_folder(folder, name) for name in plan.parts}
+    done = sum(
+        len(store.finished(folders[name], part.plan.batches)) * len(part.plan.pairs)
+        for name, part in plan.parts.items()
+    )
+    yield Event("start", done=done, total=total)
+    for name, part in plan.parts.items():
+        yield Event("note", f"{name}:")
+        for event in run_study(part.plan, folders[name], workers=workers, scheduler=scheduler, device=device):
+            if event.kind == "cell":
+                done += 1
+                yield replace(event, done=done, total=total)
+            elif event.kind == "note":
+                yield event
+    yield Event("end", text=str(folder), done=done, total=total)
 
 
 def run_batch(
