@@ -52,8 +52,8 @@ def verdicts(frame: pd.DataFrame) -> list[str]:
     found = []
     for condition in _conditions(frame):
         mine = frame[frame.condition.eq(condition) & frame.family.eq(EVERY)]
-        for N_D in sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []:
-            found.append(_verdict(mine[mine.N_D.eq(N_D)], condition, N_D))
+        ends = sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []
+        found += [_verdict(mine[mine.N_D.eq(N_D)], condition, N_D) for N_D in ends]
     return found
 
 

@@ -443,7 +443,7 @@ def build_plan(
 
 
 def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
-    """Every repetition in every condition: `constant-1`, `constant-2`, ...; DocumentError with the path of the cause."""
+    """Every repetition in every condition: `constant-1`, ...; DocumentError with the path of the cause."""
     repeat, conditions = plan.study.repeat, plan.study.condition
     if not repeat and not conditions:
         return {}
