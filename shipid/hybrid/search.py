@@ -16,7 +16,7 @@ from shipid.hybrid.method import Row, Task
 from shipid.hybrid.settings import Searched
 
 Point = TypeVar("Point")
-TIMED = 3  # first trials from whose time the number of all follows
+TIMED = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
 CLOSING = 1  # trials that the last fit costs, about
 
 

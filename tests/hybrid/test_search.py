@@ -132,13 +132,13 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
 def test_a_price_is_that_of_the_trials_after_the_first() -> None:
     assert affordable(10.0, 0.0, []) is None
     assert affordable(10.0, 0.0, [0.5]) is None
-    assert affordable(10.0, 0.0, [2.0, 0.5, 0.5]) == 20 - CLOSING
-    assert affordable(10.0, 4.0, [2.0, 0.5, 0.5]) == 12 - CLOSING
+    assert affordable(10.0, 0.0, [2.0, 0.5, 0.5, 0.5]) == 20 - CLOSING
+    assert affordable(10.0, 4.0, [2.0, 0.5, 0.5, 0.5]) == 12 - CLOSING
     assert affordable(10.0, 0.0, [6.0]) == 1  # one trial took more than half
     assert affordable(10.0, 9.0, [0.1]) == 10 - CLOSING
     assert affordable(1.0, 0.0, [0.2] * TIMED) == 5 - CLOSING
     assert affordable(1e-9, 0.0, [5.0]) == 1
-    assert affordable(100.0, 0.0, [0.0, 0.0, 0.0]) > 1000  # a clock that does not tick
+    assert affordable(100.0, 0.0, [0.0] * TIMED) > 1000  # a clock that does not tick
 
 
 @pytest.mark.parametrize("seed", range(20))
