@@ -131,6 +131,15 @@ def replace(document: Any, changes: Mapping[str, Any]) -> Any:
     return result
 
 
+def plain(value: Any) -> Any:
+    """A value as a TOML document holds it: NumPy numbers and arrays become numbers and lists, in tables too."""
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
     expression = re.compile(".*".join(re.escape(piece) for piece in pattern.split("*")))

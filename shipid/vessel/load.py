@@ -82,6 +82,7 @@ class Vessel:
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
+        values = {path: documents.plain(value) for path, value in values.items()}
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
             try:
