@@ -48,8 +48,7 @@ def _before(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
 ) -> None:
-    if verbose:
-        log_to_stderr()
+    log_to_stderr(verbose)
     if version:
         from shipid.version import __version__
 

@@ -173,12 +173,12 @@ def draw(events: Iterable[Event]) -> None:
                 progress.update(task, completed=event.done, description=label)
 
 
-def log_to_stderr() -> None:
-    """Write the log messages of shipid to standard error."""
+def log_to_stderr(verbose: bool) -> None:
+    """Write the warnings of shipid to standard error, or all its log messages."""
     import logging
 
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger = logging.getLogger("shipid")
     logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG)
+    logger.setLevel(logging.DEBUG if verbose else logging.WARNING)
