@@ -22,8 +22,6 @@ from typing import Any
 from shipid.errors import ShipidError
 
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
-TRIED = "hangs"
-"""First word of the message about a compiler that did not return."""
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +46,7 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
     try:
         printed, complaint = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired:
-        return f"{TRIED}: not done after {limit:g} s", ""
+        return f"hangs: not done after {limit:g} s", ""
     finally:
         _end(process)
     return (complaint.strip() or "it gave no reason") if process.returncode else None, printed
@@ -68,7 +66,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def build(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:
-    """Compile C source into a sealed library, which appears whole or not at all; the complaint if that fails, else None.
+    """Compile C source into a sealed library, which appears whole or not at all; the complaint if that fails.
 
     command : compiler and options, with `{source}` and `{library}` where the names of the files belong.
     """
@@ -149,10 +147,10 @@ def folder(wanted: str, probe: bytes) -> Path | None:
 
     probe : content of a compiled library, to try it.
     """
-    reasons = []
-    for make in (lambda: _kept(Path(wanted) / "shipid"), _passing):
+    reasons: list[str] = []
+    for kept in (Path(wanted) / "shipid", None):
         try:
-            place = make()
+            place = _passing() if kept is None else _kept(kept)
             with tempfile.TemporaryDirectory(dir=place) as inside:
                 trial = Path(inside) / "probe.so"
                 trial.write_bytes(probe)

@@ -127,6 +127,15 @@ def compiler() -> str | None:
     return None if probed is None or _folder() is None else probed[0]
 
 
+def engine() -> str:
+    """What computes rollouts on this machine: the native engine with its compiler and vectors, or CasADi."""
+    command = compiler()
+    if command is None:
+        return "casadi"
+    version = (compiler_version(command).splitlines() or ["?"])[0]
+    return f"native, {version}, {target().lanes} lanes"
+
+
 def refuse(reason: str) -> None:
     """Say once that this process compiles no more, and why: from now on there is no compiler."""
     if not _refused:

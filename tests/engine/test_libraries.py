@@ -1,4 +1,4 @@
-"""Compiled libraries: whatever lies in the cache or happens to the compiler, a rollout gives its numbers, or one line."""
+"""Compiled libraries: whatever lies in the cache or happens to the compiler, a rollout gives its numbers or a line."""
 
 from __future__ import annotations
 
