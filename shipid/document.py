@@ -20,7 +20,7 @@ Document = dict[str, Any]
 
 LARGEST = 20_000_000  # bytes of a document
 DEEPEST = 40  # tables and lists inside one another
-MOST_NUMBER, MOST_INTEGER = 1e18, 10**15
+MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 
 
 def bundled_folder(kind: str) -> Path:
@@ -60,7 +60,7 @@ def read(file: Path | str) -> Document:
     """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
         if Path(file).exists() and not Path(file).is_file():
-            raise DocumentError("is no file: name a TOML document", file=file)
+            raise DocumentError("cannot be read: it is no file", file=file)
         if Path(file).stat().st_size > LARGEST:
             raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB: no document is", file=file)
         text = Path(file).read_bytes().decode("utf-8")
@@ -88,7 +88,7 @@ def loads(text: str, file: Path | str | None = None) -> Document:
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
-    That is a date, a number beyond 1e18, an integer beyond 1e15, a control character, and deep nesting.
+    That is a date, a number beyond 1e24, an integer beyond 1e15, a control character, and deep nesting.
     """
     waiting: list[tuple[str, int, Any]] = [("", 0, document)]
     while waiting:

@@ -103,7 +103,7 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 
 
 def named(name: str, device: str) -> Engine | None:
-    """The engine with a name; None for `auto` and `repeated`. ShipidError for an unknown name or an unsupported device."""
+    """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
     if name in (AUTO, REPEATED):
         return None
     if name not in ENGINES:
@@ -125,7 +125,7 @@ def chosen(batch: Batch, job: Job, repeated: bool = False) -> Engine:
 
 
 def done_by(asked: Engine | None, choose: Callable[[], Engine], work: Callable[[Engine], Result]) -> Result:
-    """Result of the engine that was asked for; else of the chosen one, and of another where that cannot compile here."""
+    """Result of the engine that was asked for; else of the chosen one, or of another where it cannot compile here."""
     if asked is not None:
         return work(asked)
     try:

@@ -22,6 +22,7 @@ from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
+from shipid.predictor import MOST_STEPS
 from shipid.simulation.truth import Truth, check_truth
 from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
 from shipid.vessel.load import Vessel, load_vessel
@@ -30,7 +31,7 @@ from shipid.vessel.perturb import Family, Variant, members, resolve
 NO_MODEL = "none"
 WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
-MOST_STEPS = 100_000
+
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands

@@ -17,6 +17,8 @@ from shipid.errors import ResultError, ShipidError
 from shipid.files import read_arrays, write_text
 
 FOLDER = "seals"
+FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
+"""Name of a seal that is not of a batch -> the first file in it."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
         lines = [line.split("  ", 1) for line in seal.read_text(encoding="utf-8").splitlines()]
         known = [(digest, path) for digest, path in lines]
         whole = known and all(len(digest) == 64 and _inside(path) for digest, path in known)
+        whole = whole and known[0][1] == FIRST.get(name, f"batches/{name}.json")
     except (OSError, ValueError):
         known, whole = [], False
     if not whole:
