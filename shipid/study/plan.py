@@ -447,11 +447,12 @@ def _check_memory(plan: Plan) -> None:
     truth = plan.study.truth
     if truth is None or plan.truth is None:
         return
-    columns = 8 + 2 * len(plan.truth.document.get("thruster", {}))
+    commands = 2 * len(plan.truth.document.get("thruster", {}))
+    columns = 8 + commands
+    each = {"truth.step": commands + columns * bool(truth.sensors) + 4 * bool(truth.gusts), "truth.interval": columns}
     for path, between in (("truth.step", truth.step), ("truth.interval", truth.interval)):
-        every = truth.interval if path == "truth.interval" or not truth.sensors else truth.step
-        numbers = truth.manoeuvres * truth.length * (columns / every + (4 / truth.step if truth.gusts else 0))
-        words = f"{between:g} s: the records of {truth.manoeuvres} runs of {truth.length:g} s"
+        numbers = truth.manoeuvres * truth.length / between * each[path]
+        words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
         check_memory(numbers, words, path, plan.file)
     words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
     numbers = truth.manoeuvres * plan.cut(columns).numbers(truth.length)

@@ -9,7 +9,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
@@ -47,6 +47,11 @@ from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
+DASK = {  # a graph is never large here; a scheduler that is gone is noticed in seconds
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+    "distributed.comm.timeouts.connect": "5s",
+    "distributed.comm.retry.count": 0,
+}
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all batches share
 Rows = list[dict[str, Any]]
 Computed = Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]
@@ -323,10 +328,7 @@ def _on_dask(plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler
     import dask
     from dask.distributed import CancelledError, Client, KilledWorker, as_completed
 
-    dask_log = logging.getLogger("distributed")
-    level = dask_log.level
-    dask_log.setLevel(logging.CRITICAL)  # its tracebacks are said in one line here
-    with warnings.catch_warnings(), dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
+    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
         warnings.simplefilter("ignore")
         try:
             client = Client(scheduler, timeout="10s")
@@ -351,5 +353,18 @@ def _on_dask(plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler
             raise ShipidError(message, path=f"--scheduler {scheduler}") from None
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
-                client.close(timeout="2s")
-            dask_log.setLevel(level)
+                client.close(timeout=2)
+
+
+@contextmanager
+def _without_logs(*names: str) -> Iterator[None]:
+    """Silence loggers and those below them, whose errors are said in one line."""
+    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
+    before = {logger: logger.level for logger in every}
+    try:
+        for logger in every:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)

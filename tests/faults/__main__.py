@@ -1,4 +1,4 @@
-"""Run the campaign: `python -m tests.faults [--scale 5] [--seed 0] [--only killed,full]`; ends with 1 if anything failed."""
+"""Run the campaign: `python -m tests.faults [--scale 5] [--seed 0] [--only killed,full]`; it ends with 1 on failures."""
 
 from __future__ import annotations
 
