@@ -79,6 +79,8 @@ def mend(folder: Path) -> Iterator[str]:
     for fault in found:
         if fault.kind == "edited":
             raise edited(folder, fault)
+        if (folder / fault.file).is_dir():
+            raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
     for name in dict.fromkeys(fault.seal for fault in found):
         wrong = [fault for fault in found if fault.seal == name]
         for fault in wrong:

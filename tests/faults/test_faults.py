@@ -17,7 +17,7 @@ QUICK = {
     "dataset": 8,
     "memory": 6,
     "damaged": 4,
-    "killed": 4,
+    "killed": 3,
 }
 
 

@@ -53,15 +53,22 @@ def test_names_that_no_file_can_have(tmp_path: Path) -> None:
         tiny_plan(tmp_path, {"family.0.name": "n" * 245})
 
 
-@pytest.mark.parametrize("path", ["truth.interval", "truth.step", "prediction.interval"])
+LONG: dict[str, tuple[dict[str, float], int]] = {  # changes, and bytes of memory that all but this take
+    "truth.step": ({"truth.step": 0.01, "truth.interval": 20.0, "truth.duration": 40.0}, 1_000_000),
+    "truth.interval": ({"truth.step": 0.5, "truth.interval": 0.5}, 40_000),
+    "prediction.interval": ({"truth.step": 1.0, "prediction.interval": 0.1}, 1_000_000),
+}
+
+
+@pytest.mark.parametrize("path", LONG)
 def test_memory_that_cannot_be_had_is_refused_with_its_cause(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(capacity, "memory", lambda: 10_000)
-    changes = {"truth.step": 1.0, "truth.interval": 1.0} | ({path: 0.5} if path != "prediction.interval" else {})
+    changes, most = LONG[path]
+    monkeypatch.setattr(capacity, "memory", lambda: most)
     with pytest.raises(DocumentError, match="GiB of memory, and there are") as caught:
         tiny_plan(tmp_path, changes)
-    assert caught.value.path in ("truth.interval", "truth.step", "prediction.interval")
+    assert caught.value.path == path
 
 
 def test_two_hundred_gibibytes(tmp_path: Path) -> None:
