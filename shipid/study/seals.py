@@ -59,13 +59,13 @@ def faults(folder: Path) -> list[Fault]:
 def check(folder: Path) -> None:
     """Raise ResultError for the first sealed file that is not as it was written; nothing is mended."""
     for fault in faults(folder):
-        if fault.kind == "edited":
-            raise edited(folder, fault)
-        raise ResultError("missing or damaged: continue with `shipid study resume`", file=folder / fault.file)
+        raise wrong(folder, fault)
 
 
-def edited(folder: Path, fault: Fault) -> ResultError:
-    """The error for a file that was edited."""
+def wrong(folder: Path, fault: Fault) -> ResultError:
+    """The error for a file that is not as it was written."""
+    if fault.kind != "edited":
+        return ResultError("missing or damaged: continue with `shipid study resume`", file=folder / fault.file)
     message = "was changed after it was written: put it back, or delete it and continue with `shipid study resume`"
     return ResultError(message, file=folder / fault.file)
 
@@ -78,7 +78,7 @@ def mend(folder: Path) -> Iterator[str]:
     found = faults(folder)
     for fault in found:
         if fault.kind == "edited":
-            raise edited(folder, fault)
+            raise wrong(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
     for name in dict.fromkeys(fault.seal for fault in found):

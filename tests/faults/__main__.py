@@ -1,4 +1,4 @@
-"""Run the campaign: `python -m tests.faults [--scale 5] [--seed 0] [--only killed,full]`; it ends with 1 on failures."""
+"""Run the campaign: `python -m tests.faults [--scale 5] [--seed 0] [--only killed]`; it ends with 1 on failures."""
 
 from __future__ import annotations
 
