@@ -44,6 +44,17 @@ def show(table: Table) -> None:
         Console(width=200).print(table)
 
 
+def show_reasons(choices: list[tuple[str, str, str]]) -> None:
+    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+    from rich.console import Console
+
+    if Console().is_terminal:
+        show(table(["choice", "value", "because"], choices))
+        return
+    for path, value, why in choices:
+        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
+
+
 def digits(value: float) -> str:
     """Write a number with four digits; a dash where it is NaN."""
     if abs(value) >= 1e6:  # a moment on a clock of dates

@@ -80,7 +80,7 @@ def outcome(work: Callable[[int], Any], seed: int) -> Outcome:
         work(seed)
     except ShipidError as error:
         line = str(error)
-        good = line.isprintable() and len(line) < 2000
+        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
         return Outcome(seed, "refused" if good else "no line", line)
     except Failure as error:
         return Outcome(seed, str(error.args[0]), " ".join(map(str, error.args[1:])))
