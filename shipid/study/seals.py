@@ -82,11 +82,11 @@ def mend(folder: Path) -> Iterator[str]:
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
     for name in dict.fromkeys(fault.seal for fault in found):
-        wrong = [fault for fault in found if fault.seal == name]
-        for fault in wrong:
+        these = [fault for fault in found if fault.seal == name]
+        for fault in these:
             (folder / fault.file).unlink(missing_ok=True)
         remove(folder, name)
-        words = ", ".join(f"{fault.file} {fault.kind}" for fault in wrong)
+        words = ", ".join(f"{fault.file} {fault.kind}" for fault in these)
         yield f"{words}: computed again"
 
 
