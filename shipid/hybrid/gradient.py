@@ -20,7 +20,7 @@ from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.training import Settings, train
-from shipid.hybrid.units import best_of
+from shipid.hybrid.trials import best_of
 
 Parameters = dict[str, float]
 

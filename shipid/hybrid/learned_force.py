@@ -25,7 +25,8 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
-from shipid.hybrid.units import best_of, diverged, row_of, solve, used
+from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
+from shipid.hybrid.units import solve
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -107,21 +108,20 @@ class LearnedForce(Searched):
 
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""
-        return (
-            [self.ridge]
-            if isinstance(self.ridge, float)
-            else [float(r) for r in np.geomspace(*self.ridge, self.trials)]
-        )
+        return ridges_of(self.ridge, self.trials)
 
     def _fit(self, task: Task, name: str) -> Fitted:
         case, instants, future = task.cases[name], task.instants(name), task.windows.future
-        if not np.isfinite(case.paths).all():
+        if not sound(task, name):
             return diverged(self, ({"ridge": ridge} for ridge in self.ridges()))
         search = Search(task, [name], self, again=True)  # a trial starts from the one before
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        everything, steps = used(task), true_steps(task, name)
+        measured = replace(
+            case, physics=replace(case.physics, observer=None)
+        )  # single steps start from measured states
+        everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
         starts: dict[int, Array | None] = {}
         for number, ridge in search.left(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
             start, losses, most = time.process_time(), [], 0

@@ -28,7 +28,7 @@ from shipid.hybrid.mirror import reflection as _reflection
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
-from shipid.hybrid.units import diverged
+from shipid.hybrid.trials import diverged
 
 
 @dataclass(frozen=True)

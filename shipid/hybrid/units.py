@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from math import exp, log
 from typing import Any, Self
 
 import numpy as np
@@ -15,9 +12,7 @@ from numpy.typing import NDArray
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import choose_features, group_of
-from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.mirror import reflection as mirror_of
-from shipid.hybrid.settings import Searched, spread
 
 Array = NDArray[np.float64]
 MADE_OF = ("mean", "std", "weight", "offset")
@@ -120,67 +115,3 @@ def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Arr
     product = axes.T @ (scaled.T @ targets) / len(scaled)
     values = np.maximum(values, 0.0)
     return np.stack([axes @ (product / (values + ridge)[:, None]) / scale[:, None] for ridge in ridges])
-
-
-def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
-    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm.
-
-    They never end where a budget says how many are made; there is one where nothing is searched.
-    """
-    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
-    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
-    most = None if method.budget else method.trials
-    for shares in spread(max(len(ranges), 1), most if ranges else 1):
-        logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
-        found = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
-        yield {**fixed, **found}
-
-
-def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
-    """Ridges that every trial is solved with, evenly spread by their logarithm."""
-    return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
-
-
-def diverged(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
-    """The result where the physics is not finite: no corrector, every trial diverged."""
-    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    some = islice(points, 1 if method.budget else None)
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
-
-
-def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
-    """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
-    complete = bool(np.isfinite(value))
-    return {
-        **{"number": number, "params": dict(params), "value": value if complete else np.nan},
-        **{"seconds": time.process_time() - start, "epochs": epochs},
-        "state": "complete" if complete else "diverged",
-    }
-
-
-def best_of(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Trials that ended with a value, the best first; of equal ones the earlier."""
-    return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
-
-
-def used(task: Task) -> Index:
-    """Indices of the windows that train or validate in any fold."""
-    return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
-
-
-def sound(task: Task, name: str) -> bool:
-    """Whether the physics of a foundation is finite on all windows of the folds."""
-    return bool(np.isfinite(task.cases[name].paths[:, used(task)]).all())
-
-
-def some_of(windows: Index, most: int, seed: int) -> Index:
-    """At most so many of the windows, drawn without replacement, in order."""
-    if len(windows) <= most:
-        return windows
-    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
-
-
-def mean_square(paths: Array, future: Array) -> float:
-    """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
-    value = float(np.square(paths - future).mean())
-    return value if np.isfinite(value) else float("inf")
