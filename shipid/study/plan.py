@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -31,7 +32,7 @@ from shipid.vessel.perturb import Family, Variant, members, resolve
 NO_MODEL = "none"
 WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
-
+OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
@@ -165,6 +166,13 @@ class Published(Strict):
         return self
 
 
+class Condition(Strict):
+    """`[[condition]]`: what is different in one part of a study; its other parts stand beside it."""
+
+    name: Annotated[str, Field(pattern=NAME)]
+    set: dict[str, Any] = Field(default={}, description="dotted path -> value")
+
+
 class MethodBlock(BaseModel):
     """`[[method]]`: a way to improve physics by data; every further key is a setting of its kind."""
 
@@ -197,6 +205,10 @@ class Study(Strict):
     published: Published | None = None
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     family: Annotated[list[Family], Field(min_length=1)]
+    repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
+        default={}, description="dotted path -> values: the study is done for each; the comparison pools them"
+    )
+    condition: list[Condition] = Field(default=[], description="the study is done in each; shown side by side")
 
     @model_validator(mode="after")
     def _one_world(self) -> Study:
@@ -277,6 +289,14 @@ class Batch:
 
 
 @dataclass(frozen=True)
+class Part:
+    """One repetition of a study in one condition. `condition` is empty where the study has none."""
+
+    condition: str
+    plan: Plan
+
+
+@dataclass(frozen=True)
 class Plan:
     """A study ready to run: checked document, foundations before any redraw, methods and batches.
 
@@ -285,6 +305,8 @@ class Plan:
     vessels : every vessel that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from.
     changes : what `--set` changed, already in the document.
+    parts : name -> a study of its own, for every repetition in every condition; empty where there is neither. Then they
+        are what is run.
     """
 
     name: str
@@ -298,12 +320,14 @@ class Plan:
     vessels: Mapping[str, Vessel] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
+    parts: Mapping[str, Part] = field(default_factory=dict)
 
     @property
     def used_vessels(self) -> list[Vessel]:
         """The vessel of the truth, if there is one, and the bases of the foundations."""
         every = (self.truth, *(foundation.base for foundation in self.foundations))
-        return [vessel for vessel in every if vessel is not None]
+        of_parts = (vessel for part in self.parts.values() for vessel in part.plan.used_vessels)
+        return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
     @property
     def digest(self) -> str:
@@ -317,7 +341,7 @@ class Plan:
 
     def _digest(self, document: Document) -> str:
         vessels = sorted({vessel.digest for vessel in self.used_vessels})
-        methods = [{"kind": way.kind, **way.method.model_dump(mode="json")} for way in self.methods]
+        methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
         depends = {"vessels": vessels, "sources": dict(self.sources), "methods": methods}
         return documents.digest({"study": document, **depends})
 
@@ -450,7 +474,46 @@ def build_plan(
     )
     _check_names(plan)
     _check_memory(plan)
-    return plan
+    return replace(plan, parts=_parts(plan, file, known))
+
+
+def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
+    """Every repetition in every condition: `constant-1`, ...; DocumentError with the path of the cause."""
+    repeat, conditions = plan.study.repeat, plan.study.condition
+    if not repeat and not conditions:
+        return {}
+    names = [condition.name for condition in conditions]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise DocumentError(f"two conditions are called {name!r}", file=file, path=f"condition.{place}.name")
+    bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
+    turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
+    found: dict[str, Part] = {}
+    for place, condition in enumerate(conditions or [None]):
+        for number, turn in enumerate(turns, start=1):
+            words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
+            name = "-".join(words)
+            mine: dict[str, Any] = {} if condition is None else condition.set
+            part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
+            part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
+            whole: dict[str, Any] = {"repeat": {}, "condition": []}
+            found[name] = Part(
+                condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
+            )
+    return found
+
+
+def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
+    """A document with changes; DocumentError that names the key of the change where it reaches nothing."""
+    for path, value in changes.items():
+        if path.split(".", 1)[0] not in set(Study.model_fields) - set(OF_PARTS):
+            message = f"no such block: {choices(path, set(Study.model_fields) - set(OF_PARTS))}"
+            raise DocumentError(message, file=file, path=f"{where}.{path}")
+        try:
+            document = documents.replace(document, {path: value})
+        except (ValueError, IndexError, TypeError, AttributeError):
+            raise DocumentError("reaches no key of this study", file=file, path=f"{where}.{path}") from None
+    return document
 
 
 def _check_names(plan: Plan) -> None:

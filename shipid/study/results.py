@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
+from shipid.errors import ResultError
 from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.observer import Estimates, observe
@@ -69,6 +70,9 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
     folder = Path(folder)
     plan = store.stored_plan(folder)
+    if plan.parts:
+        named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
+        raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check(folder)
     cells = store.read_rows(folder)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
@@ -319,9 +323,14 @@ def naive_summary(results: Results) -> dict[str, float]:
 
 def reproducing_command(results: Results) -> str:
     """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
-    file = Path(results.provenance["file"])
-    name = results.plan.name if documents.bundled("studies").get(results.plan.name) == file else str(file)
-    changes = results.provenance.get("changes", {})
+    return command_of(replace(results.plan, changes=results.provenance.get("changes", {})))
+
+
+def command_of(plan: Plan) -> str:
+    """Return the command that runs a study, with its changes."""
+    file = Path(plan.file)
+    name = plan.name if documents.bundled("studies").get(plan.name) == file else str(file)
+    changes = plan.changes
     return " ".join(
         ["shipid study run", name, *(f"--set '{path}={json.dumps(value)}'" for path, value in changes.items())]
     )

@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -23,6 +23,7 @@ from shipid.data.windows import Windows, covered
 from shipid.engine.native import engine
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
@@ -83,7 +84,8 @@ def run_study(
 ) -> Iterator[Event]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
-    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again whole.
+    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again, its searches go on
+    from the journal of trials.
 
     Parameters
     ----------
@@ -94,6 +96,9 @@ def run_study(
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
+    if plan.parts:
+        yield from _run_parts(plan, folder, workers, scheduler, device)
+        return
     for words in (*seals.mend(folder), *_other_session(folder, device)):
         yield Event("note", words)
     if scheduler is None:
@@ -113,10 +118,14 @@ def run_study(
         yield Event("note", note)
     cells = len(store.finished(folder, plan.batches)) * len(plan.pairs)
     yield Event("start", done=cells, total=plan.cells)
+    trials = (folder / store.TRIALS).absolute()
+    Journal(trials)
+
+    def compute(batches: Iterable[Batch]) -> Computed:
+        return _compute(plan, prepared, batches, workers, scheduler, device, trials)
+
     with Claims(folder) as claims:
-        for rows in _shared(
-            plan, folder, claims, lambda batches: _compute(plan, prepared, batches, workers, scheduler, device)
-        ):
+        for rows in _shared(plan, folder, claims, compute):
             for row in rows:
                 cells += 1
                 yield Event("cell", done=cells, total=plan.cells, row=row)
@@ -127,6 +136,26 @@ def run_study(
     write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder))
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
+
+
+def _run_parts(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> Iterator[Event]:
+    """Run every part of a study in a folder of its own, one after the other; events count the cells of all."""
+    total = sum(part.plan.cells for part in plan.parts.values())
+    folders = {name: store.part_folder(folder, name) for name in plan.parts}
+    done = sum(
+        len(store.finished(folders[name], part.plan.batches)) * len(part.plan.pairs)
+        for name, part in plan.parts.items()
+    )
+    yield Event("start", done=done, total=total)
+    for name, part in plan.parts.items():
+        yield Event("note", f"{name}:")
+        for event in run_study(part.plan, folders[name], workers=workers, scheduler=scheduler, device=device):
+            if event.kind == "cell":
+                done += 1
+                yield replace(event, done=done, total=total)
+            elif event.kind == "note":
+                yield event
+    yield Event("end", text=str(folder), done=done, total=total)
 
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
@@ -179,16 +208,20 @@ def _free(left: Sequence[Batch], folder: Path, claims: Claims) -> Iterator[Batch
 
 
 def run_batch(
-    plan: Plan, prepared: Prepared, batch: Batch, device: str
+    plan: Plan, prepared: Prepared, batch: Batch, device: str, trials: Path | None = None
 ) -> list[tuple[dict[str, Any], Predictor | None]]:
-    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker."""
+    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker.
+
+    trials : the journal in which searches go on; on a machine that does not see the file, they are kept in memory.
+    """
     use_threads(1)
     check_device(device)
+    journal = Journal(trials) if trials is not None and trials.is_file() else None
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     known = predictions(plan, prepared, batch, device)
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
-    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device) for way in plan.methods}
+    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device, journal) for way in plan.methods}
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for name, way in plan.pairs:
         one, result = known[name], fitted[way.name][name]
@@ -211,6 +244,7 @@ def _fitted(
     known: Mapping[str, Prediction],
     way: Way,
     device: str,
+    journal: Journal | None,
 ) -> dict[str, Fitted]:
     """Results of one method for the foundations that it meets."""
     mine = {name: known[name] for name in way.foundations}
@@ -229,6 +263,8 @@ def _fitted(
         },
         estimates={name: at_instants(prepared.data, windows, one.estimates) for name, one in mine.items()},
         device=device,
+        journal=journal,
+        cells={name: batch.cell(name, way.name) for name in mine},
     )
     return way.method.fit(task)
 
@@ -313,17 +349,25 @@ def _predictor(
 
 
 def _compute(
-    plan: Plan, prepared: Prepared, batches: Iterable[Batch], workers: int | None, scheduler: str | None, device: str
+    plan: Plan,
+    prepared: Prepared,
+    batches: Iterable[Batch],
+    workers: int | None,
+    scheduler: str | None,
+    device: str,
+    trials: Path,
 ) -> Computed:
     """Batches and their results in the order in which they finish."""
     if scheduler is not None:
-        yield from _on_dask(plan, prepared, batches, scheduler, device)
+        yield from _on_dask(plan, prepared, batches, scheduler, device, trials)
         return
-    work = partial(run_batch, plan, prepared, device=device)
+    work = partial(run_batch, plan, prepared, device=device, trials=trials)
     yield from on_workers(work, batches, workers or os.cpu_count() or 1)
 
 
-def _on_dask(plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler: str, device: str) -> Computed:
+def _on_dask(
+    plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler: str, device: str, trials: Path
+) -> Computed:
     """The same on the cluster of an existing scheduler; ShipidError where it, or a worker, dies."""
     import dask
     from dask.distributed import CancelledError, Client, KilledWorker, as_completed
@@ -338,7 +382,7 @@ def _on_dask(plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler
             shared = client.scatter([plan, prepared], broadcast=True)
             futures = {
                 client.submit(
-                    run_batch, *shared, batch, device, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
+                    run_batch, *shared, batch, device, trials, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
                 ): batch
                 for batch in batches
             }

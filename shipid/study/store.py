@@ -34,7 +34,8 @@ from shipid.study.plan import Batch, Foundation, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
-DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
+DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
+PARTS = "parts"
 METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
 
 
@@ -138,6 +139,11 @@ def batch_file(folder: Path, batch: Batch) -> Path:
 def cell_file(folder: Path, cell: str) -> Path:
     """Where the predictor of a cell is."""
     return folder / "cells" / f"{cell}.npz"
+
+
+def part_folder(folder: Path, part: str) -> Path:
+    """Where the run of one part of a study is: a folder like that of any run."""
+    return folder / PARTS / part
 
 
 def finished(folder: Path, batches: Iterable[Batch]) -> list[Batch]:

@@ -41,7 +41,8 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
 
 def test_every_bundled_study_is_tested() -> None:
     worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "zigzags"}
-    assert set(bundled("studies")) == {"quick", "full-scale", *worlds}
+    of_methods = {"methods", "methods-full-scale", "paper-recipe"}
+    assert set(bundled("studies")) == {"quick", "full-scale", *worlds, *of_methods}
 
 
 def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
