@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from shipid.study.run import Event
 
 
+HANDLER = "command line"
+"""Name of the handler that writes log messages to standard error."""
+
+
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
     """Make a table of text: the headings of its columns, and rows of values."""
     from rich import box
@@ -190,8 +194,13 @@ def log_to_stderr(verbose: bool) -> None:
     """Write the warnings of shipid to standard error, or all its log messages."""
     import logging
 
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger = logging.getLogger("shipid")
+    for before in [one for one in logger.handlers if one.name == HANDLER]:
+        logger.removeHandler(before)
+    handler = logging.StreamHandler()
+    handler.name = HANDLER
+    handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG if verbose else logging.WARNING)
+    if verbose:
+        logger.setLevel(logging.DEBUG)

@@ -64,7 +64,9 @@ def test_a_world_twice_or_half_is_refused(tmp_path: Path, tiny_run: Path) -> Non
     with pytest.raises(ResultError, match=r"has seed = 0, as .* has: nothing is repeated"):
         read_worlds([tiny_run, tmp_path / "same"])
     run_here(tiny_plan(tmp_path, {"seed": 5}), tmp_path / "half")
-    next((tmp_path / "half" / "batches").glob("*.json")).unlink()
+    batch = next((tmp_path / "half" / "batches").glob("*.json"))
+    batch.unlink()
+    (tmp_path / "half" / "seals" / f"{batch.stem}.sha256").unlink()
     with pytest.raises(ResultError, match="is not finished: continue with `shipid study resume"):
         read_worlds([tiny_run, tmp_path / "half"])
     assert store.stored_plan(tmp_path / "half").study.seed == 5
