@@ -210,6 +210,18 @@ def study_report(folder: Folder) -> None:
     typer.echo(str(write_pages(folder)))
 
 
+@app.command("check")
+def study_check(folder: Folder) -> None:
+    """Check that the files of a run's folder are whole and as they were written; ends with 1 if one is not."""
+    from shipid.study.check import check_folder
+
+    found = check_folder(folder)
+    for line in found.lines:
+        typer.echo(line)
+    if found.faults:
+        raise typer.Exit(1)
+
+
 @app.command("compare")
 def study_compare(
     folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],

@@ -22,14 +22,16 @@ from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
+from shipid.predictor import MOST_STEPS
 from shipid.simulation.truth import Truth, check_truth, old_keys
+from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
 WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
-MOST_STEPS = 100_000
+
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
@@ -193,6 +195,7 @@ class Study(Strict):
     method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
     published: Published | None = None
+    unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     family: Annotated[list[Family], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -357,6 +360,12 @@ class Plan:
         """Number of cells."""
         return len(self.batches) * len(self.pairs)
 
+    def cut(self, columns: int) -> Cut:
+        """What decides how much memory the windows take, for a dataset of so many columns."""
+        prediction = self.study.prediction
+        rolled = len(self.foundations)
+        return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
+
     def label(self, foundation: str, method: str) -> str:
         """Name of a model for people: the foundation, with the method where that is not the only one that learns."""
         learning = [way.name for way in self.methods if way.method.compensates]
@@ -413,8 +422,11 @@ def build_plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
+    documents.check_values(document, file)
     _check_version(document, file)
     study = documents.parse(Study, document, file).in_its_world()
+    check_ranges(document, file)
+    check_seeds(study, file)
     known = dict(vessels or {})
     foundations = _foundations(study, file, known)
     methods = _methods(study, foundations, file)
@@ -433,9 +445,40 @@ def build_plan(
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
     found = _sources(study.data, file) if sources is None and study.data is not None else sources
-    return Plan(
+    plan = Plan(
         file.stem, str(file), document, study, foundations, methods, batches, truth, known, found or {}, changes or {}
     )
+    _check_names(plan)
+    _check_memory(plan)
+    return plan
+
+
+def _check_names(plan: Plan) -> None:
+    """Refuse names that are too long for the file of a cell."""
+    for name, way in plan.pairs:
+        longest = max(len(batch.cell(name, way.name)) for batch in plan.batches)
+        if longest > LONGEST_NAME:
+            message = (
+                f"{name[:40]}...: the name of a cell would have {longest} characters, at most {LONGEST_NAME} can be"
+            )
+            raise DocumentError(f"{message}: shorten the names of families and methods", file=plan.file, path="family")
+
+
+def _check_memory(plan: Plan) -> None:
+    """Refuse a truth whose records or windows exceed the memory of this machine, with the number that causes it."""
+    truth = plan.study.truth
+    if truth is None or plan.truth is None:
+        return
+    commands = 2 * len(plan.truth.document.get("thruster", {}))
+    columns = 8 + commands
+    each = {"truth.step": commands + columns * bool(truth.sensors) + 4 * bool(truth.gusts), "truth.interval": columns}
+    for path, between in (("truth.step", truth.step), ("truth.interval", truth.interval)):
+        numbers = truth.manoeuvres * truth.length / between * each[path]
+        words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
+        check_memory(numbers, words, path, plan.file)
+    words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
+    numbers = truth.manoeuvres * plan.cut(columns).numbers(truth.length)
+    check_memory(numbers, words, "prediction.interval", plan.file)
 
 
 def beside(folder: Path, name: str) -> Path:
