@@ -59,8 +59,7 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
         return Contrasts(mean, blank, blank, blank, blank)
     drawn, spread = _resampled(differences, weights)
     error = np.hypot(spread, training)
-    ahead = np.divide(mean, error, out=np.sign(mean) * np.inf, where=error > 0)
-    ahead[mean == 0] = 0.0
+    ahead = mean / np.maximum(error, 1e-12 * np.abs(mean) + 1e-300)
     student = float(stdtrit(len(counts) - 1, 1 - LEVEL))
     lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower"), -student)
     upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher"), student)
@@ -104,6 +103,14 @@ def resampled_means(values: Array, counts: Array) -> Array:
     draws = _draws(len(counts))
     means: Array = np.tensordot(draws * counts, values, axes=(1, values.ndim - 1))
     return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
+
+
+def over_worlds(values: Array) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than two."""
+    if len(values) < 2:
+        return np.nan, np.nan
+    wide = float(stdtrit(len(values) - 1, 1 - LEVEL) * values.std(ddof=1) / len(values) ** 0.5)
+    return float(values.mean()) - wide, float(values.mean()) + wide
 
 
 def holm(chances: Array) -> Array:

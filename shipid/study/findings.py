@@ -107,8 +107,11 @@ def judged(rivals: Rivals) -> list[Finding]:
         "R2": f"inaccurate and compensated {metres(H[bad])}, accurate alone {metres(alone[good])}: "
         f"{measured(about, 1)} less",
         "R3": f"gap {metres(before)} before, {metres(after)} after: {measured(gaps, 0 if narrower else 1)} less",
-        "R4": f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; "
-        f"most often worst: {worst}",
+        "R4": (
+            f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; most often worst: {worst}"
+            if len(rivals.steps[NO_MODEL]) > 1
+            else f"worst over the horizon, physics alone included: {worst}"
+        ),
     }
     numbers = {
         "R1": {"H / A, accurate": H[good] / alone[good], "H / A, inaccurate": H[bad] / alone[bad]},

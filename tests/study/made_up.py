@@ -77,24 +77,25 @@ def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> tup
     fall = (1 - effect if case == "S2" else 0.0) + (effect if case == "S2" else 1.0) * share**-0.4
     none = 4.0 * (np.ones(len(share)) if case == "S6" else fall)
     names = (*moderate, *high)
-    A = dict(zip(names, 2.0 * 1.25 ** np.arange(len(names)), strict=True))
+    apart = effect if case == "S6" else 1.0
+    A = dict(zip(names, 4.0 * 1.25 ** (apart * np.arange(len(names))), strict=True))
     level = np.linspace(0.55, 0.8, len(moderate))
     H = {NO_MODEL: none}
     for k, model in enumerate(moderate):
         H[model] = none * (1 - effect * (1 - level[k])) if case in ("S1", "S6") else none * level[k]
     for k, model in enumerate(high):
-        H[model] = none * (0.85, 1.4)[k % 2] ** (effect if case == "S4" else 1.0)
+        H[model] = none * (0.6, 1.6)[k % 2] ** (effect if case == "S4" else 1.0)
     if case == "S3":  # H without order in A, or along it, steeper where data are few
         order = rng.permutation(len(names))
         for k, model in enumerate(names):
-            steep = 0.45 * share**-0.3
-            along = (1 - effect) * 0.05 * order[k] + effect * steep * np.log(A[model] / 4.0)
+            steep = 0.8 * share**-0.4
+            along = (1 - effect) * 0.05 * order[k] + effect * steep * np.log(A[model] / 8.0)
             H[model] = none * np.exp(along - 0.2)
     trained = {m: TRAINED * (1 + 4 * effect * (k % 2)) for k, m in enumerate(high)} if case == "S4" else None
     by_mean = table(rng, size, A, H, trained)
     if case == "S5":
-        apart = {m: means ** effect * rng.uniform(0.5, 8.0, len(share)) ** (1 - effect) for m, means in H.items()}
-        by_90 = table(rng, size, {m: 2 * a for m, a in A.items()}, apart)
+        other = {m: means**effect * rng.uniform(0.5, 8.0, len(share)) ** (1 - effect) for m, means in H.items()}
+        by_90 = table(rng, size, {m: 2 * a for m, a in A.items()}, other)
     else:
         tails = {model: 2.2 * values * factor(rng, 0.05, values.shape) for model, values in by_mean.H.items()}
         by_90 = ErrorTable(size.amounts, by_mean.counts, {m: 2.2 * a for m, a in by_mean.A.items()}, tails)
