@@ -1,0 +1,36 @@
+"""Words of verdicts and numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.study.verdict import every, interval, metres, runs, shown, some, too_few, verdict, weakest
+
+
+def test_verdicts() -> None:
+    assert verdict(True, False) == "confirmed"
+    assert verdict(False, True) == "refuted"
+    assert verdict(False, False) == "undecided"
+    assert weakest(["confirmed", "confirmed"]) == "confirmed"
+    assert weakest(["confirmed", "undecided"]) == "undecided"
+    assert weakest(["undecided", "refuted"]) == "refuted"
+
+
+def test_all_need_no_correction_and_some_do() -> None:
+    """0.02 for each of three: all are shown; beside one that is not, 0.02 x 3 shows none."""
+    assert every(np.array([0.02, 0.02, 0.02]))
+    assert shown(np.array([0.02, 0.02, 0.02])).all()
+    assert not some(np.array([0.02, 0.02, 0.5]))
+    assert shown(np.array([0.002, 0.02, 0.5])).tolist() == [True, False, False]
+    assert not every(np.array([]))
+    assert not every(np.array([np.nan]))
+
+
+def test_numbers_in_words() -> None:
+    assert metres(9.99) == "9.99 m"
+    assert metres(9.996) == "10.0 m"
+    assert interval(1.0, 12.0) == " [1.0, 12.0]"
+    assert interval(np.nan, np.nan) == ""
+    assert runs(1) == "1 run"
+    assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
+    assert too_few(5) == ""
