@@ -66,7 +66,7 @@ def over_time(content: ReportContent) -> Figure | None:
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(means[means.N_D.isin([0, counts[-1]])]),
+        takeaway=_takeaway_time(content, means[means.N_D.isin([0, counts[-1]])]),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below."
         + _drawn(content)
@@ -103,7 +103,7 @@ def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
 def _drawn(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), exemplars(content)
-    return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
+    return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A, and the best in validation: {listed(shown, 6)}."
 
 
 def _size_control(counts: Sequence[int]) -> Control:
@@ -194,7 +194,8 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     alone = end[end.source == "physics"].set_index("model")["mean"]
     if together.empty:
         return "No compensated model gave a prediction."
-    best, pure = str(together.idxmin()), data_driven(content)
+    pure = data_driven(content)
+    best = content.best if content.best in together.index else str(together.index[0])
     text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
     return text + (
@@ -202,13 +203,14 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     )
 
 
-def _takeaway_time(means: pd.DataFrame) -> str:
+def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
     together = means[means.source == "cooperative"]
     if together.empty:
         return "No compensated model gave a prediction."
-    best = str(together.groupby("model").error.mean().idxmin())
+    names = list(together.model)
+    best = content.best if content.best in names else str(names[0])
     worst = together[together.model == best].nlargest(1, "error").iloc[0]
-    text = f"{best}, the best of those drawn, errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    text = f"{best} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
     same = means[means.model.eq(best) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)]
     return f"{text} on average over the horizon" + (
         f", where its physics alone errs by {metres(float(same.error.iloc[0]))}." if len(same) else "."

@@ -46,9 +46,9 @@ def middles(content: ReportContent) -> dict[str, str]:
 
 
 def exemplars(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A."""
+    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
     names = [str(name) for name in families(content).model]
-    middle = set(middles(content).values())
+    middle = {*middles(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
 
 
