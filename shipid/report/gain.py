@@ -101,7 +101,7 @@ def _lines(
 ) -> go.Figure:
     sizes = sorted(content.cells.N_D.unique())
     traces = []
-    for name, style in looks.items():
+    for name, style in reversed(looks.items()):  # what has no physics first: it must not cover the others
         mine = means[means.model == name].set_index("N_D")[statistic.cell]
         if mine.empty:
             continue

@@ -10,7 +10,7 @@ import pandas as pd
 from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
-FEW_RUNS = 12  # test runs in the error-over-time figure and the window browser
+FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 
 
 def spread(items: Sequence[str], count: int) -> list[str]:
