@@ -25,7 +25,11 @@ MOST_LINES = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
 SHORT = 12  # characters of a name at the axis
-WIDE, ASIDE, BACK = 0.34, 0.45, 0.11  # of the oblique bars: half a width; how far aside and up (of the highest) an N_D is
+WIDE, ASIDE, BACK = (
+    0.34,
+    0.45,
+    0.11,
+)  # of the oblique bars: half a width; how far aside and up (of the highest) an N_D is
 SHADE = "rgba(0,0,0,0.28)"
 
 

@@ -112,7 +112,11 @@ def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
 def _drawn(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), exemplars(content)
-    return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A, and the best in validation: {listed(shown, 6)}."
+    return (
+        ""
+        if len(shown) >= total
+        else f" Of {total} models, the middle one of each family by A, and the best in validation: {listed(shown, 6)}."
+    )
 
 
 def _size_control(counts: Sequence[int]) -> Control:

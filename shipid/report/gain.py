@@ -140,7 +140,9 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     for size in (means.N_D.min(), means.N_D.max()):
         here = means[means.N_D.eq(size)].set_index("model").H
         known = [f"{name} has H = {metres(here[name])}" for name in (content.best, pure) if name in here.index]
-        parts.append(f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}")
+        parts.append(
+            f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
+        )
     said = f" {content.best} is the best in validation." if content.best else ""
     return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}.{said}"
 
@@ -230,7 +232,11 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
     before = content.models.set_index("model").A.reindex(after.index).dropna()
     better = before.index[after[before.index] < before]
     best, pure = content.best, data_driven(content)
-    text = f"{best}, best in validation, has H = {metres(after[best])}; compensation" if best in after.index else "Compensation"
+    text = (
+        f"{best}, best in validation, has H = {metres(after[best])}; compensation"
+        if best in after.index
+        else "Compensation"
+    )
     text += f" improves {len(better)} of "
     text += f"{counted(len(before), 'physics model')}"
     if pure and pure in after.index:

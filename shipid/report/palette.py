@@ -75,7 +75,7 @@ def styles(content: ReportContent) -> dict[str, Style]:
 
 
 def close_styles(content: ReportContent) -> dict[str, Style]:
-    """Style of the models of a close-up: a colour and a marker each, whatever their A; rivals without physics in ink."""
+    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink."""
     frame, result = families(content), {}
     of_family = dict(zip(frame.model.astype(str), frame.family, strict=True))
     physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]

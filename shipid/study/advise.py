@@ -250,7 +250,9 @@ def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
     elif found.below:
         text = f"without physics the same {runs(fewest)} do as well{bounds}, {case.H(NO_MODEL, fewest)}"
     else:
-        text = f"without physics the same error takes about {found.value:.0f} runs{bounds}, interpolated between amounts"
+        text = (
+            f"without physics the same error takes about {found.value:.0f} runs{bounds}, interpolated between amounts"
+        )
     return f"{begins}; {text}."
 
 
@@ -267,8 +269,8 @@ def _headline(case: Case) -> str:
     told = "" if case.smallest < case.largest else "best in validation; "
     text = (
         f"With {runs(case.largest)}, {case.best} ({told}{metres(row['A'])} mean error on its own) "
-        f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are below "
-        f"{metres(row['H_90'])}"
+        f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
+        f"below {metres(row['H_90'])}"
     )
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
     return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."
@@ -290,7 +292,7 @@ def _caveats(results: Results) -> list[str]:
 
 
 def _physics_or_none(case: Case, judged: bool) -> list[str]:
-    """Which physics models, compensated, beat none and which harm, at the smallest and at the largest amount of data."""
+    """Which physics models, compensated, beat none and which harm, at the smallest and the largest amount of data."""
     if not judged:
         where = runs(case.largest)
         return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
@@ -369,7 +371,8 @@ def _floor(case: Case) -> str:
         return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model beats it."
     others = [*sides.worse, *sides.open]
     verb = "does" if len(others) == 1 else "do"
-    return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} {named(others)} {verb} not beat it."
+    begins = f"Keeping u, v and r constant gives {metres(floor)}"
+    return f"{begins}: at {runs(case.largest)} {named(others)} {verb} not beat it."
 
 
 def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
@@ -392,7 +395,9 @@ def _how_to_read(case: Case) -> list[str]:
         if PLAIN in table.H:
             first, last = (table.mean(PLAIN, case.place(amount)) for amount in (case.smallest, case.largest))
             mirrored_first = table.mean(NO_MODEL, case.place(case.smallest))
-            text += f"; without that it has {metres(first)} at {runs(case.smallest)} instead of {metres(mirrored_first)}"
+            text += (
+                f"; without that it has {metres(first)} at {runs(case.smallest)} instead of {metres(mirrored_first)}"
+            )
             text += f", and {metres(last)} at {runs(case.largest)}" if case.largest > case.smallest else ""
         found.append(f"{text}.")
     top = case.at(case.largest)
@@ -400,13 +405,13 @@ def _how_to_read(case: Case) -> list[str]:
     if len(fitted) and not fitted["model"].eq(case.best).any():
         lowest = fitted.iloc[int(fitted["loss"].argmin())]
         found.append(
-            f"Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
+            "Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
         )
     if plan.study.prediction.commands == "known" and _may_react(case.results):
         found.append(
-            "The orders of the next seconds were known. In a zigzag they tell when the heading will reach its limit, so "
-            "these errors show at best what knowing the plan can give: an upper bound of its worth."
+            "The orders of the next seconds were known. In a zigzag they tell when the heading will reach its limit, "
+            "so these errors show at best what knowing the plan can give: an upper bound of its worth."
         )
     if note := too_few(table.runs):
         found.append(f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another.")

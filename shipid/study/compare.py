@@ -45,7 +45,7 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
 
 
 def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
-    """One row per finding and key number: id, claim, verdicts, number, its mean over the worlds that have it, low, high.
+    """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
 
     low and high are Student's 95 % interval over worlds, not a number from fewer than two.
     """

@@ -63,7 +63,7 @@ class ErrorTable:
         return float(self.by_run(model, place) @ self.weights)
 
     def compare(self, differences: Sequence[Sequence[Term]]) -> Contrasts:
-        """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "moderate-1", 0)]` is what physics saves."""
+        """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
         values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
         for row, terms in enumerate(differences):
             for factor, model, place in terms:

@@ -68,7 +68,7 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
 
 
 def _resampled(differences: Array, weights: Array) -> tuple[Array, Array]:
-    """Bootstrap-t of weighted means: (B, J) distances from the mean in standard errors, and (J,) standard errors [m]."""
+    """Bootstrap-t of weighted means: (B, J) distances from the mean in standard errors; (J,) standard errors [m]."""
     draws = _draws(len(weights))
     mean = differences @ weights
     sums = weights * differences  # (J, R)

@@ -4,7 +4,7 @@ All are taken over the members of the moderate and the high family that have a r
 failed anywhere is left out and named. The unit of evidence is the test manoeuvre: "shown" means a paired difference
 whose 95 % interval over test manoeuvres is free of 0 (`shipid.study.evidence`). A claim about all needs each of its
 differences shown; a claim about some, and a list of names, is corrected for how many could have been (Holm). A finding
-is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres never confirm nor refute.
+is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres decide nothing.
 
 S1 : every moderate member has a lower H than pure data-driven at the smallest N_D, and more than half of them have it
     at every N_D.
@@ -129,7 +129,8 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
     }
     table = error_table(results, [name for names in members.values() for name in names], metric)
     sound = {
-        family: tuple(name for name in names if name in table.H and name in table.A) for family, names in members.items()
+        family: tuple(name for name in names if name in table.H and name in table.A)
+        for family, names in members.items()
     }
     left_out = tuple(name for names in members.values() for name in names if name not in table.H or name not in table.A)
     kept = (*sound[claims.moderate], *sound[claims.high])
@@ -226,8 +227,8 @@ def _S3(grid: Grid) -> Finding:
     order = np.vstack([H, H[0] - H[last]])
     rises = [rank_correlation(A, values) for values in H]
     evidence = (
-        f"for twice the A, H rises by {measured(found, 0)} at N_D = {grid.amounts[0]} and by {measured(found, last)} at "
-        f"{grid.amounts[last]}, {measured(found, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
+        f"for twice the A, H rises by {measured(found, 0)} at N_D = {grid.amounts[0]} and by {measured(found, last)} "
+        f"at {grid.amounts[last]}, {measured(found, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
         f"{max(rises):.2f} over N_D ({len(A)} models)"
     )
     numbers = {
@@ -400,7 +401,9 @@ def _S7(results: Results, grid: Grid) -> Finding:
     if results.test.horizon < 3:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
     if smooth_by_construction(results.plan):
-        evidence = "the compensation is a polynomial of time, which is smooth whatever it learned; `path-trained` is not"
+        evidence = (
+            "the compensation is a polynomial of time, which is smooth whatever it learned; `path-trained` is not"
+        )
         return _finding("S7", "not testable", evidence)
     first = grid.amounts[0]
     cells = judged_cells(results)

@@ -331,7 +331,7 @@ class Plan:
 
     @property
     def plain(self) -> str | None:
-        """Name of the method that predicts without physics and without the mirror symmetry of the hull, if there is one."""
+        """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
         alone = [way for way in self.methods if way.foundations == (NO_MODEL,) and way.name != self.judged]
         return next((way.name for way in alone if getattr(way.method, "mirror", None) == 0.0), None)
 

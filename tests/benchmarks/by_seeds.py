@@ -1,7 +1,7 @@
 """The rules of version 0.2, to measure what today's replaced: seeds were the evidence, "confirmed" if all agreed.
 
-A condition on mean errors was confirmed if it held for the mean over seeds and for every seed, undecided if only for the
-mean, else refuted; with one seed nothing was ever undecided.
+A condition on mean errors was confirmed if it held for the mean over seeds and for every seed, undecided if only for
+the mean, else refuted; with one seed nothing was ever undecided.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ def by_seed(grid: Grid) -> dict[str, Array]:
     return {model: values @ grid.table.weights for model, values in grid.table.H.items()}
 
 
-def asked(H: Mapping[str, Array], holds: Callable[[Means], bool], weakly: Callable[[Means], bool] | None = None) -> Verdict:
+def asked(
+    H: Mapping[str, Array], holds: Callable[[Means], bool], weakly: Callable[[Means], bool] | None = None
+) -> Verdict:
     """Ask a condition of the mean over seeds and of every seed."""
     mean = {model: values.mean(axis=1) for model, values in H.items()}
     seeds = next(iter(H.values())).shape[1]
@@ -118,9 +120,7 @@ def S6(grid: Grid) -> Verdict:
     H = by_seed(grid)
     A = {model: float(values @ grid.table.weights) for model, values in grid.table.A.items()}
     small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
-    data = [
-        (H[m][i], H[NO_MODEL][j]) for m in grid.moderate for i in small for j in range(i + 1, len(grid.amounts))
-    ]
+    data = [(H[m][i], H[NO_MODEL][j]) for m in grid.moderate for i in small for j in range(i + 1, len(grid.amounts))]
     physics = [(H[m][i], np.array(A[o])) for m in grid.moderate for i in small for o in grid.physics if A[o] < A[m]]
     sure = [any(bool((mine < other).all()) for mine, other in pairs) for pairs in (data, physics)]
     mean = [any(bool(mine.mean() < other.mean()) for mine, other in pairs) for pairs in (data, physics)]
@@ -146,8 +146,6 @@ def R(rivals: Rivals) -> dict[str, Verdict]:
     return {
         "R1": verdict(*(all(bool(of(H[m]) < A[m]) for m in (good, bad)) for of in (np.max, np.mean))),
         "R2": verdict(H[bad].max() <= 1.1 * A[good], H[bad].mean() <= 1.1 * A[good]),
-        "R3": verdict(
-            bool((np.abs(H[good] - H[bad]) < gap).all()), abs(float(H[good].mean() - H[bad].mean())) < gap
-        ),
+        "R3": verdict(bool((np.abs(H[good] - H[bad]) < gap).all()), abs(float(H[good].mean() - H[bad].mean())) < gap),
         "R4": verdict(share == 1.0, share > 0.5),
     }

@@ -1,4 +1,4 @@
-"""How often every verdict rule errs: tables of errors in which the truth is known, judged by today's rules and before."""
+"""How often every verdict rule errs: tables of errors whose truth is known, judged by the rules of today and before."""
 
 from __future__ import annotations
 

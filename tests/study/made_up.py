@@ -57,7 +57,7 @@ def table(
     H: Mapping[str, Array],
     trained: Mapping[str, float] | None = None,
 ) -> ErrorTable:
-    """Draw errors around true means: A by model [m], H by model (amounts,) [m]; `trained`: another spread of training."""
+    """Draw errors around true means: A by model [m], H by model (amounts,) [m]; `trained`: other spreads."""
     runs, counts = size.runs, rng.integers(WINDOWS // 2, WINDOWS, size.runs).astype(float)
     hard, (amounts, seeds) = factor(rng, HARD, (runs,)), (len(size.amounts), size.seeds)
     drawn = factor(rng, DRAWN, (amounts, seeds, 1))
@@ -130,9 +130,7 @@ def rivals(rng: np.random.Generator, size: Size, case: str, effect: float) -> Ri
 def roughness(rng: np.random.Generator, size: Size, effect: float) -> tuple[Array, Array, Array, Array]:
     """Roughness of true, pure and cooperative paths by manoeuvre, and windows: at the limits of S7, or well beyond."""
     true = factor(rng, HARD, (size.runs,))
-    pure, together = (
-        1.5 * mean * true * factor(rng, SUITS, (size.runs,)) for mean in (1 + effect, 1 - 0.3 * effect)
-    )
+    pure, together = (1.5 * mean * true * factor(rng, SUITS, (size.runs,)) for mean in (1 + effect, 1 - 0.3 * effect))
     return true, pure, together, np.full(size.runs, float(WINDOWS))
 
 

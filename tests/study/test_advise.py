@@ -51,9 +51,7 @@ def test_harmful_compensation_is_told(made: Any) -> None:
     """`good` alone has 2 m and `bad` 4 m."""
     said = text(made(grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "none": (9.0, 4.0)})))
     assert "Compensation harms good; good alone has 2.00 m, less than any compensated model." in said
-    assert "harms" not in text(
-        made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
-    )
+    assert "harms" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
 
 
 def test_no_amount_of_data_replaces_physics(made: Any) -> None:
@@ -66,7 +64,9 @@ def test_no_amount_of_data_replaces_physics(made: Any) -> None:
 def test_physics_worth_no_run_at_all(made: Any) -> None:
     """Where the least data does without physics what the best physics does, nobody needs more runs."""
     said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (1.25, 1.1)})))
-    assert "good (best in validation) has 1.50 m mean error; without physics the same 10 runs do as well, 1.25 m." in said
+    assert (
+        "good (best in validation) has 1.50 m mean error; without physics the same 10 runs do as well, 1.25 m." in said
+    )
 
 
 def test_harm_is_told_with_names(made: Any) -> None:
@@ -114,7 +114,9 @@ def test_how_good_physics_must_be(made: Any) -> None:
     alone = {f"m{k}": 2.0**k for k in range(5)}
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.0)}
     said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert re.search(r"8 s ahead\? With 10 runs physics pays if its own error A is below about 6\.0 m \[\d\.\d, \d", said)
+    assert re.search(
+        r"8 s ahead\? With 10 runs physics pays if its own error A is below about 6\.0 m \[\d\.\d, \d", said
+    )
     assert "; with 30 runs the test cannot tell any of 5 physics models from no physics." in said
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     said = text(made(grid(H), alone=alone, claims=None, runs=8))

@@ -87,7 +87,9 @@ def test_too_few_test_manoeuvres_decide_nothing(judged: Any) -> None:
 def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     found = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
     assert found["verdict"] == "refuted"
-    assert "at N_D = 10 refuted: 2 of 3 moderate models beat pure data-driven (8.00 m), by -1.50 m [" in found["evidence"]
+    assert (
+        "at N_D = 10 refuted: 2 of 3 moderate models beat pure data-driven (8.00 m), by -1.50 m [" in found["evidence"]
+    )
     found = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
     assert found["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
     assert "that most keep the lead is undecided: 1 at 30, 3 at 100" in found["evidence"]

@@ -11,7 +11,9 @@ from shipid.study.error_table import ErrorTable
 from shipid.study.worth import break_even, runs_without_physics
 
 
-def table(A: Mapping[str, float], H: Mapping[str, Sequence[float]], amounts: tuple[int, ...], runs: int = 8) -> ErrorTable:
+def table(
+    A: Mapping[str, float], H: Mapping[str, Sequence[float]], amounts: tuple[int, ...], runs: int = 8
+) -> ErrorTable:
     """Errors that are up to a tenth lower or higher by manoeuvre, alike for all models."""
     hard = np.linspace(0.9, 1.1, runs)
     return ErrorTable(
@@ -31,7 +33,7 @@ def test_break_even_by_hand() -> None:
     assert found is not None
     assert found.value == pytest.approx(6.0)
     assert found.low < 6.0 < found.high
-    assert not (found.above or found.below or found.unknown)
+    assert not any((found.above, found.below, found.unknown))
     assert break_even(table(A, {m: [1.0] for m in [*A, "none"]}, (10,)), list(A)[:3], 0) is None
 
 
