@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from shipid.errors import visible
+
 if TYPE_CHECKING:
     from pandas import DataFrame
     from rich.table import Table
@@ -25,9 +27,9 @@ def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> 
 
     result = Table(box=box.SIMPLE_HEAD)
     for column in columns:
-        result.add_column(Text(column))  # as text: rich would take [m] for markup
+        result.add_column(Text(visible(column)))  # as text: rich would take [m] for markup
     for row in rows:
-        result.add_row(*(Text(str(cell)) for cell in row))
+        result.add_row(*(Text(visible(str(cell))) for cell in row))
     return result
 
 
@@ -40,6 +42,17 @@ def show(table: Table) -> None:
         console.print(table)
     else:
         Console(width=200).print(table)
+
+
+def show_reasons(choices: list[tuple[str, str, str]]) -> None:
+    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+    from rich.console import Console
+
+    if Console().is_terminal:
+        show(table(["choice", "value", "because"], choices))
+        return
+    for path, value, why in choices:
+        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
 
 
 def digits(value: float) -> str:
@@ -133,7 +146,7 @@ def draw(events: Iterable[Event]) -> None:
         for event in events:
             line = event_line(event)
             if line:
-                typer.echo(line)
+                typer.echo(visible(line))
         return
     from rich.progress import (
         BarColumn,
@@ -157,7 +170,7 @@ def draw(events: Iterable[Event]) -> None:
         task = progress.add_task("cells", total=None)
         for event in events:
             if event.kind == "note":
-                progress.console.print(event.text, markup=False, highlight=False)
+                progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
             elif event.kind == "cell":
@@ -173,12 +186,12 @@ def draw(events: Iterable[Event]) -> None:
                 progress.update(task, completed=event.done, description=label)
 
 
-def log_to_stderr() -> None:
-    """Write the log messages of shipid to standard error."""
+def log_to_stderr(verbose: bool) -> None:
+    """Write the warnings of shipid to standard error, or all its log messages."""
     import logging
 
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger = logging.getLogger("shipid")
     logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG)
+    logger.setLevel(logging.DEBUG if verbose else logging.WARNING)

@@ -25,6 +25,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
+from shipid.logs.admit import check_log
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, TextFormat, read_table, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
@@ -68,6 +69,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     for kind in off:
         if kind not in REPAIRS:
             raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)
+    check_log(source)
     digest = digest_of(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(

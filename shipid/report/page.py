@@ -12,6 +12,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from shipid.errors import ResultError
+from shipid.files import write_text
 from shipid.report import palette, paths
 from shipid.report.content import Finding, ReportContent, Sentence
 from shipid.report.figure import Figure
@@ -116,10 +117,9 @@ def write_report(content: ReportContent, file: Path) -> Path:
 
 
 def write(text: str, file: Path) -> Path:
-    """Write text, making the folder if need be; ResultError if the place cannot be written."""
+    """Write text whole or not at all, making the folder if need be; ResultError if the place cannot be written."""
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8", newline="\n")
+        write_text(file, text)
     except OSError as error:
         raise ResultError(f"cannot be written ({error.strerror})", file=file) from None
     return file

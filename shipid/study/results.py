@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from shipid.metrics import error_by_axis, over_horizon, over_time, position_erro
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
@@ -68,6 +69,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
     folder = Path(folder)
     plan = store.stored_plan(folder)
+    seals.check(folder)
     cells = store.read_rows(folder)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
@@ -369,6 +371,10 @@ def provenance_words(results: Results) -> dict[str, str]:
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)
+    sessions = record.get("sessions", [])
+    changed = [words for one, other in pairwise(sessions) for words in store.differences(one, other)]
+    if changed:
+        words["computed in parts"] = "; ".join(changed)
     notes = record.get("notes", [])
     if notes:
         words["notes"] = "; ".join(notes)

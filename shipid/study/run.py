@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
@@ -18,6 +20,7 @@ import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Windows, covered
+from shipid.engine.native import engine
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
@@ -25,7 +28,8 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor, limits_of
-from shipid.study import store
+from shipid.study import seals, store
+from shipid.study.claims import Claims, pause
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Way
@@ -42,6 +46,15 @@ from shipid.study.prepare import (
 from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+
+DASK = {  # a graph is never large here; a scheduler that is gone is noticed in seconds
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+    "distributed.comm.timeouts.connect": "5s",
+    "distributed.comm.retry.count": 0,
+}
+DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all batches share
+Rows = list[dict[str, Any]]
+Computed = Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
@@ -81,38 +94,32 @@ def run_study(
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
+    for words in (*seals.mend(folder), *_other_session(folder, device)):
+        yield Event("note", words)
     if scheduler is None:
         import_for_workers()
-    if not (folder / store.DATASET).exists():
+    if not seals.is_sealed(folder, DATA):
         made = plan.study.data is not None and plan.study.data.dataset is not None
         doing = "reading the dataset" if made else "importing the log"
         yield Event("note", "simulating the truth" if plan.study.truth else doing)
         write_dataset(obtain(plan), folder / store.DATASET)
+        seals.write_seal(folder, DATA, [folder / store.DATASET])
     dataset = read_dataset(folder / store.DATASET)
     yield Event("note", "rolling out the foundations")
     prepared = prepare(plan, dataset, device)
-    fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if one.identify is None}
-    store.write_test(folder, prepared.test, fixed, prepared.naive)
-    write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
-    write_json(
-        folder / store.FOUNDATIONS, [{**describe(one), **_accuracy(one, prepared)} for one in prepared.foundations]
-    )
+    if not seals.is_sealed(folder, COMMON):
+        _write_common(plan, folder, prepared)
     for note in prepared.notes:
         yield Event("note", note)
-    done = store.finished(folder, plan.batches)
-    left = [batch for batch in plan.batches if batch not in done]
-    cells = len(done) * len(plan.pairs)
+    cells = len(store.finished(folder, plan.batches)) * len(plan.pairs)
     yield Event("start", done=cells, total=plan.cells)
-    for batch, results in _compute(plan, prepared, left, workers, scheduler, device):
-        rows = []
-        for row, predictor in results:
-            if predictor is not None:
-                predictor.save(store.cell_file(folder, row["cell"]))
-            rows.append(row)
-        write_json(store.batch_file(folder, batch), rows)
-        for row in rows:
-            cells += 1
-            yield Event("cell", done=cells, total=plan.cells, row=row)
+    with Claims(folder) as claims:
+        for rows in _shared(
+            plan, folder, claims, lambda batches: _compute(plan, prepared, batches, workers, scheduler, device)
+        ):
+            for row in rows:
+                cells += 1
+                yield Event("cell", done=cells, total=plan.cells, row=row)
     record = read_json(folder / store.PROVENANCE)
     record["notes"] = list(prepared.notes)
     record["machine"] = {**machine(), "device": device}
@@ -120,6 +127,55 @@ def run_study(
     write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder))
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
+
+
+def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
+    """Store what all batches share, so that a report needs nothing else."""
+    fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if one.identify is None}
+    store.write_test(folder, prepared.test, fixed, prepared.naive)
+    write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
+    write_json(
+        folder / store.FOUNDATIONS, [{**describe(one), **_accuracy(one, prepared)} for one in prepared.foundations]
+    )
+    seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
+
+
+def _other_session(folder: Path, device: str) -> Iterator[str]:
+    """Note what this run is computed with; a sentence where earlier results were computed with something else."""
+    found = machine()
+    packages = found["packages"]
+    session = {"shipid": packages.pop("shipid"), "engine": engine(), "python": found["python"], "device": device}
+    changed = store.note_session(folder, {**session, "packages": packages})
+    if changed:
+        yield f"earlier results were computed otherwise: {'; '.join(changed)}"
+
+
+def _shared(plan: Plan, folder: Path, claims: Claims, compute: Callable[[Iterable[Batch]], Computed]) -> Iterator[Rows]:
+    """Rows of every batch that is not finished yet, computed here or, where another run is at work on it, there."""
+    known = set(store.finished(folder, plan.batches))
+    while left := [batch for batch in plan.batches if batch not in known]:
+        before = len(known)
+        for batch, results in compute(_free(left, folder, claims)):
+            store.write_batch(folder, batch, results)
+            claims.give_back(batch.key)
+            known.add(batch)
+            yield [row for row, _ in results]
+        for batch in store.finished(folder, left):
+            if batch not in known:  # another run has finished it
+                known.add(batch)
+                yield store.read_batch(folder, batch)
+        if len(known) == before:
+            pause()
+
+
+def _free(left: Sequence[Batch], folder: Path, claims: Claims) -> Iterator[Batch]:
+    """Batches on which nobody works, each claimed when it is taken from here."""
+    for batch in left:
+        if not store.finished(folder, [batch]) and claims.take(batch.key):
+            if store.finished(folder, [batch]):  # by another run, just before its claim ended
+                claims.give_back(batch.key)
+            else:
+                yield batch
 
 
 def run_batch(
@@ -257,8 +313,8 @@ def _predictor(
 
 
 def _compute(
-    plan: Plan, prepared: Prepared, batches: list[Batch], workers: int | None, scheduler: str | None, device: str
-) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
+    plan: Plan, prepared: Prepared, batches: Iterable[Batch], workers: int | None, scheduler: str | None, device: str
+) -> Computed:
     """Batches and their results in the order in which they finish."""
     if scheduler is not None:
         yield from _on_dask(plan, prepared, batches, scheduler, device)
@@ -267,22 +323,18 @@ def _compute(
     yield from on_workers(work, batches, workers or os.cpu_count() or 1)
 
 
-def _on_dask(
-    plan: Plan, prepared: Prepared, batches: list[Batch], scheduler: str, device: str
-) -> Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]:
-    """The same on the cluster of an existing scheduler."""
-    if not batches:
-        return
+def _on_dask(plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler: str, device: str) -> Computed:
+    """The same on the cluster of an existing scheduler; ShipidError where it, or a worker, dies."""
     import dask
-    from dask.distributed import Client, as_completed
+    from dask.distributed import CancelledError, Client, KilledWorker, as_completed
 
-    with warnings.catch_warnings(), dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
+    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
         warnings.simplefilter("ignore")
         try:
             client = Client(scheduler, timeout="10s")
         except (OSError, ValueError) as error:
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
-        with client:
+        try:
             shared = client.scatter([plan, prepared], broadcast=True)
             futures = {
                 client.submit(
@@ -292,3 +344,27 @@ def _on_dask(
             }
             for future in as_completed(futures):
                 yield futures[future], future.result()
+        except (OSError, TimeoutError, CancelledError, KilledWorker) as error:
+            kept = "what is finished is kept: go on with `shipid study resume`"
+            if isinstance(error, KilledWorker):
+                message = f"workers of the cluster die, perhaps for want of memory; {kept} and larger workers"
+            else:
+                message = f"the Dask scheduler or its workers are gone; {kept}"
+            raise ShipidError(message, path=f"--scheduler {scheduler}") from None
+        finally:
+            with suppress(Exception):  # a client whose scheduler is gone complains in many ways
+                client.close(timeout=2)
+
+
+@contextmanager
+def _without_logs(*names: str) -> Iterator[None]:
+    """Silence loggers and those below them, whose errors are said in one line."""
+    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
+    before = {logger: logger.level for logger in every}
+    try:
+        for logger in every:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.study.verdict import every, interval, metres, runs, shown, some, too_few, verdict, weakest
+from shipid.study.plan import NO_MODEL
+from shipid.study.verdict import (
+    every,
+    interval,
+    metres,
+    named,
+    runs,
+    shown,
+    some,
+    too_few,
+    undecided,
+    verdict,
+    weakest,
+    words,
+)
 
 
 def test_verdicts() -> None:
@@ -34,3 +48,18 @@ def test_numbers_in_words() -> None:
     assert runs(1) == "1 run"
     assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few(5) == ""
+
+
+def test_undecided_claims_keep_their_words_and_say_why() -> None:
+    found = undecided({"S1": "one", "S2": "two"}, "not finished")
+    assert [(f["id"], f["claim"], f["verdict"], f["evidence"], f["numbers"]) for f in found] == [
+        ("S1", "one", "undecided", "not finished", {}),
+        ("S2", "two", "undecided", "not finished", {}),
+    ]
+
+
+def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:
+    assert words(NO_MODEL) == "pure data-driven"
+    assert named([NO_MODEL, "b"]) == "pure data-driven, b"
+    assert named("abcdef") == "a, b, c, d, e, f"
+    assert named("abcdefg") == "a, b, c, d, e and 2 more"
