@@ -16,7 +16,7 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, labe
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import families, trained
+from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, metres, number
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
@@ -88,8 +88,8 @@ def _rows(content: ReportContent) -> pd.DataFrame:
 
 def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> list[Spot]:
     errors = {(str(model), int(size)): float(H) for model, size, H in zip(means.model, means.N_D, means.H, strict=True)}
-    pure = set(rows.model[rows.family == DATA_DRIVEN])
-    learned = {size: H for (model, size), H in errors.items() if model in pure}
+    pure, rival = set(rows.model[rows.family == DATA_DRIVEN]), data_driven(content)
+    learned = {size: H for (model, size), H in errors.items() if model == rival}
     place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
     spots = []
     for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=True):
@@ -209,7 +209,9 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
         if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
             values.append(float(tick))
     strips = rows[rows.A.isna()]
-    names = ["no model" if row.family == DATA_DRIVEN else _shortened(str(row.model)) for row in strips.itertuples()]
+    only = (strips.family == DATA_DRIVEN).sum() == 1
+    named = ["no model" if only and row.family == DATA_DRIVEN else str(row.model) for row in strips.itertuples()]
+    names = [_shortened(name) for name in named]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
@@ -315,13 +317,13 @@ def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     text += f"N_D = {worst.size})"
     judged = {spot.size for spot in good if spot.model in pure}
     physics = [spot for spot in good if spot.model not in pure and spot.size in judged]
-    worse = [spot for spot in physics if spot.worse]
+    worse, rival = [spot for spot in physics if spot.worse], "pure data-driven"
     if not physics:
         return f"{text}."
     if not worse:
-        return f"{text}; physics helps in all {counted(len(physics), 'cell')}."
+        return f"{text}; H is below that of {rival} in all {counted(len(physics), 'cell')} with physics."
     limit = float(np.nanmin([accuracy[spot.model] for spot in worse] + [math.inf]))
-    text += f"; in {len(worse)} of {counted(len(physics), 'cell')} physics does not help"
+    text += f"; in {len(worse)} of {counted(len(physics), 'cell')} with physics H is not below that of {rival}"
     below = sum(float(accuracy[spot.model]) < limit for spot in physics)
     return text + (f", none of them below A = {metres(limit)}." if below else ".")
 

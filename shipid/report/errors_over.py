@@ -20,6 +20,7 @@ from shipid.report.wording import counted, listed, metres
 
 BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
+PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
@@ -159,11 +160,11 @@ def _word(source: str) -> str:
 
 
 def _visible(x: Floats, y: Floats) -> Indices:
-    """Points of a line that a plot of 2,000 pixels can tell apart; a line with gaps is kept whole."""
+    """Points of a line that the height of the plot can tell apart; a line with gaps is kept whole."""
     if not np.isfinite(y).all() or len(y) < 3:
         return np.arange(len(y))
     span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]
-    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / 2000)
+    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / PIXELS)
 
 
 def _changes(values: Floats) -> Indices:

@@ -47,7 +47,10 @@ def middles(content: ReportContent) -> dict[str, str]:
     frame = families(content)
     kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
     groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
-    return {str(family): str(group.model.iloc[len(group) // 2]) for family, group in groups}
+    # Of the rivals without physics the first is meant wherever one is named.
+    return {
+        str(family): str(group.model.iloc[0 if family == DATA_DRIVEN else len(group) // 2]) for family, group in groups
+    }
 
 
 def exemplars(content: ReportContent) -> list[str]:
