@@ -1,10 +1,10 @@
-import itertools
 import hashlib
+import itertools
 import json
-from importlib.resources import files
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pandas as pd
