@@ -26,7 +26,7 @@ from shipid.data.dataset import (
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
-from shipid.logs.readers import Format, TextFormat, read_table, seconds
+from shipid.logs.readers import Format, Progress, TextFormat, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command
 
@@ -46,7 +46,9 @@ class Imported:
     origin: tuple[float, float] | None
 
 
-def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = ()) -> Dataset:
+def import_log(
+    mapping: Mapping, file: str | Path, *, without: Iterable[str] = (), progress: Progress | None = None
+) -> Dataset:
     """Turn a log into a dataset as its mapping declares; nothing is repaired that is not declared.
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, position on the Earth to north and
@@ -59,6 +61,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     mapping : what the columns are, from `read_mapping`.
     file : the log; with `source.runs`, the folder of its files.
     without : kinds of repair to leave out.
+    progress : called with the share of a large log that has been read, 0 to 1.
 
     Raises
     ------
@@ -77,11 +80,11 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
             path="source.sha256",
         )
     logs = runs_of(mapping.source, source)
-    parts = [_imported(mapping, log, off) for log in logs.values()]
+    parts = [_imported(mapping, log, off, progress) for log in logs.values()]
     rows = parts[0].rows
     metadata = {
         "vessel": mapping.vessel,
-        "source": {**mapping.source.model_dump(exclude_none=True), "log": source.name, "sha256": digest},
+        "source": {**mapping.source.model_dump(exclude_defaults=True), "log": source.name, "sha256": digest},
         "mapping": {"name": mapping.name, "digest": mapping.digest},
         "rows": sum(part.read for part in parts),
         "clock": "shared" if mapping.source.runs is None else "run",
@@ -92,6 +95,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     if parts[0].origin is not None:
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
+    kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in logs}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     if mapping.source.runs is None:
         segments = mapping.segment or (_whole(rows, mapping, source),)
@@ -106,11 +110,19 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         return {log.stem: log}
-    before, _, after = source.runs.partition("*")
-    files = sorted(log.glob(source.runs))
+    left = {log / name for name in source.skip}
+    files = sorted(file for file in log.glob(source.runs) if file.is_file() and file not in left)
     if not files:
         raise DataError(f"no file {source.runs!r} in this folder", file=log, path="source.runs")
-    return {file.name.removeprefix(before).removesuffix(after): file for file in files}
+    return {run_of(file, log, source.runs): file for file in files}
+
+
+def run_of(file: Path, folder: Path, pattern: str) -> str:
+    """Return the name of the run in a file: what a single star stands for, else its path in the folder, less ending."""
+    if pattern.count("*") == 1 and "/" not in pattern:
+        before, _, after = pattern.partition("*")
+        return file.name.removeprefix(before).removesuffix(after)
+    return file.relative_to(folder).with_suffix("").as_posix()
 
 
 def digest_of(mapping: Mapping, log: Path) -> str:
@@ -123,14 +135,16 @@ def digest_of(mapping: Mapping, log: Path) -> str:
 
 def sha256_of(file: Path) -> str:
     """Return the SHA-256 of a file in hex; raises DataError if it cannot be read."""
+    require_file(file)
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
 
 
-def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
-    rows, first, read = _columns(mapping, file)
+def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Progress | None) -> Imported:
+    rows, first, read = _columns(mapping, file, progress)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
     rows, records = apply_repairs(rows, wrapping, off)
@@ -164,9 +178,12 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
+def _columns(
+    mapping: Mapping, file: Path, progress: Progress | None = None
+) -> tuple[pd.DataFrame, Records, int]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
-    log = read_table(file, mapping.format, mapping.clock.source)
+    here = {column.source for column in mapping.columns.values() if not column.file}
+    log = read_table(file, mapping.format, mapping.clock.source, here, progress)
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
     records = _passed_over(log)
     files = {"": (log, t, mapping.format, file)}
@@ -180,7 +197,9 @@ def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
     for name, column in mapping.columns.items():
         table, times, form, beside = files[column.file or ""]
         numbers = _numbers(table, column.source, form, beside, f"columns.{name}.from")
-        channels[name] = (times - column.latency, numbers * (column.sign * column.factor * to_si(column.unit, name)))
+        unit = to_si(column.unit, name)
+        values = numbers * (column.sign * column.factor * unit)
+        channels[name] = (times - column.latency, values + column.offset * unit if column.offset else values)
     if mapping.resamples:
         t = _common_clock(channels, t, mapping.clock.step, file)
         gap = mapping.clock.max_gap or np.inf
@@ -196,7 +215,10 @@ def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
 def _passed_over(table: pd.DataFrame) -> Records:
     count = int(table.attrs.get("unreadable", 0))
     note = "no NMEA 0183 sentence, or its checksum fails"
-    return [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
+    records: Records = [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
+    ragged = table.attrs.get("ragged", [])
+    note = f"lines with another number of cells, the first is line {ragged[0]}" if ragged else ""
+    return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
@@ -205,6 +227,8 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
         t = seconds(_column(log, clock.source, file, f"{path}.from"))
     else:
         t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+    if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
+        return evenly(t, clock.every, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
     if len(wrong):
         row = int(wrong[0]) + 1
@@ -216,6 +240,49 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
             what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
     return t
+
+
+def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float64]:
+    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s].
+
+    The rows run on from the first; where the column pauses for more than its rounding, they start anew. Raises
+    DataError where the column leaves the instants by more than it is rounded.
+    """
+    even, _ = even_clock(t, every)
+    rounding = rounding_of(t)
+    off = np.abs(even - t)
+    if np.any(off > rounding + every):
+        row = int(np.argmax(off > rounding + every))
+        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate or pauses"
+        raise DataError(message, file=file, path=f"row {row + 1}, clock.every")
+    return even
+
+
+def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
+    """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
+    steps = np.diff(t)
+    pauses = np.flatnonzero(steps > 2.0 * rounding_of(t)[1:] + 3.0 * every) + 1
+    even = np.empty(len(t))
+    for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
+        count = np.arange(last - first)
+        even[first:last] = t[first:last][0] + every * count
+        shift = np.median(t[first:last] - even[first:last]) if len(pauses) else np.median(t[: last] - even[:last])
+        even[first:last] += shift
+    return even, len(pauses)
+
+
+def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far a rounded column of time may be from the truth in each row [s]: its step to the next other value.
+
+    Of numbers written with a few digits the step grows with the number; the largest so far is taken.
+    """
+    values = np.unique(t)
+    if len(values) < 3:
+        return np.full(len(t), np.inf)
+    steps = np.diff(values)
+    near = np.append(steps, steps[-1])
+    usual = pd.Series(near).rolling(9, center=True, min_periods=1).median().to_numpy()
+    return np.asarray(np.maximum.accumulate(usual)[np.searchsorted(values, t)])
 
 
 def _common_clock(

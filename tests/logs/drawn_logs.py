@@ -424,7 +424,10 @@ def _names(columns: list[Column], style: str, plan: dict[str, Any], form: dict[s
             names.append(str(len(names) + 1))
             units.append("")
             continue
-        base = chosen.setdefault(column.word, str(random.choice(WORDS[column.word][style]))) if column.word != "other" else str(random.choice(WORDS["other"][style]))
+        words = WORDS[column.word][style]
+        if column.unit == "%":  # nobody calls a share of the power rpm
+            words = tuple(word for word in words if "rpm" not in word.lower()) or ("shaft",)
+        base = chosen.setdefault(column.word, str(random.choice(words))) if column.word != "other" else str(random.choice(WORDS["other"][style]))
         if column.side is not None:
             base = pattern[column.side].format(base)
         unit = "" if column.unit is None or column.word in ("latitude", "longitude") else column.unit
@@ -467,6 +470,7 @@ def _form(style: str, plan: dict[str, Any], several: bool, random: np.random.Gen
         "quoted": bool(random.random() < 0.1 and separator != " "),
         "words": bool(random.random() < 0.1),
         "several": several,
+        "digits": int(random.choice([3, 4, 5])),
     }
 
 
@@ -475,8 +479,8 @@ def _clock(t: Array, form: dict[str, Any]) -> list[str]:
     step = float(np.median(np.diff(t)))
     digits = 3 if step < 0.2 else 2
     match form["time"]:
-        case "rounded":  # three digits of all: 123.4 s, 99.12 s
-            return [f"{value:.{max(0, 2 - int(np.log10(max(step * 100, 1))))}f}" for value in t]
+        case "rounded":  # so many digits in all: 99.9 s, 100 s, 100 s
+            return [f"{value:.{form['digits']}g}" for value in t]
         case "epoch":
             return [f"{start.timestamp() + value:.3f}" for value in t]
         case "iso":

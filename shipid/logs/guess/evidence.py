@@ -169,9 +169,12 @@ def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, f
     return complex(whole), error, float(explained)
 
 
-def effect(t: Array, r: Array, order: Array) -> float:
-    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard."""
-    chosen = windows(t, 4.0)
+def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
+    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
+
+    t, r, order : (N,), r [rad/s]. duration : of the windows over which changes are compared [s].
+    """
+    chosen = windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     if len(chosen.first) < 12 or np.ptp(order) == 0.0:
@@ -280,3 +283,32 @@ def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
         known = np.isfinite(values)
         result[name] = np.interp(t, t[known], values[known]) if known.any() else values
     return result
+
+
+def lively(t: Array, psi: Array, chosen: Windows) -> float:
+    """Return the length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
+
+    t (N,) [s], psi (N,) [rad].
+    """
+    span = t[chosen.last] - t[chosen.first]
+    rates = np.abs(chosen.change(psi).real) / span
+    turning = float(np.percentile(rates, 90)) if len(rates) else 0.0
+    return float(np.clip(1.0 / turning, 0.2, WINDOW)) if turning > 0 else WINDOW
+
+
+def fit_with_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[Fit, complex]:
+    """Fit seen = scale * integrated + arm * turned by least squares: the fit, and the arm x + i y [m].
+
+    turned : change of exp(i psi) over each window. An arm between the points of position and velocity is a free
+    unknown, so that it does not pass for a velocity.
+    """
+    total = float(np.sum(np.abs(seen) ** 2))
+    columns = np.stack([integrated, turned, 1j * turned], axis=1)
+    design = np.concatenate([columns.real, columns.imag])
+    size = np.linalg.norm(design, axis=0)
+    if total <= 0.0 or not np.all(size > 0):
+        return fit(seen, integrated), 0j
+    both = np.concatenate([seen.real, seen.imag])
+    solution = np.linalg.lstsq(design / size, both, rcond=None)[0] / size
+    left = float(np.sum((both - design @ solution) ** 2)) / total
+    return Fit(float(solution[0]), np.inf, left), complex(solution[1], solution[2])
