@@ -567,12 +567,15 @@ def judge(drawn: Drawn) -> Verdict:
     file = drawn.path.parent / f"{drawn.path.stem}-draft.toml"
     file.write_text(draft_mapping(guessed), encoding="utf-8")
     try:
-        frame = import_log(read_mapping(file), drawn.path).frame
+        whole = read_mapping(file).model_copy(update={"segment": ()})
+        frame = import_log(whole, drawn.path).frame
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "said", (f"not imported: {error.path or ''}: {error.message}",))
     if drawn.impossible:
         return Verdict("silent", ("imported what has no position or no heading",))
     wrong = _compare(drawn, frame, guessed)
+    if any(said and reason.startswith("psi") for said, reason in wrong):  # the rest follows from the heading
+        wrong = [(True, reason) for _, reason in wrong]
     if not wrong:
         return Verdict("right", ())
     word = "said" if all(said for said, _ in wrong) else "silent"

@@ -31,6 +31,9 @@ UNIT_WORDS = {
 """Unit -> regular expression of how logs write it, in lower case."""
 
 
+NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
+
+
 @dataclass(frozen=True)
 class Suggestion:
     """A guessed column of the dataset.
@@ -91,6 +94,11 @@ def unit_said(name: str, si: str) -> str | None:
     return None
 
 
+def _may_be(scores: dict[str, float], meanings: tuple[str, ...]) -> bool:
+    best = max(scores.values(), default=0.0)
+    return best < STRONG or max(scores.get(meaning, 0.0) for meaning in meanings) >= best - NEARLY
+
+
 @dataclass
 class State:
     """What the guess knows so far; each step of `guess` adds to it.
@@ -129,16 +137,18 @@ class State:
 
     def _fitting(self, meaning: str, names: list[str]) -> list[str]:
         scores = {name: fits(name).get(meaning, 0.0) for name in names}
-        chosen = [name for name in names if scores[name] > fits(name).get("", 0.0)]
+        chosen = [name for name in names if scores[name] > 0 and scores[name] >= max(fits(name).values()) - NEARLY]
         return sorted(chosen, key=lambda name: -scores[name])
 
-    def eligible(self) -> list[str]:
-        """Return the free columns that may be anything: they vary, and no name says that they are of no use."""
-        return [
-            name
-            for name in self.free()
-            if np.ptp(self.columns[name]) > 0 and not is_order(name) and fits(name).get("", 0.0) < 0.8
-        ]
+    def eligible(self, *meanings: str) -> list[str]:
+        """Return the free columns that may have one of these meanings, or any: they vary, and no name says otherwise.
+
+        A name that fits nothing, or a number, says nothing.
+        """
+        free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
+        if not meanings:
+            return [name for name in free if fits(name).get("", 0.0) < STRONG]
+        return [name for name in free if _may_be(fits(name), meanings)]
 
     @property
     def numbered(self) -> bool:

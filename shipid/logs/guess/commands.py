@@ -143,7 +143,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
             return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
         return said, 0.9, why, {}
     known = bool(set(parts_of(name)) & TURNS)
-    if not known and top <= 101.0 and off[by_motion] < NEAR and by_motion == "rpm":
+    if not known and top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
         state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")
     if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
         unit = likely_unit(state, name, "n")

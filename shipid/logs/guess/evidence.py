@@ -179,8 +179,10 @@ def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     if len(chosen.first) < 12 or np.ptp(order) == 0.0:
         return 0.0
-    columns = [chosen.change(x).real for x in (cumulative_integral(t, order), cumulative_integral(t, r), t)]
-    design, change = np.stack(columns, axis=1), chosen.change(r).real
+    width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
+    smooth = [_boxcar(x, width) for x in (cumulative_integral(t, order), cumulative_integral(t, r), t, r)]
+    *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
+    design = np.stack(columns, axis=1)
     sizes = np.linalg.norm(design, axis=0)
     if not np.all(sizes > 0):
         return 0.0
@@ -190,6 +192,11 @@ def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
     rest = change - design / sizes @ solution
     spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * float(rest @ rest) / max(1, len(rest) - 3)
     return float(solution[0] / np.sqrt(spread[0, 0])) if spread[0, 0] > 0 else 0.0
+
+
+def _boxcar(values: Array, width: int) -> Array:
+    """Return the centred mean over `width` rows, of fewer at the ends, (N,)."""
+    return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).mean())
 
 
 def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:

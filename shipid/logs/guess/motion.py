@@ -70,7 +70,7 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
     assert state.psi is not None
     words = ("u", "v", "velocity_north", "velocity_east")
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
-    free = named if len(named) >= 2 and not state.numbered else state.eligible()[:20]
+    free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
     turn = np.exp(1j * state.psi)
     earth = {name: evidence.integral(state.t, state.columns[name]) for name in free}
     body = {name: evidence.integral(state.t, state.columns[name] * turn) for name in free}
@@ -88,7 +88,8 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
                 change = state.chosen.change(path)
                 keep = evidence.robust(seen, change)
                 result = evidence.fit(seen[keep], change[keep])
-                if result.scale > 0:
+                known = min(abs(result.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                if result.scale > 0 and (score >= 0.45 or known):
                     yield Velocities(result, first, second, frame, score, path)
 
 

@@ -68,7 +68,7 @@ def choose_pose(state: State, file: Path) -> None:
                 sentence += f"{wide.north!r}, {wide.east!r}, {wide.heading!r} do ({wide.misfit:.3f})"
                 state.find("misleading names", (wide.north, wide.east, wide.heading), 0.6, sentence)
             best = wide
-    if best is None:
+    if best is None or (best.misfit > POOR and (not pairs or not headings)):
         missing = "position (north and east, or latitude and longitude)" if not pairs else "heading"
         raise DataError(f"no column can be the {missing}: name the columns with --names, or map by hand", file=file)
     if best.misfit > POOR and not state.numbered:
@@ -95,9 +95,17 @@ def _on_globe(state: State, north: str, east: str) -> bool:
 
 
 def _best(
-    state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str], limit: int = 400
+    state: State,
+    pairs: list[tuple[str, str, bool, float]],
+    headings: list[str],
+    limit: int = 400,
+    rated: dict[str, float] | None = None,
 ) -> Pose | None:
-    """Return the hypothesis of least cost among pairs of position and columns of heading, in degrees or radians."""
+    """Return the hypothesis of least cost among pairs of position and columns of heading, in degrees or radians.
+
+    A misfit counts against the spread of the heading: a track that hardly turns agrees with any constant. `rated` is
+    what another column, integrated, leaves unexplained of a heading.
+    """
     middle = (state.chosen.first + state.chosen.last) // 2
     thin = max(1, len(middle) // limit)
     angles = {}
@@ -105,14 +113,15 @@ def _best(
         for unit in ("deg", "rad"):
             turn = 2 * np.pi / to_si(unit, "psi")
             psi, _ = evidence.heal(state.columns[heading], turn, state.t)
-            angles[heading, unit] = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
+            turned = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
+            angles[heading, unit] = turned, 1.0 - abs(complex(np.mean(turned)))
     best: Pose | None = None
     for north, east, on_globe, score in pairs:
         track = state.chosen.change(plane(state, north, east, on_globe))[::thin]
         size = float(np.sum(np.abs(track)))
         if size <= 0:
             continue
-        for (heading, unit), turned in angles.items():
+        for (heading, unit), (turned, spread) in angles.items():
             if heading in (north, east):
                 continue
             same = complex(np.sum(track * turned)) / size
@@ -121,7 +130,9 @@ def _best(
             named = fits(heading).get("psi", 0.0)
             misfit = 1 - max(abs(same), abs(mirrored))
             quarter = abs(same) >= abs(mirrored) and abs(np.angle(same)) > np.pi / 4  # an acceleration looks like that
-            cost = (misfit + 0.003 + 0.1 * quarter) / (0.3 + score) / (0.3 + named) * (0.6 if unit == (said or "deg") else 1)
+            cost = (misfit + 0.003 + 0.1 * quarter) / (spread + 0.01) / (0.3 + score) / (0.3 + named)
+            cost *= 0.6 if unit == (said or "deg") else 1.0
+            cost *= 1.0 if rated is None else 0.02 + rated.get(heading, 1.0)
             if best is None or cost < best.cost:
                 best = Pose(north, east, heading, unit, on_globe, same, mirrored, cost)
     return best
@@ -129,18 +140,24 @@ def _best(
 
 def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
     """Return the best hypothesis among all columns, names apart; a heading is rather one whose rate is a column."""
-    free = [name for name in state.eligible() if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
+    meanings = ("north", "east", "x", "y", "latitude", "longitude", "psi")
+    free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
     rated = _differentiated(state, free)
-    angles = [name for name in rated if not state.numbered or name in rated] or free
-    if headings and not state.numbered:
-        angles = [*headings, *[name for name in angles if name not in headings]]
-    places = rated if len(rated) > 2 and state.numbered else free
+    named = [name for name in headings if name in state.free()]
+    places = list(rated) if len(rated) > 2 and state.numbered else free
+    angles = list(rated) if rated and state.numbered else free
     wide = [(a, b, False, 0.3) for i, a in enumerate(places) for b in places[i + 1 :]]
     wide += [(a, b, True, 0.3) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
-    found = _best(state, [*(entry for entry in pairs if headings), *wide], angles, 150)
+    found = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
     if found is None or (found.misfit > POOR and places is not free):
         wide = [(a, b, False, 0.3) for i, a in enumerate(free) for b in free[i + 1 :]]
         found = _best(state, wide, free, 150)
+    if found is not None and state.numbered:
+        rivals = [name for name in angles if name not in (found.north, found.east, found.heading)]
+        other = _best(state, [(found.north, found.east, found.on_globe, 0.3)], rivals, 150)
+        close = other is not None and other.misfit < 2 * found.misfit + 0.02
+        if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(found.heading, 1.0) + 1e-3:
+            state.ask(("psi", "u", "v", "speed", "course"), f"is {found.heading!r} the heading and {other.heading!r} the course, or the other way?")
     return found
 
 
@@ -152,15 +169,16 @@ def _may_be_globe(state: State, north: str, east: str) -> bool:
     return bool(abs(a.mean()) > 20 * np.ptp(a) and abs(b.mean()) > 20 * np.ptp(b))
 
 
-def _differentiated(state: State, names: list[str]) -> list[str]:
-    """Return the columns whose rate is another column."""
-    integrated = []
-    integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in names}
+def _differentiated(state: State, names: list[str]) -> dict[str, float]:
+    """Return the columns whose rate is another column, with the share of their change that it leaves unexplained."""
+    integrated = {}
+    others = state.eligible()
+    integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in others}
     for name in names:
         change = state.chosen.change(_unwrapped(state.columns[name], state.t))
-        fitted = [evidence.fit(change, integrals[other]) for other in names if other != name]
-        if any(fit.left < 0.05 for fit in fitted):
-            integrated.append(name)
+        left = min((evidence.fit(change, integrals[other]).left for other in others if other != name), default=1.0)
+        if left < 0.05:
+            integrated[name] = left
     return integrated
 
 

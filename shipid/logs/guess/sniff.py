@@ -160,6 +160,7 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
         for decimal in (".", ",") if separator != "," else (".",):
             share = float(np.mean([_number_share(row, decimal) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
+            score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
             if score > best[0]:  # the first of equals: tabs are blanks, too
                 best = (score, separator, decimal)
     score, separator, decimal = best
@@ -172,6 +173,10 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
     if names:
         return form | {"skip_rows": data, "names": list(names)}
     above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:2]
+    if above and separator == "whitespace" and len(rows[above[0]]) > width:
+        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)
+        if len(joined) == width:  # blanks before units
+            return form | {"skip_rows": data, "names": _distinct(joined)}
     heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
     if len(heads) == 2 and _is_units(rows[heads[0]]):
         called = [*rows[heads[1]], ""][:width]

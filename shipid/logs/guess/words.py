@@ -86,7 +86,7 @@ ORDERS = frozenset(
 SOURCES = frozenset(
     "gps gnss dgps dgnss gpgga gprmc vtg gga imu ins mru ahrs meas measured measurement m act actual feedback fb ist true t "
     "deg sensor value val data signal raw filt filtered ship vessel own pos position value the of angle wert avg mean "
-    "odom rtk nav est estimated navigation sim ground".split()
+    "posisjon posicion standort rel odom rtk nav est estimated navigation sim ground".split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
 SIDE_WORDS = {
