@@ -572,7 +572,8 @@ def judge(drawn: Drawn) -> Verdict:
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "said", (f"not imported: {error.path or ''}: {error.message}",))
     if drawn.impossible:
-        return Verdict("silent", ("imported what has no position or no heading",))
+        said = _unsure(guessed, "psi", "north", "east", "latitude")
+        return Verdict("said" if said else "silent", ("imported what has no position or no heading",))
     wrong = _compare(drawn, frame, guessed)
     if any(said and reason.startswith("psi") for said, reason in wrong):  # the rest follows from the heading
         wrong = [(True, reason) for _, reason in wrong]

@@ -16,6 +16,7 @@ from shipid.physics.signals import SIGNALS, named, steers
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
+FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
 NEAR = 15.0  # times from that: a unit further off is doubted
 TURNS = frozenset("rpm rps revs rev zahl tall revolutions umdrehungen turns".split())
@@ -44,16 +45,25 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         unit = likely_unit(state, name, signal)
         effect = power.get(name, 0.0)
         extra: dict[str, Any] = {}
+        followed = 0.0
         why = "by its name; it is not seen to turn the ship, so that its sign is not known"
         confidence = 0.5 if by_name else 0.4
+        if by_name and abs(effect) <= SEEN and r is not None:
+            span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
+            followed = evidence.follows(state.t, r, state.columns[name], span)
+            if abs(followed) > FOLLOWED:
+                effect = float(1.01 * SEEN * np.sign(followed))
+            else:
+                followed = 0.0
         if abs(effect) > SEEN:
             confidence = 0.95 if by_name else 0.55
             # sides to which it turns the ship, and to which it does not
             sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
-            why = f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f})"
+            seen = f"t value {abs(effect):.0f}" if followed == 0.0 else f"correlation {abs(followed):.2f}"
+            why = f"positive turns the ship to {sides[0]} ({seen})"
             if (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1
-                sentence = f"positive {name!r} turns to {sides[0]} (t value {abs(effect):.0f}); here to {sides[1]}"
+                sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
         component = side_of(name) or SIGNALS[signal].component
         if not azimuth and signal == "delta" and side_of(name):

@@ -194,6 +194,23 @@ def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
     return float(solution[0] / np.sqrt(spread[0, 0])) if spread[0, 0] > 0 else 0.0
 
 
+def follows(t: Array, r: Array, order: Array, duration: float) -> float:
+    """Return the correlation of the yaw rate with an order some time before, at the delay where it is largest.
+
+    The delay is at most `duration` [s]; the correlation is not centred, for helm amidships gives no yaw rate.
+    """
+    usual = float(np.median(np.diff(t)))
+    width = max(1, round(duration / 4 / usual))
+    smooth_r, smooth_order = (_boxcar(values - np.median(values), width) for values in (r, order))
+    best = 0.0
+    for rows in np.unique(np.linspace(0, max(1, round(duration / usual)), 9).astype(int)):
+        a, b = smooth_r[rows:], smooth_order[: len(order) - rows]
+        size = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+        now = float(np.sum(a * b)) / size if size > 0 else 0.0
+        best = now if abs(now) > abs(best) else best
+    return best
+
+
 def _boxcar(values: Array, width: int) -> Array:
     """Return the centred mean over `width` rows, of fewer at the ends, (N,)."""
     return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).mean())

@@ -48,7 +48,8 @@ def choose_velocities(state: State) -> None:
     seen = state.chosen.change(state.position)
     ranked = sorted(_hypotheses(state, seen), key=lambda entry: entry.cost)
     named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
-    if not named and _speed_and_course(state, seen):
+    bound = 0.7 * min((entry.fit.left for entry in ranked), default=1.0) if state.numbered else 0.2
+    if not named and _speed_and_course(state, seen, bound):
         return
     least = min((entry.fit.left for entry in ranked), default=1.0)
     best = next(iter(ranked), None)
@@ -58,7 +59,8 @@ def choose_velocities(state: State) -> None:
     for better in (named[:1], plain[:1]):
         if better and better[0].fit.left < CLEAR * least + 1e-6:
             best = better[0]
-    if best.named < 0.45 and not state.numbered:
+    swapped = best.first in state.called("v") and best.second in state.called("u")
+    if best.named < 0.45 and not state.numbered and not swapped:
         names = f"{best.first!r} and {best.second!r}"
         sentence = f"{names} are not named as velocities, but their integral is the track"
         state.find("velocities under other names", (best.first, best.second), 0.6, sentence)
@@ -152,7 +154,8 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     factor = to_si(unit, "u")
     contrast = 1.0 - fit.left / runner.left if runner is not None and runner.left > 0 else 1.0
     confidence = float(np.clip(0.6 + 0.4 * contrast, 0.0, 0.99)) * (1 - min(0.5, fit.left))
-    confidence = confidence if best.named >= 0.45 or state.numbered else min(confidence, 0.59)
+    swapped = first in state.all_called("v") and second in state.all_called("u")
+    confidence = confidence if best.named >= 0.45 or state.numbered or swapped else min(confidence, 0.59)
     if frame == "earth" and contrast < 0.2:
         state.ask(("u", "v"), f"are {first!r} and {second!r} north and east velocities, or along and across the heading?")
     fixed = "earth" if frame == "earth" else "body"
@@ -174,7 +177,7 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
             sentence = f"{second!r} is positive to port: the track is met with its sign changed"
             state.find("wrong sign of v", (second,), confidence, sentence)
             extra_v = {"sign": -1}
-        if first in state.all_called("v") and second in state.all_called("u"):
+        if swapped:
             state.find(
                 "u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it"
             )
@@ -230,8 +233,11 @@ def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], uni
     state.find("factor", sources, sure, sentence, repair)
 
 
-def _speed_and_course(state: State, seen: Complex) -> bool:
-    """Take speed and course over ground, if the log has them, instead of velocities."""
+def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
+    """Take speed and course over ground, if the log has them, instead of velocities.
+
+    bound : unexplained share of the track, at most.
+    """
     assert state.psi is not None
     speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
     if state.numbered:
@@ -250,7 +256,7 @@ def _speed_and_course(state: State, seen: Complex) -> bool:
                 fit = evidence.fit(seen[keep], change[keep])
                 score = 1.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
                 cost = (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
-                if fit.scale > 0 and fit.left < (0.02 if state.numbered else 0.2) and (best is None or cost < best[0]):
+                if fit.scale > 0 and fit.left < bound and (best is None or cost < best[0]):
                     best = (cost, speed, course, turn, fit, way)
     if best is None:
         return False

@@ -23,6 +23,7 @@ MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and 
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
 COMPASS = frozenset("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap".split())
 YAW = frozenset("yaw gier gir theta".split())
+TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 SEARCHED = 24  # columns at most, where no name helps
 EARTH = 111_000.0  # m in a degree of latitude
 
@@ -61,6 +62,8 @@ def choose_pose(state: State, file: Path) -> None:
     best = _best(state, pairs, sure or headings)
     if best is None or best.misfit > POOR:
         wide = _search(state, pairs, headings)
+        if wide is not None and np.ptp(state.columns[wide.heading]) * to_si(wide.unit, "psi") < TURNED:
+            wide = None  # anything that hardly changes keeps to a straight course
         if wide is not None and (best is None or wide.misfit < 0.5 * best.misfit) and wide.misfit < POOR:
             if best is not None and not state.numbered:
                 named = ", ".join(map(repr, (best.north, best.east, best.heading)))
@@ -258,6 +261,8 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     extra: dict[str, Any] = {"wrap": True} | ({"sign": sign} if sign < 0 else {})
     if offset:
         extra["offset"] = offset if unit == "deg" else round(float(np.radians(offset)), 9)
+    if heading not in sure and not state.numbered:
+        confidence = min(confidence, 0.5)
     state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
     state.position = plane(state, north, east, best.on_globe)
     state.psi = sign * angle + np.radians(offset)

@@ -14,8 +14,8 @@ from functools import cache
 from shipid.physics.signals import SIGNALS
 
 PHRASES: dict[str, str] = {
-    "latitude": "lat, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, geogr breite",
-    "longitude": "lon, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, geogr laenge",
+    "latitude": "lat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, geogr breite",
+    "longitude": "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, geogr laenge",
     "north": "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, nordwert, "
     "hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta north, dist north",
     "east": "e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, rechtswert, "
@@ -89,6 +89,8 @@ SOURCES = frozenset(
     "posisjon posicion standort rel odom rtk nav est estimated navigation sim ground".split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
+UNIT_PARTS = frozenset("ms mps kn kts kt knots kmh deg degs dps dpm rad rads rps pct sec grad min".split())
+"""Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
     "port": "port|ps|bb|babord|backbord|p|prt|portside|left",
     "starboard": "starboard|stbd|sb|stb|styrbord|steuerbord|s|stb|strbd|right|star",
@@ -153,9 +155,9 @@ def is_order(name: str) -> bool:
 
 def side_of(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
-    parts = parts_of(name)
+    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", name.lower()))
     for side, words in SIDE_WORDS.items():
-        if len(parts) > 1 and set(words.split("|")) & set(parts):
+        if len(parts - {""}) > 1 and set(words.split("|")) & parts:
             return side
     return None
 
@@ -169,6 +171,8 @@ def fits(name: str) -> dict[str, float]:
     parts = list(parts_of(name))
     order = is_order(name)
     aside = {word for words in SIDE_WORDS.values() for word in words.split("|")} | SOURCES | (ORDERS if order else set())
+    while len(parts) > 1 and parts[-1] in UNIT_PARTS:
+        parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]
     found: dict[str, float] = {}
     for meaning, phrases in _phrases().items():
