@@ -168,7 +168,7 @@ def draw(seed: int, folder: Path) -> Drawn:
     layout = str(random.choice(["geo", "ned", "enu", "xy"], p=[0.42, 0.3, 0.18, 0.1]))
     several = random.random() < 0.25
     unit = ship.length / ship.speed
-    steps = [s for s in (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0) if unit / 60 < s < unit / 3.5]
+    steps = [s for s in (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0) if unit / 25 < s < unit / 3.5]
     step = float(random.choice(steps))
     span = 60 if several else float(random.uniform(70, 160))
     drawn_motions = [
@@ -565,7 +565,7 @@ def judge(drawn: Drawn) -> Verdict:
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "said", (f"refused: {error.message}",))
     file = drawn.path.parent / f"{drawn.path.stem}-draft.toml"
-    file.write_text(draft_mapping(guessed), encoding="utf-8")
+    file.write_text(draft_mapping(guessed, manoeuvres=False), encoding="utf-8")
     try:
         whole = read_mapping(file).model_copy(update={"segment": ()})
         frame = import_log(whole, drawn.path).frame

@@ -80,8 +80,11 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows: too few for a guess", file=source.path)
     choose_pose(state, source.path)
+    if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
+        choose_yaw_rate(state, 0.05)
     choose_velocities(state)
-    choose_yaw_rate(state)
+    if state.r is None:
+        choose_yaw_rate(state)
     choose_commands(state)
     _others(state)
     defects_of_rows(state, sniffed)

@@ -19,7 +19,6 @@ SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its 
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
 NEAR = 15.0  # times from that: a unit further off is doubted
-TURNS = frozenset("rpm rps revs rev zahl tall revolutions umdrehungen turns".split())
 
 
 def choose_commands(state: State) -> None:
@@ -152,8 +151,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
             state.find("unit of the shaft", (name,), 0.6, f"{sentence} of the shaft: it is read in {by_motion}")
             return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
         return said, 0.9, why, {}
-    known = bool(set(parts_of(name)) & TURNS)
-    if not known and top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
+    if top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
         state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")
     if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
         unit = likely_unit(state, name, "n")

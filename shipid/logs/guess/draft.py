@@ -17,7 +17,7 @@ from shipid.logs.guess.columns import LIKELY, Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
 from shipid.logs.readers import LARGE
-from shipid.logs.segments import manoeuvres
+from shipid.logs import segments as cutting
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "scale", "heading_offset", "lever_arm")
@@ -29,8 +29,11 @@ QUESTIONS = (
 )
 
 
-def draft_mapping(guess: Guess) -> str:
-    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
+def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
+    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported.
+
+    Without `manoeuvres` the draft is neither tried nor cut into runs.
+    """
     parts = [*_head(guess), *_origin(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
     text = (
         "\n".join(
@@ -39,6 +42,8 @@ def draft_mapping(guess: Guess) -> str:
         )
         + "\n"
     )
+    if not manoeuvres:
+        return text
     if guess.source.pattern is None and guess.file.stat().st_size > LARGE:
         return text + "\n# A large log: find its manoeuvres with `shipid data segment`.\n"
     try:
@@ -55,7 +60,7 @@ def draft_mapping(guess: Guess) -> str:
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
     """Return the manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
     whole = mapping.model_copy(update={"segment": (), "resample": None})
-    return manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
+    return cutting.manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
 
 
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:

@@ -270,17 +270,18 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     return True
 
 
-def choose_yaw_rate(state: State) -> None:
-    """Choose the yaw rate: the column whose integral fits the heading best; a fitting name wins if nearly as good."""
+def choose_yaw_rate(state: State, most: float = 0.3) -> None:
+    """Choose the yaw rate: the column whose integral fits the heading best; a fitting name wins if nearly as good.
+
+    most : share of the heading's change that a column without a fitting name may leave unexplained.
+    """
     assert state.psi is not None
     change = state.chosen.change(state.psi)
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
         return
     candidates = []
-    for name in state.free():
-        if is_order(name):
-            continue
+    for name in state.eligible("r"):
         integrated = state.chosen.change(evidence.integral(state.t, state.columns[name]))
         fit = evidence.fit(change, integrated)
         unit = min(UNITS["rad/s"], key=lambda entry: abs(np.log(max(abs(fit.scale), 1e-12) / UNITS["rad/s"][entry])))
@@ -291,7 +292,7 @@ def choose_yaw_rate(state: State) -> None:
     named = [
         entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
     ]
-    if not candidates or (not named and candidates[0][0].left > 0.3):
+    if not candidates or (not named and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():
             sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
             state.find("yaw rate does not fit", (called[0],), 0.6, sentence)
