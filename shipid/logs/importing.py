@@ -27,7 +27,7 @@ from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, Progress, TextFormat, read_table, require_file, seconds
-from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
+from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
@@ -152,6 +152,11 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)
+    fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
+    others = [
+        repair.model_copy(update={"turn": fixed}) if isinstance(repair, Latency) and repair.turn is None else repair
+        for repair in others
+    ]
     rows, more = apply_repairs(rows, others, off)
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
@@ -178,9 +183,7 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(
-    mapping: Mapping, file: Path, progress: Progress | None = None
-) -> tuple[pd.DataFrame, Records, int]:
+def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> tuple[pd.DataFrame, Records, int]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
     here = {column.source for column in mapping.columns.values() if not column.file}
     log = read_table(file, mapping.format, mapping.clock.source, here, progress)
@@ -266,7 +269,7 @@ def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64
     for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
         count = np.arange(last - first)
         even[first:last] = t[first:last][0] + every * count
-        shift = np.median(t[first:last] - even[first:last]) if len(pauses) else np.median(t[: last] - even[:last])
+        shift = np.median(t[first:last] - even[first:last]) if len(pauses) else np.median(t[:last] - even[:last])
         even[first:last] += shift
     return even, len(pauses)
 

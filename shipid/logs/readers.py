@@ -281,7 +281,9 @@ def _without_ragged(
         cells = int(row.notna().to_numpy().nonzero()[0].max()) + 1
         count = len(named) if not beyond or cells < beyond[0] else beyond[0]
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
-        message = f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'"
+        message = (
+            f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'"
+        )
         raise DataError(message, file=file, path=f"line {lines[0]}")
     return (table.loc[~wrong] if lines else table), lines
 
@@ -309,7 +311,9 @@ def _large_text(
     places = [index for index, name in enumerate(names) if name in wanted]
     if {names[index] for index in places} != wanted or len(places) != len(wanted):
         return None
-    plain = {index: pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any() for index in places}
+    plain = {
+        index: pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any() for index in places
+    }
     skip = form.skip_rows + int(form.header and form.names is None)
     table: dict[int, list[Any]] = {index: [] for index in places}
     try:

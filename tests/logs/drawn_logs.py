@@ -191,7 +191,10 @@ def draw(seed: int, folder: Path) -> Drawn:
     drawn.asks = _undecidable(plan, style)
     size = ship.speed
     drawn.slack = {
-        "position": 2.2 * abs(faults["antenna"]) + 6 * faults["position"] + 3 * faults["late"] * size + 0.1 * step * size,
+        "position": 2.2 * abs(faults["antenna"])
+        + 6 * faults["position"]
+        + 3 * faults["late"] * size
+        + 0.1 * step * size,
         "psi": np.radians(6) + abs(faults["compass"]) + 6 * faults["heading"],
         "velocity": 0.06 * size + 6 * faults["speed"] + abs(faults["compass"]) * size,
     }
@@ -236,11 +239,15 @@ def _plan(layout: str, style: str, ship: Ship, random: np.random.Generator) -> d
     missing = one_of(None, "heading", "position", p=[0.95, 0.025, 0.025])
     return {
         "position": None if missing == "position" else layout,
-        "heading": None if missing == "heading" else ("rad" if imu and random.random() < 0.8 else "rad" if random.random() < 0.12 else "deg"),
+        "heading": None
+        if missing == "heading"
+        else ("rad" if imu and random.random() < 0.8 else "rad" if random.random() < 0.12 else "deg"),
         "wrap": one_of("360", "180", "unwrapped", p=[0.75, 0.2, 0.05]) if not imu else one_of("180", "unwrapped"),
         "heading named": "yaw" if layout == "xy" or imu else "heading",
         "velocity": velocity,
-        "speed unit": one_of("kn", "m/s", "km/h", p=[0.6, 0.35, 0.05]) if "speed" in velocity else one_of("m/s", "kn", p=[0.85, 0.15]),
+        "speed unit": one_of("kn", "m/s", "km/h", p=[0.6, 0.35, 0.05])
+        if "speed" in velocity
+        else one_of("m/s", "kn", p=[0.85, 0.15]),
         "v sign": -1 if imu else one_of(1, -1, p=[0.9, 0.1]),
         "r": one_of("deg/s", "rad/s", "deg/min", None, p=[0.4, 0.25, 0.2, 0.15]),
         "r sign": -1 if imu else one_of(1, -1, p=[0.92, 0.08]),
@@ -251,7 +258,11 @@ def _plan(layout: str, style: str, ship: Ship, random: np.random.Generator) -> d
         "no shaft": random.random() < 0.06,
         "pair": ship.pair,
         "units said": one_of("names", "row", "none", p=[0.5, 0.12, 0.38]),
-        "extra": [w for w in ("roll", "pitch", "wind", "water speed", "rudder order", "heading order", "other", "other") if random.random() < 0.25],
+        "extra": [
+            w
+            for w in ("roll", "pitch", "wind", "water speed", "rudder order", "heading order", "other", "other")
+            if random.random() < 0.25
+        ],
     }
 
 
@@ -269,7 +280,9 @@ def _undecidable(plan: dict[str, Any], style: str) -> set[str]:
     return asks
 
 
-def _sampled(motion: dict[str, Array], step: float, faults: dict[str, Any], random: np.random.Generator) -> dict[str, Array]:
+def _sampled(
+    motion: dict[str, Array], step: float, faults: dict[str, Any], random: np.random.Generator
+) -> dict[str, Array]:
     t = np.arange(0.0, motion["t"][-1], step)
     t = t + random.normal(0, faults["clock noise"], len(t)) if faults["clock noise"] else t
     t = np.maximum.accumulate(np.clip(t, 0, motion["t"][-1]))
@@ -384,7 +397,9 @@ def _commands(truth: dict[str, Array], plan: dict[str, Any], random: np.random.G
     return result
 
 
-def _extra(word: str, truth: dict[str, Array], now: dict[str, Array], ship: Ship, random: np.random.Generator) -> list[Column]:
+def _extra(
+    word: str, truth: dict[str, Array], now: dict[str, Array], ship: Ship, random: np.random.Generator
+) -> list[Column]:
     size = len(truth["t"])
     wave = np.asarray(np.sin(2 * np.pi * truth["t"] / (1.5 * np.sqrt(ship.length)) + random.uniform(0, 6)))
     if word == "wind":
@@ -409,7 +424,9 @@ def _extra(word: str, truth: dict[str, Array], now: dict[str, Array], ship: Ship
 # --- names and files ---
 
 
-def _names(columns: list[Column], style: str, plan: dict[str, Any], form: dict[str, Any], random: np.random.Generator) -> list[str]:
+def _names(
+    columns: list[Column], style: str, plan: dict[str, Any], form: dict[str, Any], random: np.random.Generator
+) -> list[str]:
     """Return a name for every column, none twice; units in the names or collected for a row."""
     units = ["s" if form["time"] in ("seconds", "epoch") else "ms" if form["time"] == "ms" else ""]
     time = str(random.choice(WORDS["time"][style])) if style != "numbers" else "1"
@@ -427,12 +444,21 @@ def _names(columns: list[Column], style: str, plan: dict[str, Any], form: dict[s
         words = WORDS[column.word][style]
         if column.unit == "%":  # nobody calls a share of the power rpm
             words = tuple(word for word in words if "rpm" not in word.lower()) or ("shaft",)
-        base = chosen.setdefault(column.word, str(random.choice(words))) if column.word != "other" else str(random.choice(WORDS["other"][style]))
+        base = (
+            chosen.setdefault(column.word, str(random.choice(words)))
+            if column.word != "other"
+            else str(random.choice(WORDS["other"][style]))
+        )
         if column.side is not None:
             base = pattern[column.side].format(base)
         unit = "" if column.unit is None or column.word in ("latitude", "longitude") else column.unit
         units.append(str(random.choice(UNIT_TEXT[unit])) if unit else "")
-        if plan["units said"] == "names" and unit and not any(mark in base for mark in "[(") and "rpm" not in base.lower():
+        if (
+            plan["units said"] == "names"
+            and unit
+            and not any(mark in base for mark in "[(")
+            and "rpm" not in base.lower()
+        ):
             base = _with_unit(base, unit, style, random)
         while base in names:
             base += "_2" if style != "spaced" else " 2"
@@ -456,7 +482,11 @@ def _form(style: str, plan: dict[str, Any], several: bool, random: np.random.Gen
     decimal = "," if separator in (";", "\t") and random.random() < 0.4 else "."
     special = style in ("german", "norwegian", "symbols") or random.random() < 0.2
     encodings = ["utf-8", "utf-8-sig", "cp1252", "latin-1", "utf-16"] if style != "symbols" else ["utf-8", "utf-16"]
-    time = str(random.choice(["seconds", "rounded", "epoch", "iso", "ms", "clock", "dotted"], p=[0.5, 0.12, 0.1, 0.12, 0.06, 0.06, 0.04]))
+    time = str(
+        random.choice(
+            ["seconds", "rounded", "epoch", "iso", "ms", "clock", "dotted"], p=[0.5, 0.12, 0.1, 0.12, 0.06, 0.06, 0.04]
+        )
+    )
     return {
         "separator": separator,
         "decimal": decimal,
@@ -502,7 +532,14 @@ def _since(t: Array, form: dict[str, Any]) -> float:
     return 9 * 3600 + 12 * 60 + 31 if form["time"] == "clock" else 0.0
 
 
-def _write(columns: list[Column], names: list[str], file: Path, form: dict[str, Any], truth: dict[str, Array], random: np.random.Generator) -> None:
+def _write(
+    columns: list[Column],
+    names: list[str],
+    file: Path,
+    form: dict[str, Any],
+    truth: dict[str, Array],
+    random: np.random.Generator,
+) -> None:
     t = truth["t"]
     truth["t"] = t + _since(t, form)
     cells = [_clock(t, form)]
@@ -539,7 +576,12 @@ def _write(columns: list[Column], names: list[str], file: Path, form: dict[str, 
 
 
 def _write_folder(
-    drawn: Drawn, frames: list[list[Column]], names: list[str], form: dict[str, Any], kinds: list[tuple[str, float]], random: np.random.Generator
+    drawn: Drawn,
+    frames: list[list[Column]],
+    names: list[str],
+    form: dict[str, Any],
+    kinds: list[tuple[str, float]],
+    random: np.random.Generator,
 ) -> None:
     days = random.random() < 0.4
     entries = []
@@ -600,9 +642,19 @@ def _compare(drawn: Drawn, frame: pd.DataFrame, guessed: Guess) -> list[tuple[bo
     wrong = []
     steering = [str(c) for c in frame if str(c).endswith((".delta", ".alpha"))]
     shafts = [str(c) for c in frame if str(c).endswith(".n")]
-    checks = [("position", ("north", "latitude")), ("psi", ("psi",)), ("u", ("u", "speed")), ("v", ("v", "course")), ("r", ("r",))]
+    checks = [
+        ("position", ("north", "latitude")),
+        ("psi", ("psi",)),
+        ("u", ("u", "speed")),
+        ("v", ("v", "course")),
+        ("r", ("r",)),
+    ]
     for name, columns in checks:
-        reasons = [reason for rows, truth in zip(groups, drawn.runs, strict=True) if (reason := _motion_error(name, rows, truth, drawn))]
+        reasons = [
+            reason
+            for rows, truth in zip(groups, drawn.runs, strict=True)
+            if (reason := _motion_error(name, rows, truth, drawn))
+        ]
         if reasons:
             wrong.append((_unsure(guessed, *columns), reasons[0]))
     if not steering:
@@ -621,7 +673,9 @@ def _compare(drawn: Drawn, frame: pd.DataFrame, guessed: Guess) -> list[tuple[bo
         if not shafts:
             wrong.append((True, "no shaft: listed as not used"))
         for column in shafts:
-            worst = max(_relative(rows[column], rows["t"], truth, "n") for rows, truth in zip(groups, drawn.runs, strict=True))
+            worst = max(
+                _relative(rows[column], rows["t"], truth, "n") for rows, truth in zip(groups, drawn.runs, strict=True)
+            )
             if worst > 0.25:
                 wrong.append((_unsure(guessed, "n"), f"{column} off by {worst:.2f} of its size"))
     elif shafts:

@@ -20,7 +20,7 @@ from shipid.logs.readers import LARGE
 from shipid.logs import segments as cutting
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
-ORDER = ("wrap_interpolation", "break", "despike", "scale", "heading_offset", "lever_arm")
+ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
 NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
 QUESTIONS = (
     "Which point of the ship do positions and velocities belong to? If not the vessel's origin: a lever_arm.",
@@ -112,7 +112,10 @@ def _head(guess: Guess) -> Iterator[str]:
             yield from _lines({"skip": list(source.skipped)})
         if source.manoeuvres:
             yield "[source.manoeuvres]    # as the names of the files say"
-            yield from (f"{tomlkit.item(run).as_string()} = {tomlkit.item(kind).as_string()}" for run, kind in source.manoeuvres.items())
+            yield from (
+                f"{tomlkit.item(run).as_string()} = {tomlkit.item(kind).as_string()}"
+                for run, kind in source.manoeuvres.items()
+            )
     yield "\n[format]"
     yield from _lines(guess.sniffed.form)
     yield "\n[clock]"

@@ -105,7 +105,11 @@ def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen
     if best.frame == "earth":
         return best
     other = next(
-        (e for e in ranked if (e.first, e.second) == (best.first, best.second) and e.frame not in (best.frame, "earth")),
+        (
+            e
+            for e in ranked
+            if (e.first, e.second) == (best.first, best.second) and e.frame not in (best.frame, "earth")
+        ),
         None,
     )
     if other is None:
@@ -148,7 +152,9 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     assert state.psi is not None
     pair = {first, second}
     runner = min(
-        (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair), key=lambda one: one.left, default=None
+        (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair),
+        key=lambda one: one.left,
+        default=None,
     )
     unit, rest = _speed_unit(fit, (first, second), state)
     factor = to_si(unit, "u")
@@ -157,7 +163,9 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     swapped = first in state.all_called("v") and second in state.all_called("u")
     confidence = confidence if best.named >= 0.45 or state.numbered or swapped else min(confidence, 0.59)
     if frame == "earth" and contrast < 0.2:
-        state.ask(("u", "v"), f"are {first!r} and {second!r} north and east velocities, or along and across the heading?")
+        state.ask(
+            ("u", "v"), f"are {first!r} and {second!r} north and east velocities, or along and across the heading?"
+        )
     fixed = "earth" if frame == "earth" else "body"
     why = f"integrated as {fixed}-fixed [{unit}] they leave {100 * fit.left:.2g} % of the track unexplained"
     if runner is not None:
@@ -255,7 +263,9 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
                 keep = evidence.robust(seen, change)
                 fit = evidence.fit(seen[keep], change[keep])
                 score = 1.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
-                cost = (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
+                cost = (
+                    (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
+                )
                 if fit.scale > 0 and fit.left < bound and (best is None or cost < best[0]):
                     best = (cost, speed, course, turn, fit, way)
     if best is None:

@@ -151,7 +151,9 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
     angles = list(rated) if rated and state.numbered else free
     wide = [(a, b, False, 0.3) for i, a in enumerate(places) for b in places[i + 1 :]]
     wide += [(a, b, True, 0.3) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
-    found = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
+    found = _best(
+        state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None
+    )
     if found is None or (found.misfit > POOR and places is not free):
         wide = [(a, b, False, 0.3) for i, a in enumerate(free) for b in free[i + 1 :]]
         found = _best(state, wide, free, 150)
@@ -160,7 +162,10 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
         other = _best(state, [(found.north, found.east, found.on_globe, 0.3)], rivals, 150)
         close = other is not None and other.misfit < 2 * found.misfit + 0.02
         if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(found.heading, 1.0) + 1e-3:
-            state.ask(("psi", "u", "v", "speed", "course"), f"is {found.heading!r} the heading and {other.heading!r} the course, or the other way?")
+            state.ask(
+                ("psi", "u", "v", "speed", "course"),
+                f"is {found.heading!r} the heading and {other.heading!r} the course, or the other way?",
+            )
     return found
 
 
@@ -222,7 +227,9 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     quarter = round(phase / (np.pi / 2))
     sign, offset = 1, 0.0
     agreement = max(abs(best.same), abs(best.mirrored))
-    confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99)) * min(1.0, agreement + 0.1)
+    confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99)) * min(
+        1.0, agreement + 0.1
+    )
     swap = False
     if mirrored and quarter in (1, -1):
         swap = not best.on_globe and (compass or not clear) and quarter == 1
@@ -277,9 +284,7 @@ def _is_compass(name: str) -> bool:
 def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: bool, course: bool) -> None:
     """Ask for what neither names nor motion decide: the frame, its mirror image, whether a heading is a course."""
     if course:
-        state.ask(
-            ("psi",), f"is {best.heading!r} the heading, or the course over ground? By its name it may be either"
-        )
+        state.ask(("psi",), f"is {best.heading!r} the heading, or the course over ground? By its name it may be either")
     if not best.on_globe and not clear and (state.numbered or not compass):
         state.ask(
             ("psi", "north", "east"),
@@ -288,6 +293,8 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
         )
     elif not best.on_globe and clear and not compass and best.misfit < POOR and abs(best.mirrored) > abs(best.same):
         if not set(parts_of(best.heading)) & YAW:
-            state.ask(("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?")
+            state.ask(
+                ("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?"
+            )
     if undecided and not (compass and (clear or best.on_globe)):
         state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

@@ -133,7 +133,9 @@ def _cut(word: str) -> tuple[str, ...]:
         return (word,)
     best: dict[int, tuple[str, ...]] = {0: ()}
     for end in range(1, len(word) + 1):
-        options = [(*best[start], word[start:end]) for start in range(end) if start in best and word[start:end] in known]
+        options = [
+            (*best[start], word[start:end]) for start in range(end) if start in best and word[start:end] in known
+        ]
         if options:
             best[end] = min(options, key=len)
     return best.get(len(word), (word,))
@@ -170,7 +172,9 @@ def fits(name: str) -> dict[str, float]:
     """
     parts = list(parts_of(name))
     order = is_order(name)
-    aside = {word for words in SIDE_WORDS.values() for word in words.split("|")} | SOURCES | (ORDERS if order else set())
+    aside = (
+        {word for words in SIDE_WORDS.values() for word in words.split("|")} | SOURCES | (ORDERS if order else set())
+    )
     while len(parts) > 1 and parts[-1] in UNIT_PARTS:
         parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]

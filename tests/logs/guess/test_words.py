@@ -60,7 +60,9 @@ def test_an_order_of_the_rudder_is_a_command() -> None:
     assert fits("Rudder order")["delta"] > 0.6
 
 
-@pytest.mark.parametrize(("name", "side"), [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None)])
+@pytest.mark.parametrize(
+    ("name", "side"), [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None)]
+)
 def test_sides(name: str, side: str | None) -> None:
     assert side_of(name) == side
 
