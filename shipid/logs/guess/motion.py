@@ -48,7 +48,7 @@ def choose_velocities(state: State) -> None:
     seen = state.chosen.change(state.position)
     ranked = sorted(_hypotheses(state, seen), key=lambda entry: entry.cost)
     named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
-    bound = 0.7 * min((entry.fit.left for entry in ranked), default=1.0) if state.numbered else 0.2
+    bound = min(LEFT, 0.7 * min((entry.fit.left for entry in ranked), default=1.0)) if state.numbered else 0.2
     if not named and _speed_and_course(state, seen, bound):
         return
     least = min((entry.fit.left for entry in ranked), default=1.0)
@@ -262,11 +262,12 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
                 change = state.chosen.change(path)
                 keep = evidence.robust(seen, change)
                 fit = evidence.fit(seen[keep], change[keep])
-                score = 1.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
+                score = 0.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
                 cost = (
                     (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
                 )
-                if fit.scale > 0 and fit.left < bound and (best is None or cost < best[0]):
+                known = min(abs(fit.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                if (known or score >= 1.5 and fit.scale > 0) and fit.left < bound and (best is None or cost < best[0]):
                     best = (cost, speed, course, turn, fit, way)
     if best is None:
         return False
