@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Self, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
 
@@ -137,6 +137,16 @@ def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     return [path for path in paths if expression.fullmatch(path)]
 
 
+class Checked:
+    """For pydantic models of documents: `model_validate` raises DocumentError, as for a file, not pydantic's error."""
+
+    @classmethod
+    def model_validate(cls, obj: Any, **_: Any) -> Self:
+        """Return a checked model of plain data; DocumentError with dotted path, value and remedy."""
+        result: Self = parse(cls, obj, None, cls.__name__.lower())
+        return result
+
+
 def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
     """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
@@ -145,7 +155,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     from pydantic import ValidationError
 
     try:
-        return model.model_validate(data)
+        return model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
     except ValidationError as error:
         problems = error.errors(include_url=False)
         first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])

@@ -8,6 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from shipid import document as documents
 from shipid.errors import DocumentError
+from shipid.identification.settings import Identify
+from shipid.simulation.truth import Truth
+from shipid.vessel.perturb import Family
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
@@ -121,3 +124,37 @@ def test_a_quoted_key_may_hold_dots() -> None:
     found = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
     assert found == {"sensors": {"port.n": {"noise": 0.1}}}
     assert documents.get(found, 'sensors."port.n".noise') == 0.1
+
+
+@pytest.mark.parametrize(
+    ("model", "data", "path", "message"),
+    [
+        (Truth, {"vessel": "mariner"}, "truth.manoeuvres", "missing"),
+        (
+            Truth,
+            {"vessel": "mariner", "manoeuvres": 1, "duration": 9.0},
+            "truth.manoeuvres",
+            "1: Input should be greater",
+        ),
+        (Truth, {"vessel": "mariner", "manoevres": 3}, "truth.manoevres", "did you mean 'manoeuvres'?"),
+        (Family, {"name": "a/b"}, "family.name", "'a/b'"),
+        (Family, {"name": "a", "perturb": [{"parameters": ["*"], "factor": [2, 1]}]}, "family.perturb.0.factor", "low"),
+        (Family, {"name": "a", "perturb": [{"factr": 2}]}, "family.perturb.0.factr", "did you mean 'factor'?"),
+        (Identify, {"parameters": []}, "identify.parameters", "at least 1"),
+        (Identify, {"parameters": ["*"], "horizon": -1}, "identify.horizon", "-1"),
+        (Family, 3, "family", "3"),
+    ],
+)
+def test_public_models_answer_as_a_file_does(model: type[Any], data: Any, path: str, message: str) -> None:
+    """From Python as from a document: one line with path and remedy, not pydantic's list."""
+    with pytest.raises(DocumentError) as caught:
+        model.model_validate(data)
+    assert caught.value.path == path
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_public_model_takes_what_is_right() -> None:
+    family = Family.model_validate({"name": "a", "base": "mariner"})
+    assert Family.model_validate(family) is family
+    assert Family.model_validate(family.model_dump()) == family

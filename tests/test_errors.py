@@ -18,6 +18,17 @@ def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
 
 
 @ERRORS
+def test_several_errors_of_a_document_are_a_line_each(error: type[ShipidError]) -> None:
+    others = [DataError("second\nof two", file="a.toml", path="y"), ShipidError("third")]
+    found = error("first", file="a.toml", path="x", others=others)
+    lines = ["a.toml: x: first", "a.toml: y: second of two", "third"]
+    assert str(found).split("\n") == lines
+    again = pickle.loads(pickle.dumps(found))
+    assert str(again).split("\n") == lines
+    assert [type(one) for one in again.others] == [DataError, ShipidError]
+
+
+@ERRORS
 def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
     found = pickle.loads(pickle.dumps(error("message", file="a.toml", path="hull.x")))
     assert type(found) is error

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from shipid.cli.options import Changes, Device, Folder, Scheduler, Workers, parsed, stem
-from shipid.cli.terminal import counted, digits, draw, show, table
+from shipid.cli.terminal import counted, digits, draw, show, show_reasons, table
 
 if TYPE_CHECKING:
     from shipid.study.plan import Plan
@@ -45,8 +45,7 @@ def study_new(
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
     write_new(draft.text, file, "study")
-    rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
-    show(table(["choice", "value", "because"], rows))
+    show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
     names = ", ".join(model.name for model in draft.plan.foundations)
@@ -101,16 +100,11 @@ def study_screen(
     device: Device = "cpu",
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.files import check_table, write_table
-    from shipid.hybrid.training import check_device
+    from shipid.files import write_table
     from shipid.study import screen
-    from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
 
-    check_device(device)
-    plan = read_plan(study, parsed(changes))
-    file = out or Path(f"{plan.name}-screen.csv")
-    check_table(file)
+    plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     for note in screen.notes(plan, dataset, wanted):
         typer.echo(note, err=True)
@@ -143,16 +137,11 @@ def study_rotate(
     device: Device = "cpu",
 ) -> None:
     """Test on every run in turn and train on all others: how much the answer depends on the choice of the test run."""
-    from shipid.files import check_table, write_table
-    from shipid.hybrid.training import check_device
+    from shipid.files import write_table
     from shipid.study import rotate
-    from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
 
-    check_device(device)
-    plan = read_plan(study, parsed(changes))
-    file = out or Path(f"{plan.name}-rotate.csv")
-    check_table(file)
+    plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.turns(plan, dataset, tests)
     cells = len(wanted) * len(plan.pairs) * len(set(plan.study.grid.seeds))
@@ -239,6 +228,21 @@ def study_compare(
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
     columns = ["H [m]", *(f"N_D = {amount}" for amount in wide.columns)]
     show(table(columns, wide.reset_index().to_numpy().tolist()))
+
+
+def _before_work(
+    study: str, changes: list[str] | None, device: str, out: Path | None, command: str
+) -> tuple[Plan, Path]:
+    """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
+    from shipid.files import check_table
+    from shipid.hybrid.training import check_device
+    from shipid.study.plan import read_plan
+
+    check_device(device)
+    plan = read_plan(study, parsed(changes))
+    file = out or Path(f"{plan.name}-{command}.csv")
+    check_table(file)
+    return plan, file
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:

@@ -55,13 +55,29 @@ def reading(log: Path) -> Iterator[Callable[[float], None]]:
         step = int(100 * share) if tty else int(4 * share)
         if step > last[0]:
             last[0] = step
-            print(f"{chr(13) if tty else ''}{log.name}: {share:.0%} read", end="" if tty else "\n", file=sys.stderr, flush=True)
+            print(
+                f"{chr(13) if tty else ''}{log.name}: {share:.0%} read",
+                end="" if tty else "\n",
+                file=sys.stderr,
+                flush=True,
+            )
 
     try:
         yield say
     finally:
         if tty and last[0] >= 0:
             print(file=sys.stderr)
+
+
+def show_reasons(choices: list[tuple[str, str, str]]) -> None:
+    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+    from rich.console import Console
+
+    if Console().is_terminal:
+        show(table(["choice", "value", "because"], choices))
+        return
+    for path, value, why in choices:
+        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
 
 
 def digits(value: float) -> str:

@@ -141,7 +141,8 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r; degrees or another unit?"
     limit = SCALE_ERROR + SURE * spread
     yield _row("heading scale", scale, "1", limit, sentence, ok=noisy or abs(scale - 1) <= limit)
-    sentence = f"changes of psi leave the integral of r by {np.degrees(_rms(error)):.2g} deg (RMS), {np.degrees(noise):.2g} by noise"
+    off, by_noise = np.degrees(_rms(error)), np.degrees(noise)
+    sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
     yield _row("heading error", _rms(error), "rad", HEADING_ERROR * change + chance, sentence)
     yield from _late(stretches, "heading latency", "heading", "yaw rate", lambda rows: np.unwrap(rows["psi"]), _turned)
 

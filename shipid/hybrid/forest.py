@@ -24,7 +24,8 @@ from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Probability, Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, points_of, row_of, sound, taken, used
+from shipid.hybrid.trials import fit_each, mean_square, points_of, row_of, used
+from shipid.hybrid.units import taken
 
 Array = NDArray[np.float64]
 LEAF = -1  # the child of a node that has none
@@ -169,13 +170,7 @@ class Forest(Searched):
         self._grower(1, 1.0, 0)  # say at once if scikit-learn is missing
         inputs = Inputs(task.commands, self.memory)
         tables = shared_tables(task, inputs)
-        found = {}
-        for count, name in enumerate(task.cases):
-            healthy = sound(task, name)
-            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
 
     def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
         from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch

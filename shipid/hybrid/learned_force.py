@@ -24,7 +24,8 @@ from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
-from shipid.hybrid.units import solve, used
+from shipid.hybrid.trials import diverged, ridges_of, row_of, sound, used
+from shipid.hybrid.units import solve
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -106,24 +107,20 @@ class LearnedForce(Searched):
 
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""
-        return (
-            [self.ridge]
-            if isinstance(self.ridge, float)
-            else [float(r) for r in np.geomspace(*self.ridge, self.trials)]
-        )
+        return ridges_of(self.ridge, self.trials)
 
     def _fit(self, task: Task, name: str) -> Fitted:
         case, instants, future = task.cases[name], task.instants(name), task.windows.future
-        if not np.isfinite(case.paths).all():
-            blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-            return Fitted(
-                None, [{"number": i, "params": {"ridge": r}, **blank} for i, r in enumerate(self.ridges())], 0.0
-            )
+        if not sound(task, name):
+            return diverged([{"ridge": ridge} for ridge in self.ridges()])
         begin = time.perf_counter()
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        everything, steps = used(task), true_steps(task, name)
+        measured = replace(
+            case, physics=replace(case.physics, observer=None)
+        )  # single steps start from measured states
+        everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
         trials: list[dict[str, Any]] = []
         best = (np.inf, self.ridges()[0])
         starts: dict[int, Array | None] = {}
@@ -136,9 +133,7 @@ class LearnedForce(Searched):
                 starts[fold], most = weights, max(most, count)
                 losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
             value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
-            state = "complete" if np.isfinite(value) else "diverged"
-            trials.append({"number": number, "params": {"ridge": ridge}, "value": value, "state": state})
-            trials[-1] |= {"epochs": most, "seconds": time.perf_counter() - start}
+            trials.append(row_of(number, {"ridge": ridge}, value, start, most))
             best = min(best, (value, ridge)) if np.isfinite(value) else best
             if task.on_trial is not None:
                 task.on_trial(number + 1, len(self.ridges()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, Self
@@ -119,12 +120,13 @@ class Fitted:
     seconds: float
 
 
-class Method(BaseModel):
+class Method(BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
     compensates : whether anything is learned from data.
     meets_none : whether it works without physics.
+    meets_observer : whether it starts from the filtered state of physics with an observer, under the slow force.
     corrector : the class that a saved predictor is rebuilt with.
     """
 
@@ -132,6 +134,7 @@ class Method(BaseModel):
     validation: ClassVar[str] = "share"
     compensates: ClassVar[bool] = True
     meets_none: ClassVar[bool] = True
+    meets_observer: ClassVar[bool] = True
     corrector: ClassVar[type[Any]]
 
     @property
@@ -147,9 +150,9 @@ class Method(BaseModel):
         """Number of the best trials that make the corrector, at most."""
         return 1
 
+    @abstractmethod
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Fit every foundation of a task; name of the foundation -> result."""
-        raise NotImplementedError
 
 
 def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:

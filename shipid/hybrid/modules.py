@@ -28,21 +28,8 @@ from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import (
-    Seen,
-    Units,
-    diverged,
-    mean_square,
-    part_of,
-    points_of,
-    ridges_of,
-    row_of,
-    solve,
-    some_of,
-    sound,
-    taken,
-    used,
-)
+from shipid.hybrid.trials import fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 from shipid.physics import TERMS
 from shipid.vessel.schema import behind, term_blocks
 
@@ -218,6 +205,7 @@ class Modules(Searched):
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6
@@ -234,12 +222,7 @@ class Modules(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
-        found = {}
-        for count, name in enumerate(task.cases):
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
         begin, physics = time.perf_counter(), task.cases[name].physics
@@ -253,16 +236,12 @@ class Modules(Searched):
         rows: list[dict[str, Any]] = []
         for number, point in enumerate(points_of(self)):
             start = time.perf_counter()
-            errors = np.zeros(len(ridges))
-            for fold, (training, validation) in enumerate(task.folds):
-                found = self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
-                judged = some_of(validation, self.samples, seed_of(task.seed, fold))
-                instants = task.instants(name).select(np.tile(judged, len(ridges)))
-                paths = np.split(found.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
-                errors += [mean_square(path, task.windows.future[:, judged]) for path in paths]
-            best = int(errors.argmin())
-            value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
+
+            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> ModulesCorrector:
+                return self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
+
+            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
+            rows.append(row_of(number, {**point, "ridge": ridge}, value, start))
         complete = [row for row in rows if row["state"] == "complete"]
         if not complete:
             return Fitted(None, rows, time.perf_counter() - begin)

@@ -23,21 +23,8 @@ from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.units import (
-    Seen,
-    Units,
-    diverged,
-    mean_square,
-    part_of,
-    points_of,
-    ridges_of,
-    row_of,
-    solve,
-    some_of,
-    sound,
-    taken,
-    used,
-)
+from shipid.hybrid.trials import fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 
 Array = NDArray[np.float64]
 
@@ -134,6 +121,7 @@ class OneStep(Searched):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12
@@ -153,12 +141,7 @@ class OneStep(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        found = {}
-        for count, name in enumerate(task.cases):
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
         begin = time.perf_counter()
@@ -167,13 +150,13 @@ class OneStep(Searched):
         rows: list[dict[str, Any]] = []
         for number, point in enumerate(points_of(self)):
             start = time.perf_counter()
-            errors = np.zeros(len(ridges))
-            for fold, (training, validation) in enumerate(task.folds):
+
+            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> OneStepCorrector:
                 head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
-                errors += self._errors(task, name, head, some_of(validation, self.samples, seed_of(task.seed, fold)))
-            best = int(errors.argmin())
-            value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
+                return OneStepCorrector(task.commands, (head,), {})
+
+            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
+            rows.append(row_of(number, {**point, "ridge": ridge}, value, start))
         kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
         if not kept:
             return Fitted(None, rows, time.perf_counter() - begin)
@@ -203,11 +186,3 @@ class OneStep(Searched):
         even, odd = units.parts(here)
         surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
         return Head(units, surge, solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:])
-
-    def _errors(self, task: Task, name: str, head: Head, windows: Index) -> Array:
-        """Mean squared error [m^2] per coordinate of the path on some windows, for each ridge."""
-        count = len(head.surge)
-        instants = task.instants(name).select(np.tile(windows, count))
-        paths = OneStepCorrector(task.commands, (head,), {}).predict(task.cases[name].physics, instants, np.empty(0))
-        each = np.split(paths, count, axis=1)
-        return np.array([mean_square(path, task.windows.future[:, windows]) for path in each])

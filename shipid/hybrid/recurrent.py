@@ -27,7 +27,8 @@ from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, part_of, points_of, row_of, sound, taken
+from shipid.hybrid.trials import fit_each, mean_square, points_of, row_of
+from shipid.hybrid.units import part_of, taken
 
 Array = NDArray[np.float64]
 LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
@@ -222,13 +223,7 @@ class Recurrent(Searched):
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         inputs = Inputs(task.commands, self.memory)
         tables = shared_tables(task, inputs)
-        found = {}
-        for count, name in enumerate(task.cases):
-            healthy = sound(task, name)
-            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
 
     def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
         from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch

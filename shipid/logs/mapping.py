@@ -192,15 +192,18 @@ def read_mapping(name: str | Path) -> Mapping:
     _check_instants(mapping, file)
     _check_segments(mapping, file)
     clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
+    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
-            if column not in mapping.columns:
+            if column not in repairable:
                 raise DocumentError(
-                    f"no column {column!r} to repair: {choices(column, mapping.columns)}",
+                    f"no column {column!r} to repair: {choices(column, repairable)}",
                     file=file,
                     path=f"repair.{index}.columns",
                 )
-            if isinstance(repair, WrapInterpolation) and not mapping.columns[column].wrap:
+            if isinstance(repair, WrapInterpolation) and not (
+                column in mapping.columns and mapping.columns[column].wrap
+            ):
                 message = f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair"
                 raise DocumentError(message, file=file, path=f"repair.{index}.columns")
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]

@@ -80,8 +80,8 @@ class LeverArm(Repair):
 class Latency(Repair):
     """An earth-fixed signal comes `seconds` [s] late: what was logged at t was true at t - seconds.
 
-    `signal`: `position`, `velocity` (over ground, however it was logged), `heading` or `yaw rate`. `turn`: whether u and
-    v turn with a heading; by default where the log has them earth-fixed, or as speed and course.
+    `signal`: `position`, `velocity` (over ground, however it was logged), `heading` or `yaw rate`. `turn`: whether u
+    and v turn with a heading; by default where the log has them earth-fixed, or as speed and course.
     """
 
     signal: Literal["position", "velocity", "heading", "yaw rate"]

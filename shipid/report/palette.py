@@ -5,7 +5,9 @@ Figures hold `var(--...)` instead of colours, so that one figure serves a light,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -60,7 +62,8 @@ def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
     return float(physics.min()), float(physics.max())
 
 
-def styles(content: ReportContent) -> dict[str, Style]:
+@lru_cache(maxsize=4)  # every figure asks for it
+def styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]

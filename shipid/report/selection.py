@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -20,8 +21,12 @@ def spread(items: Sequence[str], count: int) -> list[str]:
     return [items[i] for i in np.linspace(0, len(items) - 1, count).round().astype(int)]
 
 
+@lru_cache(maxsize=4)  # every figure asks for it
 def families(content: ReportContent) -> pd.DataFrame:
-    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last."""
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last.
+
+    The frame is shared by all who ask: not to be changed.
+    """
     known = content.models[["model", "family", "A"]]
     trained = content.cells[["model", "family", "A"]]
     joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,7 +22,7 @@ from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
-from shipid.simulation.truth import Truth, check_truth
+from shipid.simulation.truth import Truth, check_truth, old_keys
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -243,12 +243,17 @@ class Foundation:
 
 @dataclass(frozen=True)
 class Way:
-    """A method of the study under its name, with the foundations that it meets."""
+    """A method of the study under its name.
+
+    foundations : those that it meets, by name. left_out : those with an observer that its families would include, but
+        that its kind cannot take.
+    """
 
     name: str
     kind: str
     method: Method
     foundations: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -377,10 +382,27 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     for path, value in (changes or {}).items():
         try:
             document = documents.replace(document, {path: value})
-        except (ValueError, IndexError, TypeError, AttributeError):
+        except IndexError:
+            raise DocumentError(f"--set: {_beyond(document, path)}", file=file, path=path) from None
+        except (ValueError, TypeError, AttributeError):
             message = f"--set cannot reach this path: {choices(path, known)}"
             raise DocumentError(message, file=file, path=path) from None
     return build_plan(document, file, changes=changes)
+
+
+def _beyond(document: Document, path: str) -> str:
+    """Which list of a document a path leaves, and how long the list is."""
+    keys = documents.parts(path)
+    value: Any = document
+    for place, key in enumerate(keys):
+        if isinstance(value, list) and int(key) >= len(value):
+            name = ".".join(keys[:place])
+            last = f", {name}.0 to {name}.{len(value) - 1}" if len(value) > 1 else f", {name}.0" if value else ""
+            return (
+                f"there is no {name}.{key}: {name} has {len(value)} {'entry' if len(value) == 1 else 'entries'}{last}"
+            )
+        value = value[int(key)] if isinstance(value, list) else value[key]
+    raise KeyError(path)
 
 
 def build_plan(
@@ -478,21 +500,40 @@ def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vesse
 
 
 def _check_version(document: Document, file: Path) -> None:
-    """Refuse a document of version 0.1 with one line that says what to write instead."""
+    """Refuse a document of version 0.1: a line for each old key, with what to write instead."""
+    old = [DocumentError(message, file=file, path=path) for path, message in _old_keys(document)]
+    if old:
+        raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])
+
+
+def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
+    """Yield the dotted path of every key of version 0.1 in a document, and what to write instead."""
     if "recipe" in document:
         kind = document["recipe"].get("kind", "fast") if isinstance(document["recipe"], dict) else "fast"
         new = {"paper": "path-trained"}.get(kind, "path-drawn")
-        message = f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
-        raise DocumentError(message, file=file, path="recipe")
+        yield "recipe", f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
     prediction = document.get("prediction")
     if isinstance(prediction, dict) and "horizon" in prediction:
         value, step = prediction["horizon"], prediction.get("step", 1.0)
         numbers = isinstance(value, int | float) and isinstance(step, int | float)
         seconds = f"ahead = {value * step:g}" if numbers else "ahead"
-        message = f"was a number of steps: write {seconds}, in seconds"
-        raise DocumentError(message, file=file, path="prediction.horizon")
+        yield "prediction.horizon", f"was a number of steps: write {seconds}, in seconds"
     if isinstance(prediction, dict) and "method" in prediction:
-        raise DocumentError("is now called `integrator`", file=file, path="prediction.method")
+        yield "prediction.method", "is now called `integrator`"
+    truth = document.get("truth")
+    if isinstance(truth, dict) and (moved := old_keys(truth)):
+        yield "truth", moved
+    families = document.get("family")
+    for index, family in enumerate(families if isinstance(families, list) else []):
+        if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():
+            yield f"family.{index}.identify", _family_of_its_own(str(family.get("name", "")), "identify")
+
+
+def _family_of_its_own(name: str, block: str) -> str:
+    return (
+        "an identified or observed family is a family of its own: take the block out of this one and add "
+        f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
+    )
 
 
 def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
@@ -534,11 +575,7 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
-            message = (
-                "an identified or observed family is a family of its own: take the block out of this one and add "
-                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]'
-            )
-            raise DocumentError(message, file=file, path=f"family.{index}.{block}")
+            raise DocumentError(_family_of_its_own(one.name, block), file=file, path=f"family.{index}.{block}")
         index = by_name[one.extends]
     return index
 
@@ -584,7 +621,11 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
         met: set[str] = set()
+        refused = set() if method.meets_observer else {f.family for f in foundations if f.observer is not None}
         for pattern in block.families:
+            if pattern in refused:
+                message = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
+                raise DocumentError(message, file=file, path=f"{path}.families")
             matching = documents.match(pattern, families)
             if not matching:
                 message = f"{pattern!r} is no family: {choices(pattern, families)}"
@@ -592,11 +633,15 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
             met.update(matching)
         if not method.meets_none:
             met -= {NO_MODEL}
-        ways.append(Way(block.name, block.kind, method, tuple(f.name for f in foundations if f.family in met)))
+        left_out = tuple(f.name for f in foundations if f.family in met & refused)
+        taken = tuple(f.name for f in foundations if f.family in met - refused)
+        ways.append(Way(block.name, block.kind, method, taken, left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:
-        raise DocumentError(f"no method meets {idle!r}: name its family in `families`", file=file, path="method")
+        observed = any(idle in way.left_out for way in ways)
+        remedy = "add one that takes an observer, such as alone" if observed else "name its family in `families`"
+        raise DocumentError(f"no method meets {idle!r}: {remedy}", file=file, path="method")
     return tuple(ways)
 
 

@@ -172,6 +172,9 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
     """
     rest, test, notes = partition(plan, dataset)
+    notes += [
+        f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
+    ]
     both = [rest, test]
     longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
     for foundation in plan.foundations:

@@ -1,7 +1,7 @@
 """Logs as strangers write them: ship, manoeuvres, columns, names, units, frames, signs and faults drawn by a seed.
 
-`draw(seed, folder)` writes one log, a file or a folder of files, and returns what it truly holds; `judge(drawn)` guesses a
-mapping of it, imports it with that mapping and compares the result with the truth, quantity by quantity.
+`draw(seed, folder)` writes one log, a file or a folder of files, and returns what it truly holds; `judge(drawn)` takes
+a guess of it, imports it with that mapping and compares the result with the truth, quantity by quantity.
 """
 
 from __future__ import annotations
@@ -176,14 +176,14 @@ def draw(seed: int, folder: Path) -> Drawn:
         for kind, angle in [_kinds(random) for _ in range(int(random.integers(3, 7)) if several else 1)]
     ]
     faults = _faults(ship, step, random)
-    plan = _plan(layout, style, ship, random)
+    plan = _plan(layout, ship, random)
     story = {"style": style, "layout": layout, "length": round(ship.length, 1), "step": step, **faults, **plan}
     frames, runs = [], []
     for _, _, motion in drawn_motions:
         truth, columns = _columns(_sampled(motion, step, faults, random), ship, faults, plan, random)
         runs.append(truth)
         frames.append(columns)
-    form = _form(style, plan, several, random)
+    form = _form(style, several, random)
     story |= {key: value for key, value in form.items() if key != "names"}
     names = _names(frames[0], style, plan, form, random)
     drawn = Drawn(folder, runs, _present(plan), story=story, kinds=[kind for kind, _, _ in drawn_motions])
@@ -222,7 +222,7 @@ def _faults(ship: Ship, step: float, random: np.random.Generator) -> dict[str, A
     }
 
 
-def _plan(layout: str, style: str, ship: Ship, random: np.random.Generator) -> dict[str, Any]:
+def _plan(layout: str, ship: Ship, random: np.random.Generator) -> dict[str, Any]:
     """Which columns there are, in which unit, frame and sign."""
 
     def one_of(*values: Any, p: list[float] | None = None) -> Any:
@@ -286,7 +286,7 @@ def _sampled(
     t = np.arange(0.0, motion["t"][-1], step)
     t = t + random.normal(0, faults["clock noise"], len(t)) if faults["clock noise"] else t
     t = np.maximum.accumulate(np.clip(t, 0, motion["t"][-1]))
-    late = {name: faults["late"] for name in ("u", "v")}
+    late = dict.fromkeys(("u", "v"), faults["late"])
     signals = {name: np.interp(t - late.get(name, 0.0), motion["t"], values) for name, values in motion.items()}
     ground = np.interp(t - faults["late"], motion["t"], motion["psi"])
     signals["over ground"] = ground  # heading at the time of the velocities
@@ -475,7 +475,7 @@ def _with_unit(base: str, unit: str, style: str, random: np.random.Generator) ->
     return f"{base}{' ' if random.random() < 0.7 else ''}{left}{text}{right}"
 
 
-def _form(style: str, plan: dict[str, Any], several: bool, random: np.random.Generator) -> dict[str, Any]:
+def _form(style: str, several: bool, random: np.random.Generator) -> dict[str, Any]:
     separator = str(random.choice([",", ";", "\t", " "], p=[0.55, 0.22, 0.17, 0.06]))
     if separator == " " and style in ("spaced", "marine", "german", "norwegian"):
         separator = "\t"
@@ -524,7 +524,7 @@ def _clock(t: Array, form: dict[str, Any]) -> list[str]:
     return [f"{value:.{digits}f}" for value in t]
 
 
-def _since(t: Array, form: dict[str, Any]) -> float:
+def _since(form: dict[str, Any]) -> float:
     """Seconds to add to t so that it is the clock of a right import."""
     start = pd.Timestamp("2023-06-15 09:12:31", tz="UTC")
     if form["time"] in ("epoch", "iso", "dotted"):
@@ -541,7 +541,7 @@ def _write(
     random: np.random.Generator,
 ) -> None:
     t = truth["t"]
-    truth["t"] = t + _since(t, form)
+    truth["t"] = t + _since(form)
     cells = [_clock(t, form)]
     for column in columns:
         text = [f"{value:.{column.decimals}f}" for value in column.values]

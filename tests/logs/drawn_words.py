@@ -1,7 +1,7 @@
 """Words of the headers of drawn logs, by what a column holds and by the style of the writer.
 
-These lists were written from recorded logs and manuals, before the importer read names by parts. Do not tune them to the
-importer, and do not copy the importer's words to here: the share of right guesses would mean nothing.
+These lists were written from recorded logs and manuals, before the importer read names by parts. Do not tune them to
+the importer, and do not copy the importer's words to here: the share of right guesses would mean nothing.
 """
 
 from __future__ import annotations

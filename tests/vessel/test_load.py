@@ -8,7 +8,7 @@ import pytest
 
 from shipid.document import bundled, leaves, replace
 from shipid.errors import DocumentError
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
 
 UNIT = re.compile(r"-|prime|deg|1/s of the command|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
 
@@ -143,3 +143,26 @@ def test_a_switched_off_block_is_still_checked() -> None:
     document = replace(load_vessel("gunnerus-28.9").document, {"thruster.bow.F_1": "much"})
     with pytest.raises(Exception, match=r"thruster\.bow\.F_1"):
         check_vessel(document, "x.toml")
+
+
+BOW = '[thruster.bow]\nkind = "tunnel"\nx = 3.0\nz = 0.1\nF_1 = 300.0\nF_2 = 5.0\nF_3 = 60.0\n'
+
+
+def test_a_source_is_that_of_the_document_that_wrote_the_block(tmp_path: Path) -> None:
+    """A block added above is not given the source of the vessel below, nor one below that of the document above."""
+    below = sources(load_vessel("kvlcc2-l7"))
+    named, bare, patch = tmp_path / "named.toml", tmp_path / "bare.toml", tmp_path / "patch.toml"
+    named.write_text(f'extends = "kvlcc2-l7"\nname = "N"\nsource = "the yard"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
+    bare.write_text(f'extends = "kvlcc2-l7"\nname = "B"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
+    patch.write_text('base = "./named.toml"\n[set]\n"hull.mmg.Y_u" = 0.0\n')
+    expected = {**below, "thruster.bow": "the yard", "hull.mmg": "the yard"}
+    assert sources(load_vessel(str(named))) == expected
+    assert sources(load_vessel(str(patch))) == expected
+    assert sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
+    own = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
+    named.write_text(own)
+    assert sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
+
+
+def test_every_term_of_a_bundled_vessel_names_its_source(bundled_vessel: Vessel) -> None:
+    assert all(len(source) > 10 for source in sources(bundled_vessel).values())

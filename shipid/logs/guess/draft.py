@@ -12,12 +12,12 @@ import numpy as np
 import tomlkit
 
 from shipid.errors import ShipidError
+from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import Finding, Suggestion
 from shipid.logs.guess.columns import LIKELY, Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
 from shipid.logs.readers import LARGE
-from shipid.logs import segments as cutting
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")

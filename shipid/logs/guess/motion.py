@@ -134,8 +134,8 @@ def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen
     if likely is not simple or ratio < SAME:
         state.ask(
             ("v",),
-            f"is {best.second!r} positive to starboard? It is drafted so that the ship drifts out of her turns, as ships do "
-            "near midships; the track does not settle it",
+            f"is {best.second!r} positive to starboard? It is drafted so that she drifts out of her turns, as ships "
+            "do near midships; the track does not settle it",
         )
     return likely
 
@@ -267,7 +267,11 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
                     (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
                 )
                 known = min(abs(fit.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
-                if (known or score >= 1.5 and fit.scale > 0) and fit.left < bound and (best is None or cost < best[0]):
+                if (
+                    (known or (score >= 1.5 and fit.scale > 0))
+                    and fit.left < bound
+                    and (best is None or cost < best[0])
+                ):
                     best = (cost, speed, course, turn, fit, way)
     if best is None:
         return False

@@ -21,8 +21,8 @@ from shipid.logs.mapping import to_si
 GOOD, POOR = 0.05, 0.2  # misfit of a course and a heading: 1 - agreement
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
-COMPASS = frozenset("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap".split())
-YAW = frozenset("yaw gier gir theta".split())
+COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
+YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 SEARCHED = 24  # columns at most, where no name helps
 EARTH = 111_000.0  # m in a degree of latitude
@@ -77,8 +77,8 @@ def choose_pose(state: State, file: Path) -> None:
     if best.misfit > POOR and not state.numbered:
         state.ask(
             ("psi", "north", "east"),
-            f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the position "
-            f"and {best.heading!r} the heading?",
+            f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the "
+            f"position and {best.heading!r} the heading?",
         )
     _take(state, best, sure)
 
@@ -288,13 +288,12 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
     if not best.on_globe and not clear and (state.numbered or not compass):
         state.ask(
             ("psi", "north", "east"),
-            f"is {best.north!r} north and does {best.heading!r} count to starboard, or is {best.north!r} east and does it "
-            "count to port? Motion is the same in both; port and starboard change places",
+            f"is {best.north!r} north and does {best.heading!r} count to starboard, or is {best.north!r} east and does "
+            "it count to port? Motion is the same in both; port and starboard change places",
         )
-    elif not best.on_globe and clear and not compass and best.misfit < POOR and abs(best.mirrored) > abs(best.same):
-        if not set(parts_of(best.heading)) & YAW:
-            state.ask(
-                ("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?"
-            )
+    mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
+    unnamed = not compass and not set(parts_of(best.heading)) & YAW
+    if not best.on_globe and clear and mirrored and unnamed:
+        state.ask(("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?")
     if undecided and not (compass and (clear or best.on_globe)):
         state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

@@ -17,8 +17,8 @@ from shipid.errors import DataError
 from shipid.logs.guess.words import parts_of
 from shipid.logs.importing import even_clock, rounding_of
 from shipid.logs.readers import (
-    LOOKED_AT,
     LONGEST_LINE,
+    LOOKED_AT,
     READERS,
     TIME_OF_DAY,
     TextFormat,
@@ -33,10 +33,13 @@ SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looke
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 CLOCK_WORDS = frozenset(
-    "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel zeit tid tidspunkt "
-    "sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo gmt".split()
+    (
+        "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
+        "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
+        "gmt"
+    ).split()
 )
-NO_CLOCK_WORDS = frozenset("delay constant zone diff delta step".split())
+NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|min|h|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|"
     r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
@@ -168,7 +171,13 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
-    data = next(i for i, row in enumerate(rows) if len(row) == width and _number_share(row, decimal) >= NUMERIC / 2)
+    shares = [_number_share(row, decimal) for row in rows]
+    usual = float(np.median([share for row, share in zip(rows, shares, strict=True) if len(row) == width]))
+    least = max(NUMERIC / 2, usual - 0.9 / width)  # a header may hold numbers, too, but fewer
+    data = next(
+        (i for i, row in enumerate(rows) if len(row) == width and shares[i] >= least),
+        next(i for i, row in enumerate(rows) if len(row) == width and shares[i] >= NUMERIC / 2),
+    )
     form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
     if names:
         return form | {"skip_rows": data, "names": list(names)}
@@ -267,7 +276,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
     candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
-    rounded = [name for name in called if name in finite and name not in rising]
+    unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
+    rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
         factor, unit = _unit_of_clock(name, finite[name])
         t = np.asarray(factor * finite[name], dtype=np.float64)
@@ -295,7 +305,7 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 
 
 def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
-    """Return the factor to seconds and the unit of a clock: as its name says, else milliseconds if it counts in them."""
+    """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
     inside = re.search(r"[\[(]\s*(ms|msec|s|sec|min|h)\s*[\])]", name.lower())
     said = inside.group(1) if inside else ""
     if said in ("min", "h"):
@@ -322,7 +332,7 @@ def _rate(t: Array) -> tuple[float, Array] | None:
     """Return the step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
     if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
         return None
-    values, first = np.unique(t, return_index=True)
+    _values, first = np.unique(t, return_index=True)
     early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
     mean = float(t[-1] - t[0]) / (len(t) - 1)
     slack = float(rounding_of(t)[-1]) / (len(t) - 1)

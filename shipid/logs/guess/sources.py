@@ -22,10 +22,10 @@ from shipid.logs.mapping import Manoeuvre
 ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".parquet", ".mat", ".nmea")
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
 KIND_WORDS = {
-    "zigzag": "zigzag zz zig zag z zickzack sikksakk siksak".split(),
-    "turning": "turning tc turn circle circles drehkreis svingsirkel tcs tcp williamson".split(),
-    "speed run": "speedrun speed acceleration deceleration".split(),
-    "transit": "transit straight course".split(),
+    "zigzag": ["zigzag", "zz", "zig", "zag", "z", "zickzack", "sikksakk", "siksak"],
+    "turning": ["turning", "tc", "turn", "circle", "circles", "drehkreis", "svingsirkel", "tcs", "tcp", "williamson"],
+    "speed run": ["speedrun", "speed", "acceleration", "deceleration"],
+    "transit": ["transit", "straight", "course"],
 }
 """Kind of manoeuvre -> parts of the names of files that say so."""
 
