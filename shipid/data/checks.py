@@ -76,7 +76,7 @@ def noise_of(values: Array) -> float:
     """
     if len(values) < 5:
         return 0.0
-    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / np.sqrt(6.0)
+    return float(np.median(np.abs(np.diff(values, 2))) / (0.6745 * np.sqrt(6.0)))
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ def _since_midnight(times: pd.Series[Any]) -> Array:
     numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
     since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
     since[np.isnan(numbers[:, 0])] = np.nan
-    return since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY)
+    return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY), dtype=np.float64)
 
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:

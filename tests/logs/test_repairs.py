@@ -9,6 +9,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces
 from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.repairs import Latency, apply_repairs
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)

@@ -1,4 +1,4 @@
-"""A few logs drawn by seed: the guess is right, or says that it is unsure; `python -m tests.benchmarks guess` takes 400."""
+"""A few logs drawn by seed: the guess is right, or says that it is unsure; the benchmark `guess` takes 400."""
 
 from __future__ import annotations
 
