@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,6 +46,33 @@ def show(table: Table) -> None:
         console.print(table)
     else:
         Console(width=200).print(table)
+
+
+@contextmanager
+def reading(log: Path) -> Iterator[Callable[[float], None]]:
+    """Give a function that says which share of a large log has been read (0 to 1), on standard error.
+
+    A terminal shows it in one line; elsewhere there is a line for every quarter.
+    """
+    last = [-1]
+    tty = sys.stderr.isatty()
+
+    def say(share: float) -> None:
+        step = int(100 * share) if tty else int(4 * share)
+        if step > last[0]:
+            last[0] = step
+            print(
+                f"{chr(13) if tty else ''}{log.name}: {share:.0%} read",
+                end="" if tty else "\n",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    try:
+        yield say
+    finally:
+        if tty and last[0] >= 0:
+            print(file=sys.stderr)
 
 
 def show_reasons(choices: list[tuple[str, str, str]]) -> None:
