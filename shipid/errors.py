@@ -61,9 +61,19 @@ def _rebuild(
     return cls(message, file=file, path=path, others=others)
 
 
+def visible(text: str) -> str:
+    """The text with every character that is not printable written out: contents of a file must not control a terminal.
+
+    Ends of lines stay as they are.
+    """
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode() for sign in text
+    )
+
+
 def _legible(text: str) -> str:
-    """The text as printable characters, shortened: contents of a file must not control or flood a terminal."""
-    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+    """The text as printable characters, shortened: contents of a file must not flood a terminal."""
+    shown = visible(text)
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 

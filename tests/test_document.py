@@ -127,6 +127,41 @@ def test_a_quoted_key_may_hold_dots() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date"),
+        ("a = [1, 07:32:00]", "a.1: 07:32:00: a date"),
+        ("a = " + "[" * 60 + "]" * 60, "nested deeper than 40"),
+        ("a = " + "[" * 2000 + "]" * 2000, "nested deeper than 40"),
+        ("a = " + "9" * 400, "a: an integer of 400 digits"),
+        ("a = " + "9" * 4301, "holds an integer beyond 1e+15"),
+        ("a = 1e308", "a: 1e+308: beyond 1e+24"),
+        ('a = "\\u001b[2J"', "a: '\\\\x1b[2J': text with a control character"),
+        ('"\\u0007" = 1', "a name with a control character"),
+    ],
+)
+def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(text)
+    with pytest.raises(DocumentError) as caught:
+        documents.read(file)
+    line = str(caught.value)
+    assert remedy.replace("\\\\", "\\") in line
+    assert line.isprintable()
+
+
+@pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
+def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(f"a = {value}")
+    assert "a" in documents.read(tmp_path / "a.toml")
+
+
+def test_what_has_no_end_is_no_document() -> None:
+    with pytest.raises(DocumentError, match="it is no file"):
+        documents.read("/dev/zero")
+
+
+@pytest.mark.parametrize(
     ("model", "data", "path", "message"),
     [
         (Truth, {"vessel": "mariner"}, "truth.manoeuvres", "missing"),

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices
+from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices, visible
 
 ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError, ResultError])
 
@@ -43,3 +43,9 @@ def test_choices_list_what_is_valid() -> None:
     assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
     assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
     assert choices("zzz", []) == "nothing is defined there"
+
+
+@pytest.mark.parametrize("name", ["\x1b[2J\x1b[31m", "\u202eabc", "a\rb", "\x00", "\x07"])
+def test_control_characters_are_made_visible(name: str) -> None:
+    assert visible(f"ship {name}\nsea").replace("\n", "").isprintable()
+    assert visible("R/V Gunnerus, 28.9 m ä 船\n") == "R/V Gunnerus, 28.9 m ä 船\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from shipid.study.plan import Plan
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
+FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
 
 
 @app.command("list")
@@ -160,19 +161,9 @@ def study_rotate(
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     show(table(heads, rows))
     typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
-    differences = rotate.contrasts(frame, plan).to_dict("records")
-    if differences:
-        typer.echo("paired differences over the turns [m], with a 95 % interval:")
-        pairs = [
-            (
-                row["id"],
-                row["difference"],
-                "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(row[n] for n in ("mean", "low", "high"))),
-                f"{row['above']} of {row['turns']}",
-            )
-            for row in differences
-        ]
-        show(table(["finding", "difference", "mean", "above 0"], pairs))
+    if found := rotate.turn_findings(frame, plan):
+        typer.echo("findings over the turns, in brackets 95 % intervals:")
+        show(table(["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)))
     typer.echo(f"{len(frame)} cells -> {file}")
 
 
@@ -213,6 +204,18 @@ def study_report(folder: Folder) -> None:
     typer.echo(str(write_pages(folder)))
 
 
+@app.command("check")
+def study_check(folder: Folder) -> None:
+    """Check that the files of a run's folder are whole and as they were written; ends with 1 if one is not."""
+    from shipid.study.check import check_folder
+
+    found = check_folder(folder)
+    for line in found.lines:
+        typer.echo(line)
+    if found.faults:
+        raise typer.Exit(1)
+
+
 @app.command("compare")
 def study_compare(
     folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],
@@ -223,13 +226,13 @@ def study_compare(
     worlds = read_worlds(folders)
     findings = compare_findings(worlds)
     if len(findings):
-        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [least, greatest]"]
+        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
         values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
         show(table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True)))
     errors = compare_errors(worlds)
     errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
-    columns = ["H [m]", *(f"N_D = {amount}" for amount in wide.columns)]
+    columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     show(table(columns, wide.reset_index().to_numpy().tolist()))
     bands = compare_bands(worlds)
     if len(bands):

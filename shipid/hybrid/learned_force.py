@@ -22,9 +22,10 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
-from shipid.hybrid.trials import diverged, ridges_of, row_of, sound, used
+from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
 from shipid.hybrid.units import solve
 from shipid.vessel.load import Vessel
 
@@ -112,8 +113,8 @@ class LearnedForce(Searched):
     def _fit(self, task: Task, name: str) -> Fitted:
         case, instants, future = task.cases[name], task.instants(name), task.windows.future
         if not sound(task, name):
-            return diverged([{"ridge": ridge} for ridge in self.ridges()])
-        begin = time.perf_counter()
+            return diverged(self, ({"ridge": ridge} for ridge in self.ridges()))
+        search = Search(task, [name], self, again=True)  # a trial starts from the one before
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
@@ -121,11 +122,9 @@ class LearnedForce(Searched):
             case, physics=replace(case.physics, observer=None)
         )  # single steps start from measured states
         everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
-        trials: list[dict[str, Any]] = []
-        best = (np.inf, self.ridges()[0])
         starts: dict[int, Array | None] = {}
-        for number, ridge in enumerate(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
-            start, losses, most = time.perf_counter(), [], 0
+        for number, ridge in search.left(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
+            start, losses, most = time.process_time(), [], 0
             for fold, (training, validation) in enumerate(task.folds):
                 seed = seed_of(task.seed, name, fold)
                 trainer = self._trainer(task, name, instants, future, training, steps, seed)
@@ -133,16 +132,17 @@ class LearnedForce(Searched):
                 starts[fold], most = weights, max(most, count)
                 losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
             value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
-            trials.append(row_of(number, {"ridge": ridge}, value, start, most))
-            best = min(best, (value, ridge)) if np.isfinite(value) else best
+            search.record({name: row_of(number, {"ridge": ridge}, value, start, most)})
             if task.on_trial is not None:
                 task.on_trial(number + 1, len(self.ridges()))
-        if not np.isfinite(best[0]):
-            return Fitted(None, trials, time.perf_counter() - begin)
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        ridge = min((row["value"], row["params"]["ridge"]) for row in best_of(rows))[1]
         trainer = self._trainer(task, name, instants, future, everything, steps, seed_of(task.seed, name))
-        weights, _ = trainer.solve(best[1], None)
-        corrector = ForceCorrector(trainer.block(weights), {"ridge": best[1]})
-        return Fitted(corrector, trials, time.perf_counter() - begin)
+        weights, _ = trainer.solve(ridge, None)
+        corrector = ForceCorrector(trainer.block(weights), {"ridge": ridge})
+        return Fitted(corrector, rows, search.seconds)
 
     def _trainer(
         self,

@@ -61,6 +61,26 @@ class Case:
     paths: Array
 
 
+Row = dict[str, Any]
+Space = Mapping[str, Any]
+
+
+class Journal(Protocol):
+    """A record of searches on disk, see `shipid.hybrid.journal`."""
+
+    def rows(self, cell: str) -> list[Row]:
+        """Return the trials of a search that ended, in order."""
+
+    def count(self, cell: str) -> int | None:
+        """Return how many trials a search by budget was found to have."""
+
+    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
+        """Append trials to searches: cell -> rows, each with the next number."""
+
+    def decide(self, cells: Sequence[str], count: int) -> None:
+        """Write how many trials some searches have."""
+
+
 @dataclass(frozen=True)
 class Task:
     """What a method is fitted to: foundations on the same windows.
@@ -77,6 +97,8 @@ class Task:
     estimates : foundation -> what its observer knows at the instants (S,), where it has one.
     on_trial : called with (trials done, trials in all) after each trial.
     device : a PyTorch device.
+    journal : where searches are written as they go and read back; without one they are kept in memory.
+    cells : foundation -> name of its search in the journal.
     """
 
     cases: Mapping[str, Case]
@@ -89,6 +111,8 @@ class Task:
     estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     on_trial: Callable[[int, int], None] | None = None
     device: str = "cpu"
+    journal: Journal | None = None
+    cells: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if any(len(part) == 0 for fold in self.folds for part in fold):

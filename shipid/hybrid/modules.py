@@ -26,9 +26,10 @@ from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.trials import fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
 from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 from shipid.physics import TERMS
 from shipid.vessel.schema import behind, term_blocks
@@ -222,10 +223,10 @@ class Modules(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
-        return fit_each(task, points_of(self), lambda name: self._fit(task, name))
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin, physics = time.perf_counter(), task.cases[name].physics
+        search, physics = Search(task, [name], self), task.cases[name].physics
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         modules = tuple(modules_of(physics))
         if not modules:
@@ -233,23 +234,22 @@ class Modules(Searched):
                 "the vessel has no hull, thruster or rudder whose factor could be learned", path="modules"
             )
         parts = shares(without(physics), steps.at, steps.free, steps.step)
-        rows: list[dict[str, Any]] = []
-        for number, point in enumerate(points_of(self)):
-            start = time.perf_counter()
+        for number, point in search.left(points_of(self)):
+            start = time.process_time()
 
             def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> ModulesCorrector:
                 return self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
 
             ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
-            rows.append(row_of(number, {**point, "ridge": ridge}, value, start))
-        complete = [row for row in rows if row["state"] == "complete"]
-        if not complete:
-            return Fitted(None, rows, time.perf_counter() - begin)
-        row = min(complete, key=lambda row: row["value"])
+            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        row = best_of(rows)[0]
         params = row["params"]
         everything = steps.of(used(task))
         found = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
-        return Fitted(found, rows, time.perf_counter() - begin)
+        return Fitted(found, rows, search.seconds)
 
     def _solved(
         self,

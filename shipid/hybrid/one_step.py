@@ -21,9 +21,10 @@ from shipid.errors import ResultError
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.trials import fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
 from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 
 Array = NDArray[np.float64]
@@ -141,32 +142,32 @@ class OneStep(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        return fit_each(task, points_of(self), lambda name: self._fit(task, name))
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin = time.perf_counter()
+        search = Search(task, [name], self)
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         table = feature_table(steps.at.columns, task.commands)
-        rows: list[dict[str, Any]] = []
-        for number, point in enumerate(points_of(self)):
-            start = time.perf_counter()
+        for number, point in search.left(points_of(self)):
+            start = time.process_time()
 
             def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> OneStepCorrector:
                 head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
                 return OneStepCorrector(task.commands, (head,), {})
 
             ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
-            rows.append(row_of(number, {**point, "ridge": ridge}, value, start))
-        kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
+            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
+        rows = search.rows[name]
+        kept = best_of(rows)
         if not kept:
-            return Fitted(None, rows, time.perf_counter() - begin)
+            return Fitted(None, rows, search.seconds)
         everything, heads = steps.of(used(task)), []
         for row in kept[: self.averaged]:
             params = row["params"]
             head = self._head(steps, table, everything, params, row["number"], [params["ridge"]], task.seed)
             heads.append(Head(head.units, head.surge[0], head.sway_yaw[0]))
         corrector = OneStepCorrector(task.commands, tuple(heads), kept[0]["params"])
-        return Fitted(corrector, rows, time.perf_counter() - begin)
+        return Fitted(corrector, rows, search.seconds)
 
     def _head(
         self,

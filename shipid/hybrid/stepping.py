@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.engine.native import compiler
+from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
@@ -65,7 +65,7 @@ def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
-    engine = "native" if len(at) * physics.horizon > WORTH_COMPILING and compiler() is not None else "auto"
+    engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO
     found = replace(physics, horizon=1).states(at, engine=engine)
     after = np.stack([found[name][0] for name in MOTIONS], axis=1)
     if physics.integrator == "euler":

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from math import exp, log
 from typing import Any
 
@@ -16,15 +17,18 @@ from shipid.hybrid.settings import Searched, seed_of, spread
 Array = NDArray[np.float64]
 
 
-def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> list[dict[str, float]]:
-    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm."""
+def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm.
+
+    They never end where a budget says how many are made; there is one where nothing is searched.
+    """
     ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
-    return [
-        {**fixed, **{n: exp(log(a) + s * (log(b) - log(a))) for s, (n, (a, b)) in zip(at, ranges.items(), strict=True)}}
-        for at in spread(max(len(ranges), 1), method.trials if ranges else 1)
-        for at in [at[: len(ranges)]]
-    ]
+    most = None if method.budget else method.trials
+    for shares in spread(max(len(ranges), 1), most if ranges else 1):
+        logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
+        found = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
+        yield {**fixed, **found}
 
 
 def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
@@ -32,17 +36,20 @@ def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
     return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
 
 
-def diverged(points: Sequence[Mapping[str, float]]) -> Fitted:
+def diverged(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
     """The result where the physics is not finite: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(points)], 0.0)
+    some = islice(points, 1 if method.budget else None)
+    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
-def fit_each(task: Task, points: Sequence[Mapping[str, float]], fit: Callable[[str], Fitted]) -> dict[str, Fitted]:
+def fit_each(
+    task: Task, method: Searched, points: Callable[[], Iterable[Mapping[str, float]]], fit: Callable[[str], Fitted]
+) -> dict[str, Fitted]:
     """Result of `fit` for every foundation of a task by name; where its physics is not finite all trials diverged."""
     fitted = {}
     for count, name in enumerate(task.cases):
-        fitted[name] = fit(name) if sound(task, name) else diverged(points)
+        fitted[name] = fit(name) if sound(task, name) else diverged(method, points())
         if task.on_trial is not None:
             task.on_trial(count + 1, len(task.cases))
     return fitted
@@ -68,13 +75,18 @@ def ridge_trial(
 
 
 def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
-    """The row of a trial that began at `start` by `time.perf_counter`."""
-    state = "complete" if np.isfinite(value) else "diverged"
-    seconds = time.perf_counter() - start
+    """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
+    complete = bool(np.isfinite(value))
     return {
-        **{"number": number, "params": dict(params), "value": value},
-        **{"seconds": seconds, "epochs": epochs, "state": state},
+        **{"number": number, "params": dict(params), "value": value if complete else np.nan},
+        **{"seconds": time.process_time() - start, "epochs": epochs},
+        "state": "complete" if complete else "diverged",
     }
+
+
+def best_of(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Trials that ended with a value, the best first; of equal ones the earlier."""
+    return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
 
 
 def used(task: Task) -> Index:

@@ -32,6 +32,7 @@ from shipid.metrics import Summary, position_error, summary
 from shipid.observer import Estimates, Observer, at_windows, observe
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
+from shipid.study.ranges import check_memory
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw, resolve
 
@@ -144,6 +145,10 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
         path=path_of(plan),
         past=plan.past,
     )
+    lengths = [float(np.ptp(rows["t"])) for _, rows in pieces(dataset)]
+    words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval"
+    numbers = sum(map(plan.cut(len(dataset.frame.columns)).numbers, lengths))
+    check_memory(numbers, words, "prediction.interval", plan.file)
     try:
         windows = cut(dataset)
     except DataError as error:

@@ -21,6 +21,7 @@ from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
+from shipid.vessel.ranges import UNUSUAL, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -33,6 +34,7 @@ from shipid.vessel.schema import (
     vessel_model,
 )
 
+LONGEST_CHAIN = 20  # documents that extend or patch one another
 LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
 
@@ -82,6 +84,7 @@ class Vessel:
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
+        values = {path: documents.plain(value) for path, value in values.items()}
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
             try:
@@ -190,6 +193,9 @@ def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
         other = documents.find(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    if len(above) >= LONGEST_CHAIN:
+        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
+        raise DocumentError(message, file=file, path=path)
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -204,6 +210,7 @@ class Patch(BaseModel):
     name: str | None = None
     source: str | None = None
     set: dict[str, Annotated[FiniteFloat, "value"]] = {}
+    unusual: list[str] = []
     provenance: dict[str, Any] = {}
 
 
@@ -218,7 +225,10 @@ def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
             raise DocumentError(
                 f"{patch.base} has no such parameter: {choices(path, base.parameters)}", file=file, path=f"set.{path}"
             )
-    named = documents.replace(base.document, {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"})
+    changes = {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"}
+    if patch.unusual:
+        changes[UNUSUAL] = [*base.document.get(UNUSUAL, []), *patch.unusual]
+    named = documents.replace(base.document, changes)
     return check_vessel(named, str(file))
 
 
@@ -250,6 +260,9 @@ def _check_numbers(vessel: Vessel) -> None:
         _check_order(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
+    fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
+    if fault is not None:
+        raise DocumentError(fault[1], file=vessel.file, path=fault[0])
 
 
 def _check_behind(vessel: Vessel) -> None:
@@ -357,5 +370,5 @@ def _without_words(document: Document) -> Document:
     return {
         key: _without_words(value) if isinstance(value, dict) else value
         for key, value in document.items()
-        if key not in ("source", "name", "description")
+        if key not in ("source", "name", "description", UNUSUAL)
     }

@@ -7,7 +7,7 @@ import torch
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.ridge import _blocks, _decompose, _left_out, _LeftOut, _Part, _reflection, _Search, smooth_basis
+from shipid.hybrid.ridge import _Best, _blocks, _decompose, _left_out, _LeftOut, _Part, _reflection, smooth_basis
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -132,11 +132,11 @@ def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, 
 
 def test_a_run_has_no_part_in_the_choice_of_what_judges_it():
     """Two trials, two folds: the first is best for fold 0 and the second for fold 1, so each judges the other fold."""
-    search, rows = _Search(most=1), [np.array([0, 1]), np.array([2, 3])]
+    search, rows = _Best(most=1), [np.array([0, 1]), np.array([2, 3])]
     for number, by_fold in enumerate([[1.0, 5.0], [4.0, 2.0]]):
         errors = torch.full((2, 4, 3), float(number))
         others = sum(by_fold) - np.array(by_fold)
-        search.record(number, {}, sum(by_fold), lambda: None, lambda o=others, e=errors: _LeftOut(o, e))
+        search.consider({}, sum(by_fold), lambda: None, lambda o=others, e=errors: _LeftOut(o, e))
     np.testing.assert_array_equal(search.without(rows)[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
 
