@@ -87,7 +87,9 @@ def compare_bands(worlds: Sequence[Results]) -> pd.DataFrame:
     """
     parts = []
     for results in worlds:
-        good = results.cells[(results.cells["status"] == "ok") & results.cells["coverage"].notna()]
+        keys = ["family", "method", "N_D", "status", "coverage", "width"]
+        good = results.cells.reindex(columns=keys).astype({"coverage": float, "width": float})
+        good = good[(good["status"] == "ok") & good["coverage"].notna()]
         parts.append(good.groupby(["family", "method", "N_D"], sort=False)[["coverage", "width"]].mean().reset_index())
     grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)
     named = {
