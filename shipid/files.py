@@ -59,7 +59,12 @@ def sync(place: Path) -> None:
     """Wait until a file, or the entries of a folder, are on the disk; folders only where the system can."""
     if place.is_dir() and os.name != "posix":
         return
-    handle = os.open(place, os.O_RDONLY if place.is_dir() else os.O_RDWR)
+    try:
+        handle = os.open(place, os.O_RDONLY if place.is_dir() else os.O_RDWR)
+    except PermissionError:
+        if place.is_dir():  # one may write into it and not list it
+            return
+        raise
     try:
         os.fsync(handle)
     except OSError as error:

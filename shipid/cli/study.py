@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from shipid.study.plan import Plan
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
+FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
 
 
 @app.command("list")
@@ -157,19 +158,9 @@ def study_rotate(
         rows.append([name, *(digits(row[column]) for column in columns), better])
     show(table(["foundation", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
     typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
-    differences = rotate.contrasts(frame, plan).to_dict("records")
-    if differences:
-        typer.echo("paired differences over the turns [m], with a 95 % interval:")
-        pairs = [
-            (
-                row["id"],
-                row["difference"],
-                "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(row[n] for n in ("mean", "low", "high"))),
-                f"{row['above']} of {row['turns']}",
-            )
-            for row in differences
-        ]
-        show(table(["finding", "difference", "mean", "above 0"], pairs))
+    if found := rotate.turn_findings(frame, plan):
+        typer.echo("findings over the turns, in brackets 95 % intervals:")
+        show(table(["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)))
     typer.echo(f"{len(frame)} cells -> {file}")
 
 
@@ -232,13 +223,13 @@ def study_compare(
     worlds = read_worlds(folders)
     findings = compare_findings(worlds)
     if len(findings):
-        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [least, greatest]"]
+        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
         values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
         show(table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True)))
     errors = compare_errors(worlds)
     errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
-    columns = ["H [m]", *(f"N_D = {amount}" for amount in wide.columns)]
+    columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     show(table(columns, wide.reset_index().to_numpy().tolist()))
 
 

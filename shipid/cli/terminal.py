@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from shipid.study.run import Event
+
+
+HANDLER = "command line"
+"""Name of the handler that writes log messages to standard error."""
 
 
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
@@ -42,6 +46,33 @@ def show(table: Table) -> None:
         console.print(table)
     else:
         Console(width=200).print(table)
+
+
+@contextmanager
+def reading(log: Path) -> Iterator[Callable[[float], None]]:
+    """Give a function that says which share of a large log has been read (0 to 1), on standard error.
+
+    A terminal shows it in one line; elsewhere there is a line for every quarter.
+    """
+    last = [-1]
+    tty = sys.stderr.isatty()
+
+    def say(share: float) -> None:
+        step = int(100 * share) if tty else int(4 * share)
+        if step > last[0]:
+            last[0] = step
+            print(
+                f"{chr(13) if tty else ''}{log.name}: {share:.0%} read",
+                end="" if tty else "\n",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    try:
+        yield say
+    finally:
+        if tty and last[0] >= 0:
+            print(file=sys.stderr)
 
 
 def show_reasons(choices: list[tuple[str, str, str]]) -> None:
@@ -190,8 +221,13 @@ def log_to_stderr(verbose: bool) -> None:
     """Write the warnings of shipid to standard error, or all its log messages."""
     import logging
 
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger = logging.getLogger("shipid")
+    for before in [one for one in logger.handlers if one.name == HANDLER]:
+        logger.removeHandler(before)
+    handler = logging.StreamHandler()
+    handler.name = HANDLER
+    handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG if verbose else logging.WARNING)
+    if verbose:
+        logger.setLevel(logging.DEBUG)

@@ -10,13 +10,13 @@ from typing import Any, Protocol
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from shipid.errors import ResultError
 from shipid.files import write_text
 from shipid.report import palette, paths
 from shipid.report.content import Finding, ReportContent, Sentence
 from shipid.report.figure import Figure
+from shipid.report.glossary import glossed
 from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
 from shipid.report.sections import SECTIONS
 from shipid.report.wording import bound, number
@@ -83,7 +83,7 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "bound": bound}
+    environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
@@ -101,7 +101,7 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=Markup(get_plotlyjs()),
+        plotly=Markup(_resource("vendor/plotly-cartesian.min.js")),
     )
 
 

@@ -81,6 +81,12 @@ class Claims:
                 return False
             except FileNotFoundError:
                 return self._made(file)
+            except OSError:  # a file system without links
+                try:
+                    with file.open("x", encoding="utf-8") as stream:
+                        stream.write(self._words)
+                except FileExistsError:
+                    return False
         return True
 
     def _is_abandoned(self, file: Path) -> bool:

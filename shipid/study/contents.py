@@ -55,6 +55,7 @@ def report_content(results: Results) -> ReportContent:
         provenance=parts.provenance_words(results),
         study_document=results.plan.text(),
         command=parts.reproducing_command(results),
+        best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
         frames={name: frame(results) for name, frame in FRAMES.items()},
     )
 

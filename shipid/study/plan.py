@@ -362,6 +362,17 @@ class Plan:
         return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
 
     @property
+    def plain(self) -> str | None:
+        """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
+        alone = [way for way in self.methods if way.foundations == (NO_MODEL,) and way.name != self.judged]
+        return next((way.name for way in alone if getattr(way.method, "mirror", None) == 0.0), None)
+
+    @property
+    def learning(self) -> list[str]:
+        """Names of the methods that learn from data, but for the plain rival without physics."""
+        return [way.name for way in self.methods if way.method.compensates and way.name != self.plain]
+
+    @property
     def causal(self) -> tuple[str, ...]:
         """Columns whose inputs hold the last fix."""
         return tuple(self.study.data.causal) if self.study.data else ()
@@ -392,8 +403,7 @@ class Plan:
 
     def label(self, foundation: str, method: str) -> str:
         """Name of a model for people: the foundation, with the method where that is not the only one that learns."""
-        learning = [way.name for way in self.methods if way.method.compensates]
-        return foundation if [method] == learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
+        return foundation if [method] == self.learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
 
     def text(self) -> str:
         """The resolved document as TOML."""

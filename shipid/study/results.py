@@ -28,9 +28,9 @@ from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
-MOST_TEST_RUNS = 4  # shown over time and in the window browser
+MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
-INSTANTS = 7  # windows of a test run in the browser
+INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
 @dataclass(frozen=True, repr=False)
@@ -227,7 +227,8 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     found, naive, cells = [], constant_motion(test), _shown_cells(results)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
-        for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
+        most = min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
+        for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             paths = {
                 (model, "physics", 0): path[:, index]
                 for model, path in results.physics.items()

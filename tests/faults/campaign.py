@@ -54,6 +54,13 @@ def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, l
         first = 1_000_000 * seed
         if row.trial.__module__ == folders.__name__:
             folders.reference()  # once, before the trials fork
-        found[f"{name} ({row.made})"] = list(outcomes(row.trial, range(first, first + count), row.limit))
-        print(f"{name}: {count} trials, {time.perf_counter() - begun:.0f} s", file=sys.stderr, flush=True)
+        trials = []
+        for one in outcomes(row.trial, range(first, first + count), row.limit):
+            trials.append(one)
+            if one.failed:
+                print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
+        found[f"{name} ({row.made})"] = trials
+        failed = sum(one.failed for one in trials)
+        words = f"{count} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
+        print(f"{name}: {words}", file=sys.stderr, flush=True)
     return found

@@ -1,13 +1,16 @@
+import hashlib
 import itertools
 import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 import pytest
+from plotly.offline import get_plotlyjs_version
 
 from shipid.errors import ResultError
 from shipid.report import ReportContent, Sentence, write_report
@@ -67,8 +70,17 @@ def page(request, pages):
 def test_one_plotly_and_a_file_that_fits_a_mail(page):
     _, text, parsed = page
     assert text.count("plotly.js v") == 1
-    assert len(text.encode()) < 10_000_000
+    assert len(text.encode()) < 4_000_000
     assert not parsed.open, "every element is closed"
+
+
+def test_the_vendored_plotly_is_the_one_that_is_recorded():
+    folder = files("shipid.report").joinpath("vendor")
+    script = folder.joinpath("plotly-cartesian.min.js").read_bytes()
+    record = folder.joinpath("README.md").read_text(encoding="utf-8")
+    assert hashlib.sha256(script).hexdigest() in record
+    assert b"plotly.js (cartesian - minified) v" + get_plotlyjs_version().encode() in script[:200]
+    assert b"</script" not in script
 
 
 def test_nothing_is_fetched(page):

@@ -1,17 +1,53 @@
+"""Words of verdicts and numbers."""
+
 from __future__ import annotations
 
-import pytest
+import numpy as np
 
 from shipid.study.plan import NO_MODEL
-from shipid.study.verdict import interval, metres, named, runs, undecided, verdict, words
-
-
-@pytest.mark.parametrize(
-    ("always", "on_average", "expected"),
-    [(True, True, "confirmed"), (False, True, "undecided"), (False, False, "refuted")],
+from shipid.study.verdict import (
+    every,
+    interval,
+    metres,
+    named,
+    runs,
+    shown,
+    some,
+    too_few,
+    undecided,
+    verdict,
+    weakest,
+    words,
 )
-def test_a_verdict_needs_every_seed(always: bool, on_average: bool, expected: str) -> None:
-    assert verdict(always, on_average) == expected
+
+
+def test_verdicts() -> None:
+    assert verdict(True, False) == "confirmed"
+    assert verdict(False, True) == "refuted"
+    assert verdict(False, False) == "undecided"
+    assert weakest(["confirmed", "confirmed"]) == "confirmed"
+    assert weakest(["confirmed", "undecided"]) == "undecided"
+    assert weakest(["undecided", "refuted"]) == "refuted"
+
+
+def test_all_need_no_correction_and_some_do() -> None:
+    """0.02 for each of three: all are shown; beside one that is not, 0.02 x 3 shows none."""
+    assert every(np.array([0.02, 0.02, 0.02]))
+    assert shown(np.array([0.02, 0.02, 0.02])).all()
+    assert not some(np.array([0.02, 0.02, 0.5]))
+    assert shown(np.array([0.002, 0.02, 0.5])).tolist() == [True, False, False]
+    assert not every(np.array([]))
+    assert not every(np.array([np.nan]))
+
+
+def test_numbers_in_words() -> None:
+    assert metres(9.99) == "9.99 m"
+    assert metres(9.996) == "10.0 m"
+    assert interval(1.0, 12.0) == " [1.0, 12.0]"
+    assert interval(np.nan, np.nan) == ""
+    assert runs(1) == "1 run"
+    assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
+    assert too_few(5) == ""
 
 
 def test_undecided_claims_keep_their_words_and_say_why() -> None:
@@ -20,13 +56,6 @@ def test_undecided_claims_keep_their_words_and_say_why() -> None:
         ("S1", "one", "undecided", "not finished", {}),
         ("S2", "two", "undecided", "not finished", {}),
     ]
-
-
-def test_numbers_in_sentences() -> None:
-    assert [metres(x) for x in (0.123, 9.994, 10.0, 123.46)] == ["0.12 m", "9.99 m", "10.0 m", "123.5 m"]
-    assert interval(1.0, 2.5, 3) == " [1.00, 2.50] over 3 seeds"
-    assert interval(1.0, 2.5, 1) == ""
-    assert [runs(count) for count in (1, 2)] == ["1 run", "2 runs"]
 
 
 def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:
