@@ -253,6 +253,17 @@ def past_of(
     return {**kept, "x": x, "y": y}
 
 
+def future_of(
+    rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: Literal["position", "velocity"]
+) -> Array:
+    """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
+    grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], rows["t"].to_numpy()[-1])
+    values = sample(rows, grid)
+    north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
+    x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
+    return np.stack([x, y], axis=-1)[1:]
+
+
 def _integral(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
     """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
     t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))

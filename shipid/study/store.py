@@ -36,7 +36,8 @@ from shipid.vessel.load import check_vessel
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
 DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
 PARTS = "parts"
-METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
+UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
+METRICS = tuple(UNITS)
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
@@ -195,7 +196,7 @@ def read_rows(folder: Path) -> pd.DataFrame:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     frame = pd.DataFrame(rows)
     for name in METRICS:
-        frame[name] = frame[name].astype(float)
+        frame[name] = frame[name].astype(float) if name in frame else np.nan
     return frame.sort_values(["N_D", "seed"], kind="stable").reset_index(drop=True)
 
 
@@ -204,7 +205,7 @@ def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     seals.remove(folder, "results")
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
-    table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
+    table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
