@@ -185,7 +185,8 @@ class Mirrored(Block):
     """Hidden tanh units in mirrored pairs and an output layer, each number kept once.
 
     h = tanh(z w + c), g = tanh((z R) w + c); out = [(h + g) x + b_x, (h - g) y + b_y].
-    weight : (d, M). offset : (M,). image : (d,) z R = sign * z[place], as `place` and `sign`. x, y : (M, r).
+    weight : (d, M). offset : (M,). image : (d,) z R = sign * z[place], as `place` and `sign`. x : (M, p). y : (M, q),
+    q may be 0.
     """
 
     weight: Array
@@ -204,8 +205,8 @@ class Mirrored(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """2 r."""
-        return 2 * int(self.x.shape[1])
+        """p + q."""
+        return int(self.x.shape[1] + self.y.shape[1])
 
     @cached_property
     def function(self) -> ca.Function:
@@ -214,7 +215,9 @@ class Mirrored(Block):
         image = ca.vertcat(*(float(s) * z[int(p)] for p, s in zip(self.place, self.sign, strict=True)))
         weight, offset = ca.DM(self.weight.T), ca.DM(self.offset)
         h, g = ca.tanh(ca.mtimes(weight, z) + offset), ca.tanh(ca.mtimes(weight, image) + offset)
-        outputs = ca.vertcat(ca.mtimes(ca.DM(self.x.T), h + g), ca.mtimes(ca.DM(self.y.T), h - g))
+        outputs = ca.mtimes(ca.DM(self.x.T), h + g)
+        if self.y.shape[1]:
+            outputs = ca.vertcat(outputs, ca.mtimes(ca.DM(self.y.T), h - g))
         return ca.Function(self.name, [z], [outputs + ca.DM(self.bias)], ["z"], ["out"])
 
     def numbers(self) -> int:
@@ -223,14 +226,14 @@ class Mirrored(Block):
 
     def statements(self, call: dict[int, str], precision: Precision) -> list[str]:  # noqa: ARG002
         """Tables and loops."""
-        (d, m), r, t = self.weight.shape, self.x.shape[1], precision
-        return [
+        (d, m), p, q, t = self.weight.shape, self.x.shape[1], self.y.shape[1], precision
+        lines = [
             f"static const real weight[{d * m}] = {{{t.table(self.weight)}}};",
             f"static const real offset[{m}] = {{{t.table(self.offset)}}};",
-            f"static const real x[{m * r}] = {{{t.table(self.x)}}};",
-            f"static const real y[{m * r}] = {{{t.table(self.y)}}};",
-            f"static const real bias[{2 * r}] = {{{t.table(self.bias)}}};",
-            f"static const int place[{d}] = {{{','.join(str(int(p)) for p in self.place)}}};",
+            f"static const real x[{m * p}] = {{{t.table(self.x)}}};",
+            *([f"static const real y[{m * q}] = {{{t.table(self.y)}}};"] if q else []),
+            f"static const real bias[{p + q}] = {{{t.table(self.bias)}}};",
+            f"static const int place[{d}] = {{{','.join(str(int(at)) for at in self.place)}}};",
             f"static const real sign[{d}] = {{{t.table(self.sign)}}};",
             f"real h[{m}], g[{m}];",
             "int i, j;",
@@ -242,14 +245,14 @@ class Mirrored(Block):
             f"        g[j] += b * weight[i * {m} + j];",
             "    }",
             "}",
-            f"for (j = 0; j < {2 * r}; ++j) out[j] = bias[j];",
+            f"for (j = 0; j < {p + q}; ++j) out[j] = bias[j];",
             f"for (i = 0; i < {m}; ++i) {{",
-            "    const real a = M(tanh)(h[i]), b = M(tanh)(g[i]);",
-            "    const real even = a + b, odd = a - b;",
-            f"    for (j = 0; j < {r}; ++j) out[j] += even * x[i * {r} + j];",
-            f"    for (j = 0; j < {r}; ++j) out[{r} + j] += odd * y[i * {r} + j];",
-            "}",
+            "    const real a = M(tanh)(h[i]), b = M(tanh)(g[i]), even = a + b;",
+            f"    for (j = 0; j < {p}; ++j) out[j] += even * x[i * {p} + j];",
         ]
+        if q:
+            lines.append(f"    for (j = 0; j < {q}; ++j) out[{p} + j] += (a - b) * y[i * {q} + j];")
+        return [*lines, "}"]
 
 
 @dataclass(frozen=True, eq=False)
