@@ -13,7 +13,7 @@ from casadi import SX
 from shipid.errors import ShipidError, choices
 from shipid.export.blocks import Block, Dense, Forest, Formula, Graph, Mirrored, Nearest, Value, formula
 from shipid.export.equations import Equations
-from shipid.export.known import Known, feature_table
+from shipid.export.known import Known, feature_table, past_records
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
@@ -487,10 +487,8 @@ def hankel(known: Known, corrector: HankelCorrector) -> Value:
 
 def _missed_before(known: Known, first: int, delays: int) -> Value:
     """Accelerations that single steps of the physics missed over the last steps of the past, row by row."""
-    from shipid.export.known import replace_horizon
-
     graph, names, model = known.graph, known.names, known.equations.model
-    records = replace_horizon(known, first, delays)
+    records = past_records(known, first, delays)
     reached = _reached(known, known.of("past", tuple(model.memory), first), records)
     body = Graph("missed")
     carry = body.input("carry", 4)

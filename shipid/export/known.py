@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
@@ -15,7 +15,6 @@ from shipid.export.equations import Equations, rollout
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, LOW, bank
-from shipid.vessel.load import Vessel
 
 SX_of = Mapping[str, SX]
 
@@ -53,12 +52,20 @@ class Layout:
 
 
 def layout(
-    physics: Physics, vessel: Vessel | None, commands: Sequence[str], num_past: int, *, known: bool, wind: bool
+    physics: Physics,
+    commands: Sequence[str],
+    num_past: int,
+    *,
+    known: bool,
+    wind: bool,
+    limited: Sequence[str] = (),
 ) -> Layout:
-    """Inputs that a predictor takes. vessel : with all terms, also those of a method. commands : that a method takes.
+    """Inputs that a predictor takes.
 
-    wind : whether the method takes the relative wind.
+    physics : with all terms, also those of a method. commands : that a method takes. wind : whether it takes the
+    relative wind. limited : columns that the alarm looks at.
     """
+    vessel = physics.vessel
     states, memory, taken, weather = [], (), (), ()
     if vessel is not None:
         model = Equations(vessel).model
@@ -67,6 +74,7 @@ def layout(
     place = ("north", "east") if physics.observer is not None and physics.path == "position" else ()
     every = tuple(dict.fromkeys((*taken, *commands)))
     environment = tuple(dict.fromkeys((*weather, *(("V_w", "beta_w") if wind else ()))))
+    environment += tuple(name for name in limited if name not in (*MOTIONS, *every, *environment))
     now = (*place, "psi", *MOTIONS, *states, *every, *environment)
     past = tuple(name for name in now if name not in place)
     return Layout(
@@ -229,7 +237,7 @@ class Known:
         graph, physics = self.graph, self.physics
         steps = steps_of(seconds, physics.step)
         first = self.names.num_past - steps
-        known = replace_horizon(self, first, steps)
+        known = past_records(self, first, steps)
         carry, then = SX.sym("carry", self.equations.num_carry), SX.sym("then", 3)
         now = SX.sym("now", 4)
         places = self.equations.index(("north", "east", *MOTIONS))
@@ -261,7 +269,7 @@ class Known:
         return Table(self, inputs, tuple(trajectory))
 
 
-def replace_horizon(known: Known, first: int, steps: int) -> Value:
+def past_records(known: Known, first: int, steps: int) -> Value:
     """Carries over `steps` past steps, from the measured state at row `first` of the past, actuators at their order."""
     graph, equations, physics = known.graph, known.equations, known.physics
     model = equations.model
@@ -391,8 +399,3 @@ def _estimates(names: Layout, groups: SX_of) -> dict[str, SX]:
     north, east = seen["current_north"], seen["current_east"]
     table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
     return table | {f"observer-wave.{name}": now[name] - seen[name] for name in MOTIONS}
-
-
-def with_terms(physics: Physics, vessel: Vessel | None) -> Physics:
-    """The physics with another vessel."""
-    return replace(physics, vessel=vessel)

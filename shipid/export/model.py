@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -133,13 +133,13 @@ def model(predictor: Exportable) -> Model:
         physics = corrector.with_force(physics)
     names = layout(
         physics,
-        physics.vessel,
         taken_.commands or _orders(predictor),
         predictor.past,
         known=predictor.commands == "known",
         wind=taken_.wind,
+        limited=tuple(predictor.limits),
     )
-    return Model(predictor, physics, replace(names))
+    return Model(predictor, physics, names)
 
 
 def _orders(predictor: Exportable) -> tuple[str, ...]:
