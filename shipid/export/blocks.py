@@ -7,6 +7,7 @@ once here, and the C and the CasADi that come from it say the same.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,6 +21,8 @@ from shipid.engine.printing import ARITHMETIC, Dialect, print_function
 from shipid.errors import ShipidError
 
 Array = np.ndarray
+LONGEST = 600  # operations of one C function
+_VALUE, _TARGET = re.compile(r"\ba\d+\b"), re.compile(r"const real (a\d+) = ")
 
 _CALLS = {
     ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
@@ -641,17 +644,51 @@ def c_functions(blocks: Sequence[Block], precision: Precision) -> tuple[str, dic
 
 
 def c_function(block: Block, call: dict[int, str], precision: Precision) -> str:
-    """One static C function."""
+    """One static C function; a long formula is a chain of functions, since compilers take long for long ones."""
     lines = block.statements(call, precision)
     given = [name for name, size in block.inputs if size]
+    if isinstance(block, Formula) and len(lines) > LONGEST:
+        return _chain(lines, given, call[id(block)])
+    return _function(lines, given, call[id(block)])
+
+
+def _function(lines: Sequence[str], given: Sequence[str], name: str, more: Sequence[str] = ("real *out",)) -> str:
     body = "\n".join(lines)
-    unused = [f"(void){name};" for name in given if not _mentions(body, name)]
-    heads = ", ".join([*(f"const real *{name}" for name in given), "real *out"])
+    unused = [f"(void){key};" for key in (*given, *(one.rpartition("*")[2] for one in more)) if not _mentions(body, key)]
+    heads = ", ".join([*(f"const real *{key}" for key in given), *more])
     declared = [line for line in lines if line.startswith(("static const", "int ", "real ", "float "))]
     rest = lines[len(declared) :] if lines[: len(declared)] == declared else lines
     declared = declared if rest is not lines else []
     text = "\n".join(f"    {line}" for line in (*declared, *unused, *rest))
-    return f"static void {call[id(block)]}({heads})\n{{\n{text}\n}}\n"
+    return f"static void {name}({heads})\n{{\n{text}\n}}\n"
+
+
+def _chain(lines: Sequence[str], given: Sequence[str], name: str) -> str:
+    """Lines `const real a7 = ...;` in parts of `LONGEST`, values in slots of one array that are used again."""
+    last: dict[str, int] = {}
+    for number, line in enumerate(lines):
+        for key in _VALUE.findall(line):
+            last[key] = number
+    slots: dict[str, int] = {}
+    free: list[int] = []
+    count, written = 0, []
+    for number, line in enumerate(lines):
+        target = _TARGET.match(line)
+        used = [key for key in dict.fromkeys(_VALUE.findall(line)) if target is None or key != target[1]]
+        text = line if target is None else line[target.end() :]
+        text = _VALUE.sub(lambda found: f"w[{slots[found[0]]}]", text)
+        free += [slots[key] for key in used if last[key] == number]
+        if target is not None:
+            if not free:
+                free.append(count)
+                count += 1
+            slots[target[1]] = free.pop()
+            text = f"w[{slots[target[1]]}] = {text}"
+        written.append(text)
+    parts = [written[first : first + LONGEST] for first in range(0, len(written), LONGEST)]
+    texts = [_function(part, given, f"{name}_{k}", ("real *w", "real *out")) for k, part in enumerate(parts)]
+    calls = [f"{name}_{k}({', '.join([*given, 'w', 'out'])});" for k in range(len(parts))]
+    return "\n".join([*texts, _function([f"real w[{max(1, count)}];", *calls], given, name)])
 
 
 def _mentions(text: str, name: str) -> bool:

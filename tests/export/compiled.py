@@ -46,14 +46,14 @@ def compile_(command: list[str], folder: Path, *arguments: str) -> None:
 def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
     """The source as a shared library."""
     write(files, folder)
-    compile_([compiler()], folder, *(options or ("-O1",)), "-shared", "-fPIC", "-o", "model.so", f"{files.name}.c")
+    compile_([compiler()], folder, *(options or ("-O0",)), "-shared", "-fPIC", "-o", "model.so", f"{files.name}.c")
     return ctypes.CDLL(str(folder / "model.so"))
 
 
 def run_example(files: Files, folder: Path, *options: str) -> str:
     """Output of the example."""
     write(files, folder)
-    compile_([compiler()], folder, *(options or ("-O1",)), "-o", "example", "main.c", f"{files.name}.c")
+    compile_([compiler()], folder, *(options or ("-O0",)), "-o", "example", "main.c", f"{files.name}.c")
     result = subprocess.run([folder / "example"], capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout

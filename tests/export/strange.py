@@ -128,7 +128,7 @@ def _signs(rng, size):
     return matrix
 
 
-def _network(rng, names, table, horizon, terms, mirrored):
+def network_of(rng, names, table, horizon, terms, mirrored):
     normaliser = _normaliser(rng, names, table)
     units = int(rng.integers(2, 20))
     weight, offset = rng.normal(0, 0.4, (len(names), units)), rng.normal(size=units)
@@ -213,7 +213,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         networks = []
         for _ in range(int(rng.integers(1, 4))):
             fewer = [name for name in taken if rng.random() < 0.8] or taken
-            networks.append(_network(rng, fewer, table, horizon, terms, rng.random() < 0.5))
+            networks.append(network_of(rng, fewer, table, horizon, terms, rng.random() < 0.5))
         return (Calibrated if kind == "calibrator" else Compensator)(inputs, tuple(networks), {})
     if kind == "forest":
         values = np.stack([table[name] for name in taken], axis=1)

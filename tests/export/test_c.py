@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,8 +25,8 @@ from shipid.predictor import Predictor
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import pace, variety
-from tests.export.compiled import SANITIZERS, library, paths, pointer, run_example
-from tests.export.strange import KINDS, drawn
+from tests.export.compiled import SANITIZERS, compile_, compiler, library, paths, pointer, run_example, write
+from tests.export.strange import KINDS, drawn, network_of
 
 NEAR = 1e-12  # m
 INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME = 1, 2, 4, 8, 16
@@ -131,12 +134,12 @@ def test_sanitizers_are_silent_with_an_observer(tmp_path):
 
 
 def log_of(vessel, seconds, rng, interval):
-    """A run with orders that change, at uneven times, its heading across the wrap."""
+    """A run with orders that change, at uneven times; its heading goes on beyond pi."""
     slow, commands = pace(vessel), dynamics(vessel).commands
     t = np.cumsum(rng.uniform(0.8, 1.2, round(seconds / interval)) * interval) * slow
     frame = pd.DataFrame({"run": "a", "t": t, "flags": 0})
     psi = 3.0 + 0.03 / slow * (t - t[0])
-    frame["psi"] = (psi + np.pi) % (2 * np.pi) - np.pi
+    frame["psi"] = psi
     frame["u"], frame["v"] = slow * (3 + 0.2 * np.sin(t)), slow * 0.2 * np.cos(t)
     frame["r"] = np.full(len(t), 0.03 / slow)
     frame["north"] = 200 + np.cumsum(np.r_[0, np.diff(t) * frame["u"].to_numpy()[1:] * np.cos(psi[1:])])
@@ -175,7 +178,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     )
     table = inputs.table(physics, instants)
     names = [name for name in table if "." not in name or rng.random() < 0.6]
-    network = _network(rng, names, table, physics.horizon)
+    network = network_of(rng, names, table, physics.horizon, 3, False)
     predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (0.0, 9.0)})
     exported = model(predictor)
     files = predictor_files(exported, "odd", Precision())
@@ -186,12 +189,11 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     path = np.zeros((physics.horizon, 2))
     assert loaded.odd_predict(pointer(kept), None, pointer(path)) == NO_PAST
     order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
-    import ctypes
-
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
     found = []
     for i in range(len(t)):
         row = np.ascontiguousarray(rows.iloc[i][list(order)].to_numpy(dtype=float))
+        row[order.index("psi")] = (row[order.index("psi")] + np.pi) % (2 * np.pi) - np.pi
         assert loaded.odd_record(pointer(kept), t[i], pointer(row)) == 0
         assert loaded.odd_record(pointer(kept), t[i], pointer(row)) == TIME
         bad = row.copy()
@@ -205,17 +207,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     np.testing.assert_allclose(np.stack(found, axis=1), expected, rtol=0, atol=1e-10)  # filters amplify rounding
 
 
-def _network(rng, names, table, horizon):
-    from tests.export.strange import _network as network
-
-    return network(rng, names, table, horizon, 3, False)
-
-
 def _size_of_struct(files, folder):
-    import subprocess
-
-    from tests.export.compiled import compile_, compiler, write
-
     write(files, folder)
     (folder / "size.c").write_text(
         '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd)); return 0; }\n'
@@ -242,8 +234,6 @@ def _steps(vessel, folder, draw_inputs):
     drawn_ = draw_inputs(vessel, 3)
     loads = 1e-3 * float(vessel.document["inertia"]["m"]) * np.ones(equations.model.num_dof)
     loaded = library(vessel_files(vessel, "ship", "rk4", Precision()), folder)
-    import ctypes
-
     loaded.ship_step.argtypes = [*[ctypes.c_void_p] * 5, ctypes.c_double]
     steps = 60
     expected = rollout(
