@@ -153,7 +153,7 @@ class Dense(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """o."""
+        """O."""
         return len(self.bias)
 
     @cached_property
@@ -208,7 +208,7 @@ class Mirrored(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """p + q."""
+        """P + q."""
         return int(self.x.shape[1] + self.y.shape[1])
 
     @cached_property
@@ -473,7 +473,7 @@ class Graph(Block):
         return Value(name, 0, symbol)
 
     def add(self, x: Value, factor: float | Duration, k: Value) -> Value:
-        """x + factor k."""
+        """X + factor k."""
         name = self._new(x.size)
         self._lines.append(("add", (name, x.size, x.text, factor, k.text)))
         return Value(name, 0, x.symbol + (factor.symbol if isinstance(factor, Duration) else factor) * k.symbol)
@@ -654,7 +654,9 @@ def c_function(block: Block, call: dict[int, str], precision: Precision) -> str:
 
 def _function(lines: Sequence[str], given: Sequence[str], name: str, more: Sequence[str] = ("real *out",)) -> str:
     body = "\n".join(lines)
-    unused = [f"(void){key};" for key in (*given, *(one.rpartition("*")[2] for one in more)) if not _mentions(body, key)]
+    unused = [
+        f"(void){key};" for key in (*given, *(one.rpartition("*")[2] for one in more)) if not _mentions(body, key)
+    ]
     heads = ", ".join([*(f"const real *{key}" for key in given), *more])
     declared = [line for line in lines if line.startswith(("static const", "int ", "real ", "float "))]
     rest = lines[len(declared) :] if lines[: len(declared)] == declared else lines

@@ -19,16 +19,51 @@ from shipid.export.equations import Equations
 from shipid.export.model import Model
 from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
 from shipid.physics.signals import SIGNALS, signal_of
-from shipid.vessel.load import Vessel
 from shipid.version import __version__
+from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main".split()
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "main",
+    ]
 )
 
 
@@ -157,16 +192,20 @@ class VesselParts:
         constants = ",\n    ".join(f"{name}_{key} = {value}" for key, value in numbers.items())
         declared, _ = self._tables()
         real = "float" if self.precision.single else "double"
-        return f"""{comment([
-            f"{self.vessel.name}: equations of motion in C99, written by shipid {__version__}.",
-            f"Vessel document digest {self.vessel.digest}.",
-            "",
-            "SI units, radians, revolutions per second. The state is north, east, heading over ground, velocities in body",
-            "axes; then the hidden states of terms and the positions of actuators that lag behind their orders. Names and",
-            "units of every entry, in order, are in the tables below. Directions of wind and current are towards.",
-            "Not in this file: waves that a simulated truth draws, a screening of inputs, a helmsman.",
-            "No memory is allocated and nothing is kept between calls.",
-        ])}
+        return f"""{
+            comment(
+                [
+                    f"{self.vessel.name}: equations of motion in C99, written by shipid {__version__}.",
+                    f"Vessel document digest {self.vessel.digest}.",
+                    "",
+                    "SI units, radians, revolutions per second. The state is north, east, heading over ground, velocities in body",
+                    "axes; then the hidden states of terms and the positions of actuators that lag behind their orders. Names and",
+                    "units of every entry, in order, are in the tables below. Directions of wind and current are towards.",
+                    "Not in this file: waves that a simulated truth draws, a screening of inputs, a helmsman.",
+                    "No memory is allocated and nothing is kept between calls.",
+                ]
+            )
+        }
 #ifndef {guard}
 #define {guard}
 
@@ -192,11 +231,15 @@ enum {{
 /* Actuators of a carry take the positions that the commands order. */
 void {name}_begin({name}_real *carry, const {name}_real *commands);
 
-/* d(state)/dt of {name}_NUM_CARRY less the actuators. loads: forces and moments that are added, such as waves or a tug. */
+/* d(state)/dt of {
+            name
+        }_NUM_CARRY less the actuators. loads: forces and moments that are added, such as waves or a tug. */
 void {name}_rates(const {name}_real *carry, const {name}_real *commands, const {name}_real *environment,
                   const {name}_real *loads, const {name}_real *parameters, {name}_real *rates);
 
-/* One step of {"explicit Euler" if self.method == "euler" else "classical Runge-Kutta (RK4)"} over dt seconds; actuators move exactly. Any dt above 0; up to a tenth of the
+/* One step of {
+            "explicit Euler" if self.method == "euler" else "classical Runge-Kutta (RK4)"
+        } over dt seconds; actuators move exactly. Any dt above 0; up to a tenth of the
  * ship's shortest time constant is accurate. parameters: {name}_defaults, or a changed copy of it. */
 int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_real *environment,
                 const {name}_real *loads, const {name}_real *parameters, {name}_real dt);
@@ -280,7 +323,9 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
         orders = []
         for command in groups["commands"]:
             row = SIGNALS[signal_of(command)]
-            orders.append(repr(float(np.deg2rad(10) if row.turns else row.usual[0] + 0.5 * (row.usual[1] - row.usual[0]))))
+            orders.append(
+                repr(float(np.deg2rad(10) if row.turns else row.usual[0] + 0.5 * (row.usual[1] - row.usual[0])))
+            )
         speed = groups["carry"].index("u")
         return f"""/* A minute of {self.name} with the helm over. cc -std=c99 main.c {name}.c -lm */
 #include <stdio.h>
@@ -396,21 +441,30 @@ class PredictorParts:
         limits = [f"{key} {low:.6g} to {high:.6g} {model.unit(key)}" for key, (low, high) in model.limits.items()]
         filters = self.filters
         states = "" if filters is None else f"    {name}_real filters[{_size(filters) * filters.num_filters}];\n"
-        return f"""{comment([
-            f"Predictor of a trajectory in C99, written by shipid {__version__}: {what}, method {predictor.method}.",
-            f"{names.horizon} steps of {physics.step:g} s ({physics.integrator}); commands are {predictor.commands} over the horizon.",
-            *([] if physics.observer is None else ["An observer filters the motion and estimates slow forces and current."]),
-            "",
-            "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
-            "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
-            "Limits of the alarm: " + ("; ".join(limits) or "none: every instant counts as outside") + ".",
-            "",
-            "Not in this file: a screening of inputs, a fusion of sensors, a repair of logs. Fixes that were interpolated",
-            "look ahead; give what is known at the time" + (f" ({', '.join(predictor.causal)})." if predictor.causal else "."),
-            "No memory is allocated; everything that is kept is in the struct, so that many may run side by side.",
-            "",
-            *provenance_lines(predictor.provenance),
-        ])}
+        return f"""{
+            comment(
+                [
+                    f"Predictor of a trajectory in C99, written by shipid {__version__}: {what}, method {predictor.method}.",
+                    f"{names.horizon} steps of {physics.step:g} s ({physics.integrator}); commands are {predictor.commands} over the horizon.",
+                    *(
+                        []
+                        if physics.observer is None
+                        else ["An observer filters the motion and estimates slow forces and current."]
+                    ),
+                    "",
+                    "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
+                    "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
+                    "Limits of the alarm: " + ("; ".join(limits) or "none: every instant counts as outside") + ".",
+                    "",
+                    "Not in this file: a screening of inputs, a fusion of sensors, a repair of logs. Fixes that were interpolated",
+                    "look ahead; give what is known at the time"
+                    + (f" ({', '.join(predictor.causal)})." if predictor.causal else "."),
+                    "No memory is allocated; everything that is kept is in the struct, so that many may run side by side.",
+                    "",
+                    *provenance_lines(predictor.provenance),
+                ]
+            )
+        }
 #ifndef {guard}
 #define {guard}
 
@@ -448,7 +502,8 @@ typedef struct {{
 void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
- * {GAP * physics.step:g} s the past begins anew. Angles may wrap. Rows closer than {physics.step / ROWS_A_STEP:g} s replace each other in the past. */
+ * {GAP * physics.step:g} s the past begins anew. Angles may wrap. Rows closer than {
+            physics.step / ROWS_A_STEP:g} s replace each other in the past. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
 /* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, or a null
@@ -503,15 +558,15 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
         lines.append(nan)
         for key in ("now", "past", "estimates", "parameters"):
             if sizes_[key]:
-                lines.append(
-                    f"for (i = 0; i < {sizes_[key]}; ++i) if (!isfinite({key}[i])) return {name}_NOT_FINITE;"
-                )
+                lines.append(f"for (i = 0; i < {sizes_[key]}; ++i) if (!isfinite({key}[i])) return {name}_NOT_FINITE;")
         if names.planned:
             lines.append(
                 f"if (!planned) {{ for (i = 0; i < {sizes_['planned']}; ++i) "
                 f"held[i] = now[order[i % {len(commands)}]]; planned = held; }}"
             )
-            lines.append(f"for (i = 0; i < {sizes_['planned']}; ++i) if (!isfinite(planned[i])) return {name}_NOT_FINITE;")
+            lines.append(
+                f"for (i = 0; i < {sizes_['planned']}; ++i) if (!isfinite(planned[i])) return {name}_NOT_FINITE;"
+            )
         if names.reached:
             source_ = "planned" if names.planned else "now"
             lines.append(
@@ -558,12 +613,14 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
             f"        kept[{i}] += (real)(6.283185307179586476925 * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / 6.283185307179586476925));"
             for i in angles
         )
-        lines = [f"""void {name}_init({name} *self)
+        lines = [
+            f"""void {name}_init({name} *self)
 {{
     memset(self, 0, sizeof *self);
     memcpy(self->parameters, {name}_defaults, sizeof self->parameters);
 }}
-"""]
+"""
+        ]
         actuators = ""
         if advance is not None:
             model_ = Equations(_must(model.vessel)).model
@@ -690,7 +747,9 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
         values = []
         for key in row:
             low, high = self.model.limits.get(key, (0.0, 0.0))
-            values.append(repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else ""))
+            values.append(
+                repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else "")
+            )
         rows = names.num_past + 1
         return f"""/* A ship that does the same for a while, and where she goes. cc -std=c99 main.c {name}.c -lm */
 #include <stdio.h>

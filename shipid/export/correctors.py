@@ -165,7 +165,9 @@ def recurrent(known: Known, corrector: RecurrentCorrector) -> Value:
             other = graph.call(read, image, graph.call(_image(at), now))
             one, two = SX.sym("one", output.size), SX.sym("two", output.size)
             half = ca.DM(np.repeat([1.0, -1.0], output.size // 2))
-            output = graph.call(formula("even_odd", [("one", one), ("two", two)], (one + half * two) / 2), output, other)
+            output = graph.call(
+                formula("even_odd", [("one", one), ("two", two)], (one + half * two) / 2), output, other
+            )
         outputs.append(output)
     assert names.num_past >= max(network.reader.steps for network in corrector.networks)
     return _plus(known, outputs, [network.basis for network in corrector.networks])
@@ -430,9 +432,7 @@ def modules_builder(known: Known, corrector: ModulesCorrector) -> Builder:
         x = _features(graph, known, at, corrector.commands, corrector.units.normaliser.names)
         raw = graph.call(units_with(corrector.units, corrector.weights.T, np.zeros((len(corrector.units.offset) +
                          (corrector.units.reflection is None), 0))), x)  # fmt: skip
-        apart = graph.call(
-            Nearest(corrector.alarm.centres), graph.call(z_score(corrector.units.normaliser), x)
-        )
+        apart = graph.call(Nearest(corrector.alarm.centres), graph.call(z_score(corrector.units.normaliser), x))
         r, d, steps = SX.sym("raw", count), SX.sym("apart"), SX.sym("after", 3 * (count + 1))
         weight = 1 - (d - corrector.alarm.radius) / corrector.fade
         weight = ca.if_else(ca.fabs(d) < np.inf, ca.fmin(ca.fmax(weight, 0), 1), 0)

@@ -6,7 +6,6 @@ The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org. Its declarat
 from __future__ import annotations
 
 import platform
-import shutil
 import subprocess
 import tempfile
 import uuid
@@ -25,9 +24,9 @@ from shipid.export.blocks import Precision
 from shipid.export.c import Files, PredictorParts, VesselParts, predictor_files, vessel_files
 from shipid.export.model import Model
 from shipid.files import whole
-from shipid.physics.signals import SIGNALS, neutral, signal_of
-from shipid.vessel.load import Vessel
+from shipid.physics.signals import SIGNALS, neutral
 from shipid.version import __version__
+from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): "linux64", ("Darwin", "x86_64"): "darwin64"}
 LARGEST_STEP = 0.1  # s: of a vessel inside a communication step, scaled by the size of the ship
@@ -88,7 +87,9 @@ def vessel_unit(vessel: Vessel, name: str, method: Method, largest: float | None
         for key in groups["environment"]
     ]
     found += [
-        Variable(f"load.{key}", "input", "continuous", parts.unit("loads", key), f"added {key}, such as waves or a tug", 0.0)
+        Variable(
+            f"load.{key}", "input", "continuous", parts.unit("loads", key), f"added {key}, such as waves or a tug", 0.0
+        )
         for key in groups["loads"]
     ]
     found += [
@@ -122,7 +123,9 @@ def predictor_unit(model: Model, name: str) -> Packed:
             found.append(Variable(f"{axis}[{k + 1}]", "output", "continuous", "m", text, None))
     found.append(Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None))
     for key, value in zip(names.parameters, model.parameters, strict=True):
-        found.append(Variable(key, "parameter", "tunable", model.unit(key), "number of the vessel document", float(value)))
+        found.append(
+            Variable(key, "parameter", "tunable", model.unit(key), "number of the vessel document", float(value))
+        )
     if names.planned:
         text = "1: orders stay as they are over the horizon; 0: as in planned[...]"
         found.append(Variable("held", "parameter", "tunable", "-", text, 1.0))
@@ -179,7 +182,9 @@ def description(unit: Packed, guid: str) -> str:
         head += f' initial="{initial}"' if initial else ""
         real = "" if variable.unit in ("-", "") else f" unit={quoteattr(variable.unit)}"
         real += "" if variable.start is None else f' start="{float(variable.start)!r}"'
-        rows.append(f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>")
+        rows.append(
+            f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>"
+        )
     rows.append(
         '    <ScalarVariable name="status" valueReference="0" causality="output" variability="discrete" initial="exact"'
         ' description="0, or a sum of the results that the header in sources lists">\n'
@@ -211,7 +216,7 @@ def description(unit: Packed, guid: str) -> str:
     </SourceFiles>
   </CoSimulation>
   <UnitDefinitions>
-{newline.join(f'    <Unit name={quoteattr(name)}/>' for name in units)}
+{newline.join(f"    <Unit name={quoteattr(name)}/>" for name in units)}
   </UnitDefinitions>
   <LogCategories>
     <Category name="logStatusError" description="values that are refused"/>
@@ -250,7 +255,9 @@ def _vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variab
         at[group] = place
         place += sizes[group]
     total = place + 1
-    given = ", ".join(f"self->values + {at[group]}" for group in ("carry", "commands", "environment", "loads", "parameters"))
+    given = ", ".join(
+        f"self->values + {at[group]}" for group in ("carry", "commands", "environment", "loads", "parameters")
+    )
     begin = f"    {name}_begin(self->values, self->values + {at['commands']});\n" if sizes["carry"] > num_states else ""
     return f"""
 #define NUM_REALS {total}

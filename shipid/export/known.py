@@ -206,7 +206,7 @@ class Known:
         force = ca.DM(filters.mass) @ ca.vertcat(*(seen[name] for name in "XYN"))
         slow = formula("slow", [("fade", fade), ("estimates", estimates)], fade * force)
         tau = graph.map(slow, [graph.constant(faded)], [self.values["estimates"]], physics.horizon)
-        assert LOW == len(COLUMNS)
+        assert len(COLUMNS) == LOW
         drift = self.values["estimates"][COLUMNS.index("current_north") : COLUMNS.index("current_east") + 1]
         return state, environment, drift, tau
 
@@ -257,9 +257,7 @@ class Known:
             "error", [("carry", carry), ("then", then), ("now", now)], [ca.if_else(sound, e, 0) for e in errors]
         )
         last = known[-self.equations.num_carry :] if known.size > self.equations.num_carry else known
-        return graph.call(
-            block, last, self.of("past", ("x", "y", "psi"), first), self.of("now", ("psi", *MOTIONS))
-        )
+        return graph.call(block, last, self.of("past", ("x", "y", "psi"), first), self.of("now", ("psi", *MOTIONS)))
 
     def table(self, inputs: Inputs, trajectory: Sequence[int] = ()) -> Table:
         """Every input that a method may take, see `shipid.hybrid.features.Inputs.table`.

@@ -116,7 +116,9 @@ class Model:
             at = len(next(iter(instants.past.values()))) - names.num_past + row
             rows = {"down": instants.past.get("z", np.zeros((at + 1, count))), **instants.past}
             past += [np.asarray(rows[name][at]) if name in rows else zero for name in names.past]
-        planned = [np.asarray((instants.planned or {})[name][k]) for k in range(names.horizon) for name in names.planned]
+        planned = [
+            np.asarray((instants.planned or {})[name][k]) for k in range(names.horizon) for name in names.planned
+        ]
         orders = {name: (instants.planned or {}).get(name, [columns.get(name)])[0] for name in names.reached}
         reached = [np.asarray((instants.hidden or orders)[name], dtype=float) for name in names.reached]
         estimates = [np.asarray(instants.estimates[name]) for name in names.estimates]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.data.windows import Instants
-from shipid.export.known import Layout
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
@@ -75,9 +74,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     )
     inputs = Inputs(tuple(commands), memory if rng.random() < 0.7 else Memory())
     corrector = _corrector(kind, rng, physics, inputs, instants, slow)
-    limits = {
-        key: tuple(np.quantile(instants.columns[key], [0.05, 0.95])) for key in (*MOTIONS, *commands, "V_w")
-    }
+    limits = {key: tuple(np.quantile(instants.columns[key], [0.05, 0.95])) for key in (*MOTIONS, *commands, "V_w")}
     predictor = Predictor(
         physics, kind, corrector, limits, {"seed": seed, "odd": 'a "quote", a */ and ??('}, "known" if known else "held"
     )
@@ -87,7 +84,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
 def _instants(rng, physics, commands, count, steps, slow, known):
     def one(name, *shape):
         last = name.rpartition(".")[2]
-        low, high = ENVELOPE[last] if last in ENVELOPE else (0.3, 0.9)
+        low, high = ENVELOPE.get(last, (0.3, 0.9))
         factor = slow if name in SPEEDS else 1.0
         return factor * rng.uniform(low, high, shape)
 
@@ -113,7 +110,7 @@ def _instants(rng, physics, commands, count, steps, slow, known):
     return Instants(columns, past, planned, hidden, estimates)
 
 
-def _normaliser(rng, names, table):
+def _normaliser(names, table):
     mean = np.array([np.mean(table[name]) for name in names])
     return Normaliser(tuple(names), mean, np.array([max(np.std(table[name]), 1e-2) for name in names]))
 
@@ -129,7 +126,7 @@ def _signs(rng, size):
 
 
 def network_of(rng, names, table, horizon, terms, mirrored):
-    normaliser = _normaliser(rng, names, table)
+    normaliser = _normaliser(names, table)
     units = int(rng.integers(2, 20))
     weight, offset = rng.normal(0, 0.4, (len(names), units)), rng.normal(size=units)
     if mirrored:
@@ -148,7 +145,7 @@ def network_of(rng, names, table, horizon, terms, mirrored):
 def _units(rng, names, table, count):
     mirror = rng.random() < 0.6
     return Units(
-        _normaliser(rng, names, table),
+        _normaliser(names, table),
         rng.normal(0, 0.4, (len(names), count)),
         rng.normal(size=count),
         _signs(rng, len(names)) if mirror else None,
@@ -230,7 +227,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         }  # fmt: skip
         layers = {key: rng.normal(0, 0.5, shape) for key, shape in shapes.items()}
         mirrors = (_signs(rng, len(names)), _signs(rng, len(taken))) if rng.random() < 0.5 else None
-        reader = Reader(_normaliser(rng, names, now), _normaliser(rng, taken, table), mirrors, steps)
+        reader = Reader(_normaliser(names, now), _normaliser(taken, table), mirrors, steps)
         networks.append(GatedNetwork(reader, layers, smooth_basis(horizon, terms)))
     past = max(steps * physics.step, inputs.memory.past)
     return RecurrentCorrector(inputs, past, tuple(networks), {})
@@ -256,11 +253,6 @@ def _trees(rng, values, terms):
             left[node], right[node] = grow(depth - 1), grow(depth - 1)
         return node
 
-    for _ in range(5):
-        first.append(grow(int(rng.integers(0, 5))))
+    first.extend(grow(int(rng.integers(0, 5))) for _ in range(5))
     whole = [np.array(part, dtype=np.int64) for part in (first, left, right, feature)]
     return Trees(*whole, np.array(threshold), np.array(leaves))
-
-
-def columns_of(layout: Layout) -> tuple[str, ...]:
-    return layout.now
