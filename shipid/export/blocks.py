@@ -1,8 +1,8 @@
 """Blocks: functions of vectors that are at once CasADi functions and lines of C.
 
-A predictor is a graph of few kinds of blocks: formulas (CasADi SX, printed operation by operation), dense layers, trees,
-distances to centres, and graphs of these with loops over steps. Every block has one output vector. Each is written
-once here, and the C and the CasADi that come from it say the same.
+A predictor is a graph of few kinds of blocks: formulas (CasADi SX, printed operation by operation), dense layers,
+trees, distances to centres, and graphs of these with loops over steps. Every block has one output vector. Each is
+written once here, and the C and the CasADi that come from it say the same.
 """
 
 from __future__ import annotations
@@ -334,9 +334,9 @@ class Forest(Block):
 
     def statements(self, call: dict[int, str], precision: Precision) -> list[str]:  # noqa: ARG002
         """Tables of nodes, those of leaves apart: a child below 0 is leaf -1 - child."""
-        leaf = self.left < 0
-        place = np.where(leaf, -np.cumsum(leaf), np.cumsum(~leaf) - 1)
-        inner = np.flatnonzero(~leaf)
+        leaf = np.asarray(self.left < 0)
+        place = np.where(leaf, -np.cumsum(leaf), np.cumsum(np.logical_not(leaf)) - 1)
+        inner = np.flatnonzero(np.logical_not(leaf))
         rows = {
             "left": place[self.left[inner]],
             "right": place[self.right[inner]],

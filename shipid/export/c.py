@@ -573,9 +573,8 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
                 f"if (!reached) {{ for (i = 0; i < {len(reached)}; ++i) begun[i] = {source_}[actuator[i]]; reached = begun; }}"
             )
             lines.append(f"for (i = 0; i < {len(reached)}; ++i) if (!isfinite(reached[i])) return {name}_NOT_FINITE;")
-        limited = [key for key in model.limits]
         if model.predictor.limits:
-            places = [(names.now.index(key), self.row.index(key)) for key in limited]
+            places = [(names.now.index(key), self.row.index(key)) for key in model.limits]
             for place, row in places:
                 lines.append(
                     f"if (!(now[{place}] >= {name}_limits[{2 * row}] && now[{place}] <= {name}_limits[{2 * row + 1}])) "

@@ -63,5 +63,8 @@ def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) 
     with whole(file) as temporary:
         function.save(str(temporary))
     beside = file.with_name(file.name + ".json")
-    write_json(beside, {"shipid": __version__, "casadi": ca.__version__, **json.loads(json.dumps(names, default=str))})
+    write_json(
+        beside,
+        {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},
+    )
     return [file, beside]

@@ -148,15 +148,18 @@ def write_fmu(unit: Packed, file: Path, *, binary: bool = True) -> list[str]:
     texts["modelDescription.xml"] = description(unit, f"{{{digest}}}")
     texts[f"sources/{unit.files.name}.c"] = source.replace("@GUID@", f"{{{digest}}}")
     place = BINARIES.get((platform.system(), platform.machine())) if binary and compiler() is not None else None
-    with tempfile.TemporaryDirectory() as folder, whole(file) as temporary:
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, text in texts.items():
-                archive.writestr(name, text)
-            if place is not None:
-                for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
-                    (Path(folder) / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
-                built = _compiled(Path(folder), unit.files.name)
-                archive.write(built, f"binaries/{place}/{unit.identifier}.so")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        whole(file) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        for name, text in texts.items():
+            archive.writestr(name, text)
+        if place is not None:
+            for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
+                (Path(folder) / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
+            built = _compiled(Path(folder), unit.files.name)
+            archive.write(built, f"binaries/{place}/{unit.identifier}.so")
     return [] if place is None else [place]
 
 

@@ -66,7 +66,10 @@ def layout(
     relative wind. limited : columns that the alarm looks at.
     """
     vessel = physics.vessel
-    states, memory, taken, weather = [], (), (), ()
+    states: list[str] = []
+    memory: tuple[str, ...] = ()
+    taken: tuple[str, ...] = ()
+    weather: tuple[str, ...] = ()
     if vessel is not None:
         model = Equations(vessel).model
         states = [name for name in model.state if name not in ("north", "east", "psi", *MOTIONS)]

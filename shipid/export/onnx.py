@@ -31,7 +31,7 @@ class _Nodes:
 
     def constant(self, values: Any, kind: type | None = None) -> str:
         name = f"c{len(self.constants)}"
-        array = np.asarray(values, dtype=kind or self.kind)
+        array: Any = np.asarray(values, dtype=kind or self.kind)
         self.constants.append(self.numpy_helper.from_array(array, name))
         return name
 

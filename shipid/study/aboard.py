@@ -174,8 +174,8 @@ def summary(played: Played) -> list[str]:
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     lines = [
-        f"{len(instants)} predictions in {runs} run{'s' if runs > 1 else ''}, {played.horizon * played.step:g} s ahead; "
-        f"{played.skipped} rows before there was a past"
+        f"{len(instants)} predictions in {runs} run{'s' if runs > 1 else ''}, "
+        f"{played.horizon * played.step:g} s ahead; {played.skipped} rows before there was a past"
     ]
     if played.assumed:
         lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")
@@ -194,7 +194,8 @@ def summary(played: Played) -> list[str]:
             error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
             inside = f"{np.median(error[alarm]):.2f}" if alarm.any() else "-"
             lines.append(
-                f"{moment:>36g} s {np.median(error):>8.2f} {np.quantile(error, 0.9):>6.2f} {error.max():>7.2f} {inside:>10}"
+                f"{moment:>36g} s {np.median(error):>8.2f} {np.quantile(error, 0.9):>6.2f} {error.max():>7.2f} "
+                f"{inside:>10}"
             )
     return lines
 

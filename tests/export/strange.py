@@ -1,4 +1,4 @@
-"""Predictors that nobody has fitted: every method with drawn numbers, on drawn vessels, horizons, steps and memories."""
+"""Predictors that nobody has fitted: every method with drawn numbers, on drawn vessels, horizons and memories."""
 
 from __future__ import annotations
 
