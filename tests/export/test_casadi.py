@@ -47,7 +47,7 @@ def hybrid(horizon):
 
 
 def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
-    """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard: gradients are those of the file."""
+    """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard."""
     horizon = 8
     predictor = hybrid(horizon)
     file, names = predictor.export("casadi", tmp_path / "ship.casadi")
