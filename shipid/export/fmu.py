@@ -603,7 +603,7 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
     size_t i;
     for (i = 0; i < n; ++i) {
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
-        if (kinds[vr[i]] == 'o' && (vr[i] >= NUM_EXACT || self->phase == STEPPING))
+        if (kinds[vr[i]] == 'o' && ((long)vr[i] >= NUM_EXACT || self->phase == STEPPING))
             return refuse(self, fmi2Error, "variable %u is an output and cannot be set now", vr[i]);
         if (!isfinite(value[i]))
             return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);

@@ -90,7 +90,7 @@ class Model:
         for name, (low, high) in self.predictor.limits.items():
             if name in self.layout.now:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
-                found[name] = (low - slack, high + slack)
+                found[name] = (float(low - slack), float(high + slack))
         return found
 
     def unit(self, name: str) -> str:

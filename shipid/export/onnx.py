@@ -122,23 +122,23 @@ def _acceleration(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str]
     names = list(dict.fromkeys(name for head in corrector.heads for name in head.units.normaliser.names))
     found = []
     for head in corrector.heads:
-        even, odd = _parts(nodes, head.units, nodes.chosen("inputs", names, head.units.normaliser.names))
-        surge = nodes.layer(even, head.surge[1:], head.surge[0], False)
-        first = 1 if head.units.reflection is None else 0
+        units = head.units
+        even, odd = _parts(nodes, units, nodes.chosen("inputs", names, units.normaliser.names))
+        # weights carry all factors: runtimes fuse one beside a product, and keep it in single precision
+        size = len(units.offset) ** 0.5 * (1 if units.reflection is None else 2)
+        first = 1 if units.reflection is None else 0
+        surge = nodes.layer(even, head.surge[1:] / size, head.surge[0], False)
         bias = head.sway_yaw[0] if first else np.zeros(2)
-        found.append(nodes.node("Concat", surge, nodes.layer(odd, head.sway_yaw[first:], bias, False), axis=1))
+        sway_yaw = nodes.layer(odd, head.sway_yaw[first:] / size, bias, False)
+        found.append(nodes.node("Concat", surge, sway_yaw, axis=1))
     return names, nodes.mean(found), [3]
 
 
 def _parts(nodes: _Nodes, units: Units, x: str) -> tuple[str, str]:
-    """Even and odd hidden units."""
+    """Even and odd hidden units, without their factors."""
     z = nodes.z_score(x, units.normaliser.mean, units.normaliser.std)
-    size = nodes.constant(len(units.offset) ** 0.5)
-    plain = nodes.node("Div", nodes.layer(z, units.weight, units.offset, True), size)
+    plain = nodes.layer(z, units.weight, units.offset, True)
     if units.reflection is None:
         return plain, plain
-    image = nodes.node("Div", nodes.layer(z, units.reflection @ units.weight, units.offset, True), size)
-    two = nodes.constant(2.0)
-    return nodes.node("Div", nodes.node("Add", plain, image), two), nodes.node(
-        "Div", nodes.node("Sub", plain, image), two
-    )
+    image = nodes.layer(z, units.reflection @ units.weight, units.offset, True)
+    return nodes.node("Add", plain, image), nodes.node("Sub", plain, image)
