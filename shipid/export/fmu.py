@@ -270,7 +270,7 @@ typedef struct {{
     double values[NUM_REALS];
     int status;
 }} Model;
-{_fmi(name, sizes["carry"], variables)}
+{_fmi(name, variables)}
 static void model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
@@ -333,7 +333,7 @@ typedef struct {{
     int status;
     {name} kept;
 }} Model;
-{_fmi(name, 0, variables)}
+{_fmi(name, variables)}
 static void model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
@@ -378,15 +378,19 @@ static int model_boolean(const Model *self, unsigned reference)
 {_FMI_BODY}"""
 
 
-def _fmi(name: str, num_exact: int, variables: Sequence[Variable]) -> str:
+def _kind(variable: Variable) -> str:
+    exact = variable.causality == "output" and variable.start is not None
+    return f"'{'e' if exact else variable.causality[0]}'"
+
+
+def _fmi(name: str, variables: Sequence[Variable]) -> str:
     """Start values and kinds of the variables."""
     values = Precision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
     return f"""
-#define NUM_EXACT {num_exact} /* outputs that may be set before the start */
 static const char guid[] = "@GUID@";
 static const char identifier[] = "{name}";
 static const double start_values[NUM_REALS] = {{{values}}};
-static const char kinds[] = {{{", ".join(f"'{v.causality[0]}'" for v in variables)}}}; /* input, output, parameter */
+static const char kinds[] = {{{", ".join(_kind(v) for v in variables)}}}; /* input, output, exact at the start, parameter */
 """
 
 
@@ -603,7 +607,7 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
     size_t i;
     for (i = 0; i < n; ++i) {
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
-        if (kinds[vr[i]] == 'o' && ((long)vr[i] >= NUM_EXACT || self->phase == STEPPING))
+        if (kinds[vr[i]] == 'o' || (kinds[vr[i]] == 'e' && self->phase == STEPPING))
             return refuse(self, fmi2Error, "variable %u is an output and cannot be set now", vr[i]);
         if (!isfinite(value[i]))
             return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);

@@ -49,5 +49,5 @@ def test_a_vessel_has_no_networks(tmp_path):
 
 def test_a_forest_beyond_the_size_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr("shipid.export.model.MOST_NUMBERS", 10)
-    with pytest.raises(ShipidError, match="hold .* numbers, an export at most 10: use fewer trees"):
+    with pytest.raises(ShipidError, match=r"hold .* numbers, an export at most 10: use fewer trees"):
         export_predictor(drawn("forest", 5, vessel="mariner").predictor, "c", tmp_path / "f")
