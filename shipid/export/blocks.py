@@ -335,7 +335,7 @@ class Forest(Block):
     def statements(self, call: dict[int, str], precision: Precision) -> list[str]:  # noqa: ARG002
         """Tables of nodes, those of leaves apart: a child below 0 is leaf -1 - child."""
         leaf = np.asarray(self.left < 0)
-        place = np.where(leaf, -np.cumsum(leaf), np.cumsum(np.logical_not(leaf)) - 1)
+        place = np.where(leaf, np.negative(np.cumsum(leaf, dtype=np.int64)), np.cumsum(np.logical_not(leaf)) - 1)
         inner = np.flatnonzero(np.logical_not(leaf))
         rows = {
             "left": place[self.left[inner]],

@@ -256,7 +256,8 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
         model, n = equations.model, equations.num_carry
         step = equations.step(self.method)
         begun = equations.begun()
-        text, call = c_functions([equations.rates, step, begun], self.precision)
+        blocks: list[Block] = [equations.rates, step, *([begun] if model.memory else [])]
+        text, call = c_functions(blocks, self.precision)
         sizes_ = {group: len(names) for group, names in groups.items()}
         arguments = {
             "carry": "carry",
@@ -282,7 +283,7 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
         voids = "".join(f"    (void){key};\n" for key in idle)
         begin = (
             f"    {call[id(begun)]}(commands, carry + {equations.num_states});"
-            if model.memory and model.commands
+            if model.memory
             else "    (void)carry;\n    (void)commands;"
         )
         return f"""{comment([f"{self.vessel.name}, written by shipid {__version__}; see {name}.h."])}

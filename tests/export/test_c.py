@@ -216,7 +216,7 @@ def _size_of_struct(files, folder):
     return int(subprocess.run([folder / "size"], capture_output=True, text=True).stdout)
 
 
-@pytest.mark.parametrize("name", ["actuators", "mariner"])
+@pytest.mark.parametrize("name", ["actuators", "gunnerus-33.9", "mariner"])
 def test_a_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
     _steps(variety()[name], tmp_path, draw_inputs)
 
