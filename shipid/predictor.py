@@ -8,12 +8,13 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from pydantic import BaseModel, Field
 
 from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
-from shipid.errors import DataError, ResultError, choices
+from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
@@ -23,6 +24,7 @@ from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
 FORMAT = 4
+MOST_STEPS = 100_000  # of a horizon
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,10 @@ class Predictor:
         """
         instants = self._known(instants)
         alone = self.physics.paths(instants) if paths is None else paths
-        return self.corrector.predict(self.physics, instants, alone)
+        try:
+            return self.corrector.predict(self.physics, instants, alone)
+        except (ValueError, TypeError, IndexError) as error:
+            raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
 
     def alone(self, instants: Instants) -> Array:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
@@ -132,7 +137,7 @@ class Predictor:
             header = json.loads(str(arrays.pop("header")))
         except OSError as error:
             raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
-        except (ValueError, KeyError):
+        except (ValueError, KeyError, RecursionError):
             raise foreign from None
         if not isinstance(header, dict):
             raise foreign
@@ -140,28 +145,52 @@ class Predictor:
             raise ResultError(
                 f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
             )
+        _check_arrays(arrays, file)
         try:
+            known = _Header.model_validate(header)
             vessel = header["vessel"]
             return cls(
                 physics=Physics(
                     None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
-                    int(header["horizon"]),
-                    float(header["step"]),
-                    header["integrator"],
+                    known.horizon,
+                    known.step,
+                    known.integrator,
                     None if header["observer"] is None else Observer(**header["observer"]),
-                    header["path"],
+                    known.path,
                 ),
                 method=header["method"],
                 corrector=METHODS[header["method"]].corrector.from_arrays(header["corrector"], arrays),
-                limits={name: (low, high) for name, (low, high) in header["limits"].items()},
-                provenance=dict(header["provenance"]),
-                commands=header["commands"],
-                causal=tuple(header["causal"]),
+                limits=known.limits,
+                provenance=known.provenance,
+                commands=known.commands,
+                causal=tuple(known.causal),
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
-        except (KeyError, TypeError, ValueError, AttributeError, IndexError):
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, ShipidError):
             raise ResultError("damaged: run the study again", file=file) from None
+
+
+class _Header(BaseModel):
+    """What the header of a predictor holds beside vessel, observer and method, with its types."""
+
+    horizon: Annotated[int, Field(ge=1, le=MOST_STEPS)]
+    step: Annotated[float, Field(gt=0, le=1e4)]
+    integrator: Literal["euler", "rk4"]
+    commands: Commands
+    causal: list[str]
+    path: Literal["position", "velocity"]
+    limits: dict[str, tuple[float, float]]
+    provenance: dict[str, Any]
+
+
+def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:
+    """Raise ResultError for an array that holds anything but numbers, or that holds NaN."""
+    for name, array in arrays.items():
+        numbers = array.dtype.kind in "fiub"
+        if not numbers or np.isnan(array).any():
+            what = "NaN" if numbers else f"{array.dtype}"
+            raise ResultError(f"damaged: {name!r} holds {what}: run the study again", file=file)
 
 
 def fit(

@@ -40,6 +40,9 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
+    except MemoryError:
+        sys.stderr.write("error: out of memory: fewer --workers, longer intervals or fewer members take less\n")
+        sys.exit(1)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
         sys.exit(1)
@@ -50,8 +53,7 @@ def _before(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
 ) -> None:
-    if verbose:
-        log_to_stderr()
+    log_to_stderr(verbose)
     if version:
         from shipid.version import __version__
 

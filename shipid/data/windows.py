@@ -175,6 +175,9 @@ def cut_windows(
 ) -> Windows:
     """Cut a window every `interval` [s], its whole past and future inside one unbroken stretch of one run.
 
+    An instant of prediction is a row: the last one at or before each multiple of the interval. So what is known at an
+    instant, its past included, depends on no later row. Rows farther apart than the interval give a window each.
+
     Parameters
     ----------
     dataset : the recorded or simulated runs.
@@ -195,10 +198,8 @@ def cut_windows(
     parts = []
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()
-        first = t[0] + past * step
-        last = np.floor((t[-1] - first - horizon * step + clock_slack(t)) / interval)
-        if last >= 0:
-            instants = first + interval * np.arange(int(last) + 1)
+        instants = _instants(t, past * step, horizon * step, interval)
+        if len(instants):
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
             values = sample(rows, grid)
             north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
@@ -221,6 +222,15 @@ def cut_windows(
         history = f" and the past of {past * step:g} s" if past else ""
         raise DataError(f"no run is as long as the horizon of {horizon * step:g} s{history}")
     return concatenate(parts)
+
+
+def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
+    """Times of the rows t (N,) at which windows are cut, (S,): a past and a future [s] of each lie within t."""
+    slack, first = clock_slack(t), t[0] + past
+    last = np.floor((t[-1] - first - ahead + slack) / interval)
+    wanted = first + interval * np.arange(int(last) + 1)
+    rows = np.unique(np.searchsorted(t, wanted + slack, side="right") - 1)
+    return np.asarray(t[rows[t[rows] >= first - slack]])
 
 
 def past_of(

@@ -15,36 +15,20 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
-from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
-from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
+from shipid.hybrid.features import Inputs, choose_features, group_of
+from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
-
-
-class Drawn(Protocol):
-    """Settings that the closed form takes, see `shipid.hybrid.path_drawn.PathDrawn`."""
-
-    @property
-    def units(self) -> int: ...  # noqa: D102
-    @property
-    def terms(self) -> int: ...  # noqa: D102
-    @property
-    def averaged(self) -> int: ...  # noqa: D102
-    @property
-    def trials(self) -> int: ...  # noqa: D102
-    @property
-    def memory(self) -> Memory: ...  # noqa: D102
-    def inputs(self, commands: tuple[str, ...]) -> Inputs: ...  # noqa: D102
-    def path(self) -> list[float]: ...  # noqa: D102
-    def points(self) -> list[dict[str, float]]: ...  # noqa: D102
-    def left_out(self, point: Mapping[str, float]) -> frozenset[str]: ...  # noqa: D102
+from shipid.hybrid.trials import diverged
 
 
 @dataclass(frozen=True)
@@ -76,24 +60,22 @@ class _Part:
     product: Tensor
 
 
-class _Search:
-    """The rows of one model and the networks of its best trials so far."""
+class _Best:
+    """The networks of the best trials of one model so far."""
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self.rows: list[dict[str, Any]] = []
         self.kept: list[tuple[float, dict[str, float], Network]] = []
 
-    def record(self, number: int, params: dict[str, float], value: float, network: Callable[[], Network]) -> None:
-        """Write a row, and solve the network if the trial is among the best."""
-        self.rows.append({"number": number, "params": params, "value": value, "state": "complete"})
+    def consider(self, params: dict[str, float], value: float, network: Callable[[], Network]) -> None:
+        """Solve the network if the trial is among the best."""
         if len(self.kept) < self.most or value < self.kept[-1][0]:
             self.kept = sorted([*self.kept, (value, params, network())], key=lambda kept: kept[0])[: self.most]
 
-    def fitted(self, inputs: Inputs) -> Fitted:
+    def fitted(self, inputs: Inputs, rows: list[Row]) -> Fitted:
         """Average the best networks."""
         compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Fitted(compensator, self.rows, sum(row["seconds"] for row in self.rows))
+        return Fitted(compensator, rows, sum(row["seconds"] for row in rows))
 
 
 @dataclass(frozen=True)
@@ -110,7 +92,7 @@ class _Group:
     mirrored: _Inputs | None
 
 
-def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
+def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -128,16 +110,18 @@ def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
     paths = {key: np.tensordot(basis.T, targets[key][:, windows], 1) for key in names}
     judged = np.concatenate([validation for _, validation in task.folds])
     faster = {key: _faster(targets[key][:, judged], basis) for key in names}
-    searches = {key: _Search(method.averaged) for key in names}
+    best = {key: _Best(method.averaged) for key in names}
+    search = Search(task, names, method, again=True)  # networks are solved again: it costs less than to keep them
     ridges = method.path()
     groups: dict[frozenset[str], list[_Group]] = {}
 
-    for number, point in enumerate(method.points()):
+    for number, point in search.left(method.points() if names else ()):
+        rows: dict[str, Row] = {}
         left_out = method.left_out(point)
         if left_out not in groups:
             groups[left_out] = _groups({key: tables[key] for key in names}, paths, left_out, len(windows), device)
         for group in groups[left_out]:
-            start = time.perf_counter()
+            start = time.process_time()
             seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
             hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
             parts = _parts(seen, hidden, group.outputs, device)
@@ -147,13 +131,21 @@ def tune_ridge(task: Task, method: Drawn) -> dict[str, Fitted]:
                 params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
-                searches[key].record(number, params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
-            seconds = (time.perf_counter() - start) / len(group.names)
+                best[key].consider(params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
+                rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
+            seconds = (time.process_time() - start) / len(group.names)
             for key in group.names:
-                searches[key].rows[-1] |= {"seconds": seconds, "epochs": 0}
+                rows[key] |= {"seconds": seconds, "epochs": 0}
+        search.keep(rows)
         if task.on_trial is not None:
-            task.on_trial(number + 1, method.trials)
-    return {key: searches[key].fitted(inputs) if key in searches else _unsolvable(method) for key in targets}
+            task.on_trial(number + 1, search.count or number + 1)
+    search.write()
+    if not names and task.on_trial is not None:
+        task.on_trial(method.trials, method.trials)
+    return {
+        key: best[key].fitted(inputs, search.rows[key]) if key in best else diverged(method, method.points())
+        for key in targets
+    }
 
 
 def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
@@ -185,12 +177,6 @@ def _groups(
         table = seen[table_key]
         found.append(_Group(tuple(keys), outputs, _inputs(table, device), _mirrored(table, device)))
     return found
-
-
-def _unsolvable(method: Drawn) -> Fitted:
-    """The result where targets are not numbers: no corrector, every trial diverged."""
-    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    return Fitted(None, [{"number": i, "params": point, **blank} for i, point in enumerate(method.points())], 0.0)
 
 
 def smooth_basis(horizon: int, terms: int) -> Array:

@@ -40,7 +40,7 @@ class Finding:
 
     id: str
     claim: str
-    verdict: Literal["confirmed", "refuted", "undecided"]
+    verdict: Literal["confirmed", "refuted", "undecided", "not testable"]
     evidence: str
 
 
@@ -101,6 +101,7 @@ class ReportContent:
     repairs : kind, column, count, note.
     provenance : label -> value.
     study_document, command : the document as TOML text and the command that reproduces the study.
+    best : the physics model that validation prefers at the largest amount of data; every figure means it by "best".
     frames : further frames by name, for sections that show something new.
     """
 
@@ -127,4 +128,5 @@ class ReportContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     study_document: str = ""
     command: str = ""
+    best: str = ""
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from shipid.errors import ShipidError, choices
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
 from shipid.report.figure import Chip, Control, Figure, FixedWindow, line, plane
-from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, styles
+from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres, number
@@ -242,7 +242,7 @@ def _aside(points: Floats) -> tuple[Floats, Floats]:
 
 
 def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
-    style = styles(content).get(model)
+    style = close_styles(content).get(model)
     pure = model == data_driven(content)
     words = {"cooperative": model if pure else f"{model}, compensated", "physics": f"{model}, physics alone"}
     width = style.width if style and source == "cooperative" else 1.5

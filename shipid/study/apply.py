@@ -17,6 +17,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Estimates, observe
 from shipid.predictor import Predictor
+from shipid.study import seals
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file
 
@@ -62,7 +63,11 @@ def _known_cell(folder: Path, cell: str) -> Path:
         raise ResultError("holds no finished cells: is it the folder of a run?", file=folder)
     if cell not in available:
         raise ResultError(f"no such cell: {choices(cell, available)}", file=folder, path=f"--cell {cell}")
-    return cell_file(folder, cell)
+    file = cell_file(folder, cell)
+    fault = next((fault for fault in seals.faults(folder) if folder / fault.file == file), None)
+    if fault is not None:
+        raise seals.wrong(folder, fault)
+    return file
 
 
 def _along(

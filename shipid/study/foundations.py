@@ -71,7 +71,7 @@ def apart(dataset: Dataset, test: Windows) -> Dataset:
     seen = np.zeros(len(t), dtype=bool)
     for start, end in test.spans.values():
         seen |= (t >= start) & (t <= end)
-    names = list(dict.fromkeys([*dataset.metadata["flags"], BREAK]))
+    names = list(dict.fromkeys([*dataset.metadata.get("flags", []), BREAK]))
     after = np.concatenate([[False], seen[:-1]])
     flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
     frame = dataset.frame.assign(flags=flags)[~seen].reset_index(drop=True)

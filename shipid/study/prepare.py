@@ -31,6 +31,7 @@ from shipid.metrics import Summary, position_error, summary
 from shipid.observer import Estimates, Observer, at_windows, observe
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
+from shipid.study.ranges import check_memory
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw, resolve
 
@@ -141,6 +142,10 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
         path=path_of(plan),
         past=plan.past,
     )
+    lengths = [float(np.ptp(rows["t"])) for _, rows in pieces(dataset)]
+    words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval"
+    numbers = sum(map(plan.cut(len(dataset.frame.columns)).numbers, lengths))
+    check_memory(numbers, words, "prediction.interval", plan.file)
     try:
         windows = cut(dataset)
     except DataError as error:
@@ -172,6 +177,9 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
     """
     rest, test, notes = partition(plan, dataset)
+    notes += [
+        f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
+    ]
     both = [rest, test]
     longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
     for foundation in plan.foundations:

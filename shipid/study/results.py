@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +16,21 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
+from shipid.errors import ResultError
 from shipid.files import read_json
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
-MOST_TEST_RUNS = 4  # shown over time and in the window browser
+MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
-INSTANTS = 7  # windows of a test run in the browser
+INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,6 +70,10 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
     folder = Path(folder)
     plan = store.stored_plan(folder)
+    if plan.parts:
+        named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
+        raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
+    seals.check(folder)
     cells = store.read_rows(folder)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
@@ -221,7 +227,8 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     found, naive, cells = [], constant_motion(test), _shown_cells(results)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
-        for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
+        most = min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
+        for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             paths = {
                 (model, "physics", 0): path[:, index]
                 for model, path in results.physics.items()
@@ -317,9 +324,14 @@ def naive_summary(results: Results) -> dict[str, float]:
 
 def reproducing_command(results: Results) -> str:
     """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
-    file = Path(results.provenance["file"])
-    name = results.plan.name if documents.bundled("studies").get(results.plan.name) == file else str(file)
-    changes = results.provenance.get("changes", {})
+    return command_of(replace(results.plan, changes=results.provenance.get("changes", {})))
+
+
+def command_of(plan: Plan) -> str:
+    """Return the command that runs a study, with its changes."""
+    file = Path(plan.file)
+    name = plan.name if documents.bundled("studies").get(plan.name) == file else str(file)
+    changes = plan.changes
     return " ".join(
         ["shipid study run", name, *(f"--set '{path}={json.dumps(value)}'" for path, value in changes.items())]
     )
@@ -368,6 +380,10 @@ def provenance_words(results: Results) -> dict[str, str]:
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)
+    sessions = record.get("sessions", [])
+    changed = [words for one, other in pairwise(sessions) for words in store.differences(one, other)]
+    if changed:
+        words["computed in parts"] = "; ".join(changed)
     notes = record.get("notes", [])
     if notes:
         words["notes"] = "; ".join(notes)
