@@ -190,6 +190,14 @@ class Predictor:
         write_arrays(target, arrays)  # not compressed: weights do not shrink
         return target
 
+    def export(
+        self, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
+    ) -> list[Path]:
+        """Write it for others, to `c`, `fmu`, `casadi` or `onnx`: see `shipid.export.write.export_predictor`."""
+        from shipid.export.write import export_predictor  # a study does not need it
+
+        return export_predictor(self, to, out, single=single, name=name)
+
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; ResultError for anything else."""
