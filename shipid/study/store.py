@@ -57,8 +57,31 @@ def open_folder(folder: Path, plan: Plan) -> None:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+    _mend(folder, plan)
     for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER):
         sweep(place)
+
+
+def _mend(folder: Path, plan: Plan) -> None:
+    """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
+    try:
+        changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
+    except DocumentError:
+        write_text(folder / STUDY, plan.text())
+        changed = False
+    try:
+        stored = read_json(folder / VESSELS)
+        digests = {name: documents.digest(entry["document"]) for name, entry in stored.items()}
+        changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
+    except (ResultError, TypeError, KeyError, AttributeError):
+        _write_vessels(folder, plan)
+    if changed:
+        raise ResultError("its study or vessels were changed by hand: choose another --out", file=folder)
+
+
+def _write_vessels(folder: Path, plan: Plan) -> None:
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
 
 
 def _make(folder: Path, plan: Plan) -> None:
@@ -84,8 +107,7 @@ def _describe(folder: Path, plan: Plan) -> None:
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     origin["changes"] = dict(plan.changes)
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
-    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
-    write_json(folder / VESSELS, vessels)
+    _write_vessels(folder, plan)
     write_text(folder / STUDY, plan.text())
 
 
