@@ -12,6 +12,7 @@ A band says what noise in the trials leaves open. It does not hold what the stru
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -65,7 +66,7 @@ def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
         return f"the standard errors are not to be trusted: {best.reason if best else 'no factor is free'}"
     open_ = [path for path, error in zip(solution.paths, judged.errors, strict=True) if np.isinf(error)]
     if open_:
-        return f"the data do not determine {listed([short(path) for path in open_])}: give priors, or fix some"
+        return f"the data do not determine {listed(short(open_))}: give priors, or fix some"
     return ""
 
 
@@ -113,7 +114,13 @@ def bands(
             slopes, bends = (ends[:, 0] - ends[:, 1]) / 2, ends.mean(axis=1) - value
             deviation, shift = float(np.sqrt((slopes**2 + 2 * bends**2).sum())), float(bends.sum())
             wide, note = quantile * deviation, "" if np.isfinite(deviation) else "not reached on both sides of an axis"
-            row = {"manoeuvre": title, "measure": name, "value": value, "deviation": deviation, "note": note}
+            row: dict[str, Any] = {
+                "manoeuvre": title,
+                "measure": name,
+                "value": value,
+                "deviation": deviation,
+                "note": note,
+            }
             rows.append({**row, "low": value - wide + min(shift, 0.0), "high": value + wide + max(shift, 0.0)})
     return pd.DataFrame(rows, columns=["manoeuvre", "measure", "value", "deviation", "low", "high", "note"])
 

@@ -268,9 +268,9 @@ def _headline(case: Case) -> str:
     row = case.at(case.largest).set_index("model").loc[case.best]
     told = "" if case.smallest < case.largest else "best in validation; "
     text = (
-        f"With {runs(case.largest)}, {case.best} ({told}{metres(row['A'])} mean error on its own) "
+        f"With {runs(case.largest)}, {case.best} ({told}{metres(float(row['A']))} mean error on its own) "
         f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
-        f"below {metres(row['H_90'])}"
+        f"below {metres(float(row['H_90']))}"
     )
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
     return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."
