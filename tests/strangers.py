@@ -48,7 +48,11 @@ class Stranger:
         """What is known, as options of the command line."""
         found: list[str] = []
         for name, value in self.known.items():
-            found += [f"--{name}"] if value is True else [f"--{name}", f"{value:g}" if isinstance(value, float) else str(value)]
+            found += (
+                [f"--{name}"]
+                if value is True
+                else [f"--{name}", f"{value:g}" if isinstance(value, float) else str(value)]
+            )
         return found
 
 
@@ -138,8 +142,20 @@ def _wind(size: Mapping[str, float], f: Any) -> dict[str, Any]:
 def _hull(kind: str, size: Mapping[str, float], lift: Mapping[str, float], R: float, f: Any) -> dict[str, Any]:
     L, T, rho, U = size["L"], size["T"], size["rho"], size["U"]
     if kind == "cubic":
-        more = {"X_vv": -0.04 * f(), "X_vr": 0.01 * f(-2, 2), "X_rr": 0.01 * f(0, 1), "Y_vvv": -1.5 * f(), "Y_vvr": 0.3 * f(0, 1)}
-        more |= {"Y_vrr": -0.4 * f(), "N_vvv": -0.03 * f(), "N_vvr": -0.3 * f(), "N_vrr": 0.05 * f(), "N_rrr": -0.013 * f()}
+        more = {
+            "X_vv": -0.04 * f(),
+            "X_vr": 0.01 * f(-2, 2),
+            "X_rr": 0.01 * f(0, 1),
+            "Y_vvv": -1.5 * f(),
+            "Y_vvr": 0.3 * f(0, 1),
+        }
+        more |= {
+            "Y_vrr": -0.4 * f(),
+            "N_vvv": -0.03 * f(),
+            "N_vvr": -0.3 * f(),
+            "N_vrr": 0.05 * f(),
+            "N_rrr": -0.013 * f(),
+        }
         return {"mmg": {"R_0": R / (0.5 * rho * L * T * U**2), **lift, **more}}
     unit = 0.5 * rho * L * T
     derivatives = {
@@ -147,7 +163,10 @@ def _hull(kind: str, size: Mapping[str, float], lift: Mapping[str, float], R: fl
         "Y_uv": unit * lift["Y_v"] * 0.8, "Y_ur": unit * L * lift["Y_r"],
         "N_uv": unit * L * lift["N_v"], "N_ur": unit * L**2 * lift["N_r"],
     }  # fmt: skip
-    return {"derivatives": derivatives, "crossflow": {"strips": 12, "C_d": f(0.6, 1.1), "x_aft": -L / 2, "x_fwd": L / 2}}
+    return {
+        "derivatives": derivatives,
+        "crossflow": {"strips": 12, "C_d": f(0.6, 1.1), "x_aft": -L / 2, "x_fwd": L / 2},
+    }
 
 
 def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: float) -> dict[str, Any]:
@@ -200,7 +219,14 @@ def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: fl
             }  # fmt: skip
     if drive == "screw and tunnel":
         push = 0.15 * R
-        found["bow"] = {"kind": "tunnel", "x": 0.38 * L, "z": 0.6 * T, "F_1": 0.0, "F_2": push / 25.0 / quick**2, "F_3": 0.0}
+        found["bow"] = {
+            "kind": "tunnel",
+            "x": 0.38 * L,
+            "z": 0.6 * T,
+            "F_1": 0.0,
+            "F_2": push / 25.0 / quick**2,
+            "F_3": 0.0,
+        }
     return found
 
 

@@ -15,10 +15,11 @@ from typing import Literal
 import numpy as np
 import tomlkit
 from numpy.typing import NDArray
+from tomlkit.items import KeyType, SingleKey
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.physics.signals import is_shaft, steers
@@ -29,11 +30,14 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
+Gear = tuple[tuple[str, float], ...]
+"""Changed numbers of actuators: dotted path and value of each."""
 
-MOST_WINDOWS = 240
-MOST_CHANGES = 6
-FACTORS = (0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.5, 4.0, 7.0)
-FINER = (0.75, 0.87, 0.94, 1.06, 1.15, 1.3)
+MOST_WINDOWS = 120
+MOST_CHANGES = 5
+FACTORS = (0.35, 0.55, 0.75, 1.3, 1.8, 2.8)
+FAR = (0.15, 0.4, 2.5, 7.0)  # of what may be off by more: lags and rates
+FINER = (0.82, 0.93, 1.07, 1.22)
 SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
 SAID = 0.15  # of the error that all groups together must save, else nothing is said
@@ -41,6 +45,7 @@ PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
+MODEST = 5.0  # factor
 OFF = 1.15  # a factor by which speed or turning may differ before it is said
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
@@ -110,6 +115,11 @@ class Look:
         return self.changes[-1].error if self.changes else self.alone
 
     @property
+    def wrong(self) -> bool:
+        """Whether the vessel should not be used as it is."""
+        return bool(self.changes) or self.alone >= self.constant
+
+    @property
     def values(self) -> dict[str, float]:
         """Dotted path -> value of all changes."""
         return {path: value for change in self.changes for path, value in change.values.items()}
@@ -142,7 +152,7 @@ class Look:
             for path, value in change.values.items():
                 number = tomlkit.item(value)
                 number.comment(f"was {self.vessel.parameters[path]:.6g}: {change.group.name} x {change.factor:.3g}")
-                table.append(tomlkit.key(path) if "." not in path else tomlkit.items.SingleKey(path, tomlkit.items.KeyType.Basic), number)
+                table.append(SingleKey(path, KeyType.Basic), number)
         document.add("set", table)
         return tomlkit.dumps(document)
 
@@ -173,7 +183,7 @@ def first_look(
     constant = float(position_error(constant_motion(windows), windows.future).mean())
     trial = _Trial(vessel, part, windows, constant)
     alone = trial.errors([{}])[0]
-    facts = tuple(_facts(vessel, windows, trial.instants(vessel)))
+    facts = tuple(_facts(vessel, windows, trial.instants()))
     changes = _explained(trial, alone)
     if changes and changes[-1].error > (1 - SAID) * alone:
         changes = []
@@ -196,15 +206,18 @@ class _Trial:
     dataset: Dataset
     windows: Windows
     constant: float
+    known: dict[Gear, Instants] = field(default_factory=dict)
 
-    def instants(self, vessel: Vessel) -> Instants:
-        """What the vessel knows at every window: planned commands, and where its actuators are."""
-        hidden = window_memory(vessel, self.dataset, self.windows)
-        return self.windows.instants(known=True, hidden=hidden)
+    def instants(self, gear: Gear = ()) -> Instants:
+        """What the vessel with changed actuators knows at every window: planned commands, and where they are."""
+        if gear not in self.known:
+            hidden = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
+            self.known[gear] = self.windows.instants(known=True, hidden=hidden)
+        return self.known[gear]
 
     def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
         """Mean error [m] for each set of changed numbers; what diverges counts as `PENALTY` times constant motion."""
-        by_gear: dict[tuple[tuple[str, float], ...], list[int]] = {}
+        by_gear: dict[Gear, list[int]] = {}
         for number, row in enumerate(rows):
             gear = tuple(sorted((path, value) for path, value in row.items() if ".actuator." in path))
             by_gear.setdefault(gear, []).append(number)
@@ -218,7 +231,7 @@ class _Trial:
                 for path, value in rows[place].items():
                     parameters[number, names.index(path)] = value
             physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
-            found = physics.distances(self.instants(vessel), self.windows.future, parameters)
+            found = physics.distances(self.instants(gear), self.windows.future, parameters)
             mean = np.where(found.diverged, np.inf, found.total / self.windows.horizon)
             capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9) * 10)
             for number, place in enumerate(places):
@@ -238,7 +251,7 @@ def _explained(trial: _Trial, alone: float) -> list[Change]:
             (group, factor)
             for group in groups
             if group not in factors
-            for factor in FACTORS
+            for factor in (FAR if group.high > MODEST else FACTORS)
             if group.low <= factor <= group.high
         ]
         found = _least(trial, groups, [{**factors, group: factor} for group, factor in options])
@@ -299,9 +312,7 @@ def _members(vessel: Vessel, group: Group) -> list[str]:
     return [path for path, value in vessel.parameters.items() if value and re.fullmatch(group.pattern, path)]
 
 
-def _values(
-    vessel: Vessel, groups: Mapping[Group, Sequence[str]], factors: Mapping[Group, float]
-) -> dict[str, float]:
+def _values(vessel: Vessel, groups: Mapping[Group, Sequence[str]], factors: Mapping[Group, float]) -> dict[str, float]:
     return {
         path: float(f"{vessel.parameters[path] * factor:.6g}")
         for group, factor in factors.items()
@@ -340,9 +351,7 @@ def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[flo
     straight = change & same & (np.abs(turned) < STRAIGHT) & (u[-1] > 0)
     if straight.sum() < FEW or not shafts:
         return None
-    orders = {
-        name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands
-    }
+    orders = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
     held = steady_speed(vessel, orders)
     driving = max(shafts, key=lambda name: abs(orders[name]))
     return orders[driving] / RPM, float(np.median(u[-1, straight])), held
@@ -378,11 +387,3 @@ def _shown(vessel: Vessel, change: Change) -> str:
     path = next(iter(change.values))
     others = f" and {len(change.values) - 1} with it" if len(change.values) > 1 else ""
     return f"{path} = {change.values[path]:.4g} in place of {vessel.parameters[path]:.4g}{others}"
-
-
-def looked(vessel: Vessel, dataset: Dataset, runs: Iterable[str], **how: float) -> Look | ShipidError:
-    """`first_look`, or why there is none."""
-    try:
-        return first_look(vessel, dataset, runs, **how)  # type: ignore[arg-type]
-    except ShipidError as error:
-        return error

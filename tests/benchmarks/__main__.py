@@ -31,7 +31,11 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "orchestration": 1,
     "identification": 2,
 }
-ASKED = {"coverage": 1, "observer": 1}  # the same, of what is no matter of time and takes minutes: only where named
+ASKED = {
+    "coverage": 1,
+    "observer": 1,
+    "strangers": 1,
+}  # the same, of what is no matter of time and takes minutes: only where named
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
 WIDTH = 140
