@@ -1,8 +1,8 @@
 """Made-up ships that the template has never seen, with their logs: drawn by seed, from other terms than the template's.
 
-The truth has a hull of cubic MMG terms, or linear lift with cross-flow drag; a rudder in the race, or one that knows the
-ship's speed alone; lags of shaft and steering gear; a current and gusts that nobody measured. Slopes are those of Inoue
-et al. (1981), each times a factor of its own; the template has Clarke's and Kijima's.
+The truth has a hull of cubic MMG terms, or linear lift with cross-flow drag; a rudder in the race, or one that knows
+the ship's speed alone; lags of shaft and steering gear; a current and gusts that nobody measured. Slopes are those of
+Inoue et al. (1981), each times a factor of its own; the template has Clarke's and Kijima's.
 """
 
 from __future__ import annotations
@@ -109,7 +109,9 @@ def _ship(random: np.random.Generator, drive: str) -> dict[str, Any]:
         "particulars": {"L_pp": L, "B": B, "T": T, "C_b": full, "U_0": U},
         "constants": {"rho": rho, "rho_a": 1.225},
         "inertia": {"m": m, "I_z": I_z, "x_G": L * f(-0.02, 0.03)},
-        "added_mass": {"coriolis": "mmg", "X_udot": -mass["m_x"], "Y_vdot": -mass["m_y"], "N_rdot": -I_z * f(0.55, 1.0)},
+        "added_mass": {
+            "coriolis": "mmg", "X_udot": -mass["m_x"], "Y_vdot": -mass["m_y"], "N_rdot": -I_z * f(0.55, 1.0)
+        },
         "current": {"kind": "uniform"},
         "wind": _wind(size, f),
     }  # fmt: skip

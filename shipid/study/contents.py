@@ -22,6 +22,7 @@ ANSWER, SUMMARY, REPORT = "answer.txt", "summary.md", "report.html"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
+    "kinds": parts.kinds_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
 }

@@ -1,8 +1,9 @@
 """A vessel against its log, before any study: what is off, and which few numbers would explain it.
 
-The log decides by prediction: the vessel starts from recorded instants with the recorded commands, and its mean position
-error over the horizon is compared with that of constant u, v, r. Groups of numbers that a first guess gets wrong, such
-as the size of the screw, are scaled by one factor each; the factor that lowers the error most is taken, then the next.
+The log decides by prediction: the vessel starts from recorded instants with the recorded commands, and its mean
+position error over the horizon is compared with that of constant u, v, r. Groups of numbers that a first guess gets
+wrong, such as the size of the screw, are scaled by one factor each. The factor that lowers the error most is taken,
+then the next.
 """
 
 from __future__ import annotations
@@ -86,7 +87,10 @@ GROUPS = (
 
 @dataclass(frozen=True)
 class Change:
-    """A group of numbers scaled. values : dotted path -> new value. error : mean error [m] with this and those before."""
+    """A group of numbers scaled.
+
+    values : dotted path -> new value. error : mean error [m] with this change and those before it.
+    """
 
     group: Group
     factor: float
@@ -345,16 +349,21 @@ def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[flo
     """Shaft speed [rpm], speed of the log and steady speed of the vessel [m/s] where the log goes straight; or None."""
     commands = dynamics(vessel).commands
     shafts = [name for name in commands if is_shaft(name) and name in windows.planned]
+    if not shafts:
+        return None
     u = windows.states["u"]
     change = np.abs(u[-1] - windows.columns["u"]) < STEADY * np.abs(u[-1])
-    same = np.all([np.ptp(windows.planned[name], axis=0) <= STEADY * np.abs(windows.planned[name][0]) for name in shafts], axis=0) if shafts else False  # fmt: skip
+    orders = [windows.planned[name] for name in shafts]
+    same = np.all([np.ptp(order, axis=0) <= STEADY * np.abs(order[0]) for order in orders], axis=0)
     straight = change & same & (np.abs(turned) < STRAIGHT) & (u[-1] > 0)
-    if straight.sum() < FEW or not shafts:
+    if not straight.any():
         return None
-    orders = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
-    held = steady_speed(vessel, orders)
-    driving = max(shafts, key=lambda name: abs(orders[name]))
-    return orders[driving] / RPM, float(np.median(u[-1, straight])), held
+    driving = max(orders, key=lambda order: float(np.abs(order[0, straight]).max()))[0]
+    straight &= driving >= (1 - STEADY) * driving[straight].max()  # the fastest, where there are several speeds
+    if straight.sum() < FEW:
+        return None
+    held = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
+    return float(np.median(driving[straight])) / RPM, float(np.median(u[-1, straight])), steady_speed(vessel, held)
 
 
 def steady_speed(vessel: Vessel, commands: Mapping[str, float], most: float = 40.0) -> float:

@@ -357,7 +357,7 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
 
 
 def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[Any]:
-    """Every vessel as it is and as its log corrects it, and the first made inaccurate as in the paper's experiment 2."""
+    """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2."""
     taken = {NO_MODEL, "inaccurate"}
     found: list[Any] = []
     for named, vessel in vessels.items():
