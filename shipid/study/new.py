@@ -125,6 +125,14 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
     return chosen, why + short
 
 
+def proposed_horizon(vessel: Vessel, dataset: Dataset) -> tuple[float, float]:
+    """Horizon and step [s] that a new study of a vessel and its runs would have."""
+    seen = survey(dataset)
+    horizon, _ = horizon_of(length_of(vessel), seen.speed, seen.runs["duration"].tolist())
+    step = step_of(horizon, seen.step)
+    return max(round(horizon / step), 2) * step, step
+
+
 def step_of(horizon: float, log_step: float) -> float:
     """Step of the predictor [s]: a round number, a fifteenth of the horizon at most, but no shorter than the log's."""
     most = min(horizon / STEPS, LONGEST_STEP)

@@ -60,10 +60,9 @@ def test_a_rudder_of_the_other_sign_is_said(log: Dataset) -> None:
 
 
 def test_steady_speed_is_that_of_the_published_approach() -> None:
-    assert steady_speed(load_vessel(SHIP), {"propeller.n": RPM / 60, "rudder.delta": 0.0}) == pytest.approx(
-        1.179, rel=0.02
-    )
-    assert steady_speed(load_vessel(SHIP), {"propeller.n": 0.0, "rudder.delta": 0.0}) == 0.0
+    vessel, orders = load_vessel(SHIP), {"propeller.n": RPM / 60, "rudder.delta": 0.0}
+    assert steady_speed(vessel, orders) == pytest.approx(1.179, rel=0.02)
+    assert steady_speed(vessel, orders | {"propeller.n": 0.0}) == 0.0
 
 
 def test_groups_share_no_number() -> None:
