@@ -26,7 +26,7 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import order_keys
-from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
+from shipid.simulation.standard import GRAVITY, length_of, service_speed, shaft_speed
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import obtain, partition, prepare
@@ -420,7 +420,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
-    service = float(vessel.document["particulars"].get("U_0", FROUDE * np.sqrt(GRAVITY * length)))
+    service = service_speed(vessel)
     rpm = shaft_speed(Controls.of(vessel), service) / RPM
     speed = 0.75 * service
     horizon, why = horizon_of(length, speed, [np.inf])
