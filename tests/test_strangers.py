@@ -1,4 +1,4 @@
-"""Strangers are ships: they differ by seed, their logs are datasets, and a first guess of them is checked by its log."""
+"""Strangers are ships: a seed makes one, its log is a dataset, and a first guess of it is checked by its log."""
 
 from __future__ import annotations
 
