@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 
 export OMP_NUM_THREADS ?= 2
 
-.PHONY: study test slow check format bench clean
+.PHONY: study test slow check format faults bench clean
 
 study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
 	$(BIN)/shipid study run quick
@@ -30,6 +30,12 @@ check: $(STAMP)          ## format, lint, types, layers
 format: $(STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# A campaign of faults, drawn by seed: SCALE=1 is a fifth of it, SCALE=5 all.
+SCALE ?= 1
+SEED  ?= 0
+faults: $(STAMP)         ## kills at every write, mutated documents, full disks, damaged folders: a table of outcomes
+	OMP_NUM_THREADS=1 $(BIN)/python -m tests.faults --scale $(SCALE) --seed $(SEED)
 
 bench: $(STAMP)          ## timings: never in tests
 	$(BIN)/python -m tests.benchmarks

@@ -7,14 +7,20 @@ import hashlib
 import json
 import re
 import tomllib
+import unicodedata
 from collections.abc import Iterator, Mapping
+from datetime import date, time
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Self, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
 
 Document = dict[str, Any]
+
+LARGEST = 20_000_000  # bytes of a document
+DEEPEST = 40  # tables and lists inside one another
+MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 
 
 def bundled_folder(kind: str) -> Path:
@@ -51,17 +57,65 @@ def find(name: str, kind: str, relative_to: Path | None = None) -> Path:
 
 
 def read(file: Path | str) -> Document:
-    """Read a TOML document; DocumentError for duplicate keys, invalid syntax or a wrong encoding."""
+    """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
+        if Path(file).exists() and not Path(file).is_file():
+            raise DocumentError("cannot be read: it is no file", file=file)
+        if Path(file).stat().st_size > LARGEST:
+            raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB: no document is", file=file)
         text = Path(file).read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
     except OSError as error:
         raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
+    document = loads(text, file)
+    check_values(document, file)
+    return document
+
+
+def loads(text: str, file: Path | str | None = None) -> Document:
+    """Parse TOML text; DocumentError for invalid syntax, and for what the parser cannot hold."""
     try:
         return tomllib.loads(text)
+    except RecursionError:
+        raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file) from None
     except tomllib.TOMLDecodeError as error:
         raise DocumentError(f"not valid TOML: {error}", file=file) from None
+    except ValueError:  # of an integer with thousands of digits
+        raise DocumentError(f"holds an integer beyond {MOST_INTEGER:.0e}", file=file) from None
+
+
+def check_values(document: Any, file: Path | str | None) -> None:
+    """Raise DocumentError for a value that no document may hold, with its dotted path.
+
+    That is a date, a number beyond 1e24, an integer beyond 1e15, a control character, and deep nesting.
+    """
+    waiting: list[tuple[str, int, Any]] = [("", 0, document)]
+    while waiting:
+        path, depth, value = waiting.pop()
+        if depth > DEEPEST:
+            raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file, path=path[:80])
+        if isinstance(value, Mapping | list):
+            entries = value.items() if isinstance(value, Mapping) else enumerate(value)
+            for key, inner in entries:
+                inside = f"{path}.{key}" if path else str(key)
+                if any(unicodedata.category(sign) == "Cc" for sign in str(key)):
+                    raise DocumentError("a name with a control character", file=file, path=inside)
+                waiting.append((inside, depth + 1, inner))
+            continue
+        fault = None
+        if isinstance(value, date | time):
+            fault = f"{value}: a date, where none is used: write text in quotes"
+        elif isinstance(value, int) and abs(value) > MOST_INTEGER:
+            fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
+        elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):
+            fault = f"{value:g}: beyond {MOST_NUMBER:.0e}, no quantity of a ship in SI units is"
+        elif isinstance(value, str) and any(
+            unicodedata.category(sign) == "Cc" and sign not in "\n\r\t" for sign in value
+        ):
+            fault = f"{value!r}: text with a control character"
+        if fault is not None:
+            raise DocumentError(fault, file=file, path=path)
 
 
 def digest(document: Any) -> str:
@@ -131,10 +185,29 @@ def replace(document: Any, changes: Mapping[str, Any]) -> Any:
     return result
 
 
+def plain(value: Any) -> Any:
+    """A value as a TOML document holds it: NumPy numbers and arrays become numbers and lists, in tables too."""
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
     expression = re.compile(".*".join(re.escape(piece) for piece in pattern.split("*")))
     return [path for path in paths if expression.fullmatch(path)]
+
+
+class Checked:
+    """For pydantic models of documents: `model_validate` raises DocumentError, as for a file, not pydantic's error."""
+
+    @classmethod
+    def model_validate(cls, obj: Any, **_: Any) -> Self:
+        """Return a checked model of plain data; DocumentError with dotted path, value and remedy."""
+        result: Self = parse(cls, obj, None, cls.__name__.lower())
+        return result
 
 
 def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
@@ -145,7 +218,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     from pydantic import ValidationError
 
     try:
-        return model.model_validate(data)
+        return model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
     except ValidationError as error:
         problems = error.errors(include_url=False)
         first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])

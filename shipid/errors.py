@@ -1,4 +1,4 @@
-"""Errors that a user can correct; each is one line with file, path, problem and remedy."""
+"""Errors that a user can correct; each is a line with file, path, problem and remedy."""
 
 from __future__ import annotations
 
@@ -17,20 +17,30 @@ class ShipidError(Exception):
     message : what is wrong and what would be right, one sentence.
     file : the document or log with the error.
     path : dotted path, column or row inside the file.
+    others : further errors of the same document, a line each.
     """
 
-    def __init__(self, message: str, *, file: str | PathLike[str] | None = None, path: str | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | PathLike[str] | None = None,
+        path: str | None = None,
+        others: Iterable[ShipidError] = (),
+    ) -> None:
         super().__init__(message)
         self.message = message
         self.file = None if file is None else str(file)
         self.path = path
+        self.others = tuple(others)
 
     def __str__(self) -> str:
         parts = [part for part in (self.file, self.path, self.message) if part]
-        return ": ".join(_legible(" ".join(part.split())) for part in parts)
+        line = ": ".join(_legible(" ".join(part.split())) for part in parts)
+        return "\n".join([line, *map(str, self.others)])
 
     def __reduce__(self) -> tuple[object, ...]:  # errors of worker processes are pickled
-        return (_rebuild, (type(self), self.message, self.file, self.path))
+        return (_rebuild, (type(self), self.message, self.file, self.path, self.others))
 
 
 class DocumentError(ShipidError):
@@ -45,13 +55,25 @@ class ResultError(ShipidError):
     """A results folder or a saved predictor that is missing, foreign or damaged."""
 
 
-def _rebuild(cls: type[ShipidError], message: str, file: str | None, path: str | None) -> ShipidError:
-    return cls(message, file=file, path=path)
+def _rebuild(
+    cls: type[ShipidError], message: str, file: str | None, path: str | None, others: tuple[ShipidError, ...]
+) -> ShipidError:
+    return cls(message, file=file, path=path, others=others)
+
+
+def visible(text: str) -> str:
+    """The text with every character that is not printable written out: contents of a file must not control a terminal.
+
+    Ends of lines stay as they are.
+    """
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode() for sign in text
+    )
 
 
 def _legible(text: str) -> str:
-    """The text as printable characters, shortened: contents of a file must not control or flood a terminal."""
-    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+    """The text as printable characters, shortened: contents of a file must not flood a terminal."""
+    shown = visible(text)
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import shutil
+import socket
 import tempfile
+import time
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +23,8 @@ from shipid.errors import DataError, ResultError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+TEMPORARY = ".shipid-"
+"""Beginning of the names of temporary folders."""
 TABLES = (".parquet", ".csv")
 """Endings of the files that `write_table` writes."""
 
@@ -27,23 +33,80 @@ TABLES = (".parquet", ".csv")
 def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
-    The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, so that a
-    power cut leaves the old file or the new one. Raises OSError where the place cannot be written.
+    The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, and the
+    folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
+    temporary folder, which `sweep` removes. Raises OSError where the place cannot be written.
     """
     target = Path(target)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".shipid-") as folder:
-        temporary = Path(folder) / target.name
+    make_folder(target.parent)
+    with temporary_folder(target.parent) as folder:
+        temporary = folder / target.name
         yield temporary
-        with temporary.open("rb+") as stream:
-            os.fsync(stream.fileno())
+        sync(temporary)
         os.replace(temporary, target)
+    sync(target.parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, synced to disk."""
+    if not folder.is_dir():
+        make_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        sync(folder.parent)
+
+
+def sync(place: Path) -> None:
+    """Wait until a file, or the entries of a folder, are on the disk; folders only where the system can."""
+    if place.is_dir() and os.name != "posix":
+        return
+    try:
+        handle = os.open(place, os.O_RDONLY if place.is_dir() else os.O_RDWR)
+    except PermissionError:
+        if place.is_dir():  # one may write into it and not list it
+            return
+        raise
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that does not sync folders
+            raise
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def temporary_folder(parent: Path) -> Iterator[Path]:
+    """Give a folder for files that are not whole yet; its name says which process made it."""
+    with tempfile.TemporaryDirectory(dir=parent, prefix=f"{TEMPORARY}{socket.gethostname()}-{os.getpid()}-") as folder:
+        yield Path(folder)
+
+
+def sweep(folder: Path) -> None:
+    """Remove the temporary folders in a folder whose process is gone, or that are older than a day."""
+    for place in folder.glob(f"{TEMPORARY}*"):
+        words = place.name.removeprefix(TEMPORARY).rsplit("-", 2)
+        with suppress(OSError):
+            old = time.time() - place.stat().st_mtime > 86400
+            here = len(words) == 3 and words[0] == socket.gethostname() and words[1].isdecimal()
+            if old or (here and not is_alive(int(words[1]))):
+                shutil.rmtree(place, ignore_errors=True)
+
+
+def is_alive(process: int) -> bool:
+    """Whether a process of this machine runs, or may run."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def write_text(file: Path, text: str) -> None:
     """Write a UTF-8 text file."""
     with whole(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def check_new(file: Path, kind: str) -> None:
@@ -75,7 +138,7 @@ def read_json(file: Path) -> Any:
         return json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise ResultError("damaged: run the study again into a new folder", file=file) from None
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from casadi import SX
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, stretches
+from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
 from shipid.data.windows import Windows, cut_windows, to_frame
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method
@@ -516,8 +516,7 @@ def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:
         rows, chosen = np.flatnonzero(names == run), windows.run == run
-        slack = 1e-6 + 4 * float(np.spacing(np.abs(t[rows]).max()))
-        found[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + slack, side="right") - 1]
+        found[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
     return {**windows.columns, **{name: values[found] for name, values in estimates.columns.items()}}
 
 

@@ -8,6 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from shipid import document as documents
 from shipid.errors import DocumentError
+from shipid.identification.settings import Identify
+from shipid.simulation.truth import Truth
+from shipid.vessel.perturb import Family
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
@@ -121,3 +124,72 @@ def test_a_quoted_key_may_hold_dots() -> None:
     found = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
     assert found == {"sensors": {"port.n": {"noise": 0.1}}}
     assert documents.get(found, 'sensors."port.n".noise') == 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date"),
+        ("a = [1, 07:32:00]", "a.1: 07:32:00: a date"),
+        ("a = " + "[" * 60 + "]" * 60, "nested deeper than 40"),
+        ("a = " + "[" * 2000 + "]" * 2000, "nested deeper than 40"),
+        ("a = " + "9" * 400, "a: an integer of 400 digits"),
+        ("a = " + "9" * 4301, "holds an integer beyond 1e+15"),
+        ("a = 1e308", "a: 1e+308: beyond 1e+24"),
+        ('a = "\\u001b[2J"', "a: '\\\\x1b[2J': text with a control character"),
+        ('"\\u0007" = 1', "a name with a control character"),
+    ],
+)
+def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(text)
+    with pytest.raises(DocumentError) as caught:
+        documents.read(file)
+    line = str(caught.value)
+    assert remedy.replace("\\\\", "\\") in line
+    assert line.isprintable()
+
+
+@pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
+def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(f"a = {value}")
+    assert "a" in documents.read(tmp_path / "a.toml")
+
+
+def test_what_has_no_end_is_no_document() -> None:
+    with pytest.raises(DocumentError, match="it is no file"):
+        documents.read("/dev/zero")
+
+
+@pytest.mark.parametrize(
+    ("model", "data", "path", "message"),
+    [
+        (Truth, {"vessel": "mariner"}, "truth.manoeuvres", "missing"),
+        (
+            Truth,
+            {"vessel": "mariner", "manoeuvres": 1, "duration": 9.0},
+            "truth.manoeuvres",
+            "1: Input should be greater",
+        ),
+        (Truth, {"vessel": "mariner", "manoevres": 3}, "truth.manoevres", "did you mean 'manoeuvres'?"),
+        (Family, {"name": "a/b"}, "family.name", "'a/b'"),
+        (Family, {"name": "a", "perturb": [{"parameters": ["*"], "factor": [2, 1]}]}, "family.perturb.0.factor", "low"),
+        (Family, {"name": "a", "perturb": [{"factr": 2}]}, "family.perturb.0.factr", "did you mean 'factor'?"),
+        (Identify, {"parameters": []}, "identify.parameters", "at least 1"),
+        (Identify, {"parameters": ["*"], "horizon": -1}, "identify.horizon", "-1"),
+        (Family, 3, "family", "3"),
+    ],
+)
+def test_public_models_answer_as_a_file_does(model: type[Any], data: Any, path: str, message: str) -> None:
+    """From Python as from a document: one line with path and remedy, not pydantic's list."""
+    with pytest.raises(DocumentError) as caught:
+        model.model_validate(data)
+    assert caught.value.path == path
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_public_model_takes_what_is_right() -> None:
+    family = Family.model_validate({"name": "a", "base": "mariner"})
+    assert Family.model_validate(family) is family
+    assert Family.model_validate(family.model_dump()) == family

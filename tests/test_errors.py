@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices
+from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices, visible
 
 ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError, ResultError])
 
@@ -15,6 +15,17 @@ def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
     assert str(found) == "a.toml: hull.x: first second"
     assert str(error("only this")) == "only this"
     assert isinstance(found, ShipidError)
+
+
+@ERRORS
+def test_several_errors_of_a_document_are_a_line_each(error: type[ShipidError]) -> None:
+    others = [DataError("second\nof two", file="a.toml", path="y"), ShipidError("third")]
+    found = error("first", file="a.toml", path="x", others=others)
+    lines = ["a.toml: x: first", "a.toml: y: second of two", "third"]
+    assert str(found).split("\n") == lines
+    again = pickle.loads(pickle.dumps(found))
+    assert str(again).split("\n") == lines
+    assert [type(one) for one in again.others] == [DataError, ShipidError]
 
 
 @ERRORS
@@ -32,3 +43,9 @@ def test_choices_list_what_is_valid() -> None:
     assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
     assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
     assert choices("zzz", []) == "nothing is defined there"
+
+
+@pytest.mark.parametrize("name", ["\x1b[2J\x1b[31m", "\u202eabc", "a\rb", "\x00", "\x07"])
+def test_control_characters_are_made_visible(name: str) -> None:
+    assert visible(f"ship {name}\nsea").replace("\n", "").isprintable()
+    assert visible("R/V Gunnerus, 28.9 m ä 船\n") == "R/V Gunnerus, 28.9 m ä 船\n"

@@ -150,3 +150,29 @@ def test_a_document_on_a_full_disk_is_one_sentence(tmp_path: Path, monkeypatch: 
     with pytest.raises(DataError, match=r"a\.toml.*cannot be written \(No space"):
         files.write_new("x = 1\n", tmp_path / "a.toml")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_killed_process_leaves_is_swept(tmp_path: Path) -> None:
+    process = os.fork()
+    if not process:
+        with files.whole(tmp_path / "a.txt") as temporary:
+            temporary.write_text("half")
+            os._exit(0)
+    os.waitpid(process, 0)
+    with files.whole(tmp_path / "b.txt") as mine:
+        mine.write_text("whole")
+        assert len(list(tmp_path.iterdir())) == 2
+        files.sweep(tmp_path)
+        assert list(tmp_path.iterdir()) == [mine.parent], "only what is at work stays"
+    assert [file.name for file in tmp_path.iterdir()] == ["b.txt"]
+
+
+def test_folder_and_file_are_synced_before_and_after_the_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    replace = os.replace
+    monkeypatch.setattr(files, "sync", lambda place: calls.append(f"sync {Path(place).name}"))
+    monkeypatch.setattr(files.os, "replace", lambda one, other: (calls.append("replace"), replace(one, other)))
+    files.write_text(tmp_path / "new" / "a.txt", "x")
+    assert calls == [f"sync {tmp_path.name}", "sync a.txt", "replace", "sync new"]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli import data, identify, predict, replay, simulation, study, vessel
+from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError
 
@@ -22,6 +22,8 @@ app.command("manoeuvre")(simulation.manoeuvre)
 app.command("replay")(replay.replay)
 app.command("identify")(identify.identify)
 app.command("predict")(predict.predict)
+app.command("export")(export.export)
+app.command("aboard")(export.aboard)
 app.add_typer(vessel.app, name="vessel")
 app.add_typer(data.app, name="data")
 app.add_typer(study.app, name="study")
@@ -39,6 +41,9 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
+    except MemoryError:
+        sys.stderr.write("error: out of memory: fewer --workers, longer intervals or fewer members take less\n")
+        sys.exit(1)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
         sys.exit(1)
@@ -49,8 +54,7 @@ def _before(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
 ) -> None:
-    if verbose:
-        log_to_stderr()
+    log_to_stderr(verbose)
     if version:
         from shipid.version import __version__
 

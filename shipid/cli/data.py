@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.terminal import criterion_table, measure_table, show, table, write_measures
+from shipid.cli.terminal import criterion_table, measure_table, reading, show, table, write_measures
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
@@ -29,14 +29,17 @@ def data_import(
         Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: in this folder")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="repair to leave out, such as heading_offset")] = None,
-    guess: Annotated[Path | None, typer.Option(help="draft a mapping of this log instead of importing it")] = None,
+    guess: Annotated[
+        Path | None,
+        typer.Option(help="draft a mapping of this log, folder of logs or glob in quotes, instead of importing it"),
+    ] = None,
     names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
-        _draft(guess, tuple(filter(None, names.split(","))), out or Path(f"{guess.stem}.toml"))
+        _draft(guess, tuple(filter(None, names.split(","))), out)
         return
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
@@ -48,7 +51,9 @@ def data_import(
     if out is not None and out.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
     declared = read_mapping(mapping)
-    dataset = import_log(declared, log or fetch(mapping), without=without or ())
+    source = log or fetch(mapping)
+    with reading(source) as progress:
+        dataset = import_log(declared, source, without=without or (), progress=progress)
     file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
     repairs = dataset.metadata.get("repairs", [])
     if repairs:
@@ -57,19 +62,30 @@ def data_import(
     typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
 
 
-def _draft(log: Path, names: tuple[str, ...], out: Path) -> None:
+def _draft(log: Path, names: tuple[str, ...], out: Path | None) -> None:
     from shipid.files import write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import draft_mapping
 
     guessed = guess(log, names)
-    file = write_new(draft_mapping(guessed), out)
+    file = write_new(draft_mapping(guessed), out or Path(f"{guessed.file.resolve().stem}.toml"))
     rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in guessed.columns)
     show(table(["column", "from", "unit", "sure", "why"], rows))
     if guessed.findings:
         show(
             table(["finding", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in guessed.findings))
         )
+    source = guessed.source
+    if source.pattern is not None:
+        typer.echo(f"{len(source.files)} files {source.pattern!r} are one source of as many runs")
+    if source.skipped:
+        show(table(["left out", "because"], source.skipped.items()))
+    for note in guessed.sniffed.notes:
+        typer.echo(f"note: {note}")
+    if guessed.unused:
+        typer.echo(f"not used: {', '.join(map(repr, guessed.unused))}")
+    for question in guessed.questions:
+        typer.echo(f"? {question.sentence}")
     typer.echo(f"draft -> {file}: read it before you import with it")
 
 

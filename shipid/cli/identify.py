@@ -45,6 +45,9 @@ def identify(
     test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
     ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
     profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
+    band: Annotated[
+        float | None, typer.Option(help="level of bands on the measures of standard manoeuvres, such as 0.9")
+    ] = None,
     design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
     out: Annotated[
         Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml in this folder")
@@ -78,7 +81,7 @@ def identify(
         with iterations() as progress:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
-                progress=progress,
+                band=band, progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
@@ -155,11 +158,16 @@ def _show_identified(outcome: Identified) -> None:
         typer.echo(f"  {sentence}")
     typer.echo(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(outcome)))
+    banded = "low" in outcome.manoeuvres
     compared = [
-        [row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"]), row["unit"], row["note"]]
+        [
+            *(row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"])),
+            *([f"{digits(row['low'])} ... {digits(row['high'])}"] if banded else []),
+            *(row["unit"], row["note"]),
+        ]
         for row in outcome.manoeuvres.to_dict("records")
     ]
-    show(table(["calm water", "measure", "before", "after", "unit", "note"], compared))
+    show(table(["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"], compared))
     for curve in outcome.profiles:
         typer.echo(f"profile: {curve.sentence}")
     if outcome.programme is not None:

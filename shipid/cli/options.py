@@ -20,7 +20,7 @@ Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 def parsed(changes: list[str] | None) -> dict[str, Any]:
     """Return path -> value of `path=value` texts; a value is read as TOML, or taken as text."""
-    import tomllib
+    from shipid.document import check_values, loads
 
     result: dict[str, Any] = {}
     for change in changes or []:
@@ -28,15 +28,16 @@ def parsed(changes: list[str] | None) -> dict[str, Any]:
         if not equals or not path:
             raise DocumentError(f"{change!r}: write --set path=value, such as --set grid.N_D=[10,30]", path="--set")
         try:
-            result[path] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+            result[path] = loads(f"value = {text}")["value"]
+        except DocumentError:
             result[path] = text
+        check_values(result, "--set")
     return result
 
 
 def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
     """`paths=value`, the value TOML; paths may hold a comparison."""
-    import tomllib
+    from shipid.document import loads
 
     result = {}
     for pair in given:
@@ -44,8 +45,8 @@ def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
         try:
             if not equals or not path:
                 raise ValueError
-            result[path] = tomllib.loads(f"value = {text}")["value"]
-        except ValueError:
+            result[path] = loads(f"value = {text}")["value"]
+        except (ValueError, DocumentError):
             raise DocumentError(f"{pair!r}: write {example}", path=option) from None
     return result
 

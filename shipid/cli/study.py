@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from shipid.cli.options import Changes, Device, Folder, Scheduler, Workers, parsed, stem
-from shipid.cli.terminal import counted, digits, draw, show, table
+from shipid.cli.terminal import counted, digits, draw, show, show_reasons, table
 
 if TYPE_CHECKING:
     from shipid.study.plan import Plan
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
+FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
 
 
 @app.command("list")
@@ -45,8 +46,7 @@ def study_new(
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
     write_new(draft.text, file, "study")
-    rows = ((choice.path, str(choice.value), choice.why) for choice in draft.choices)
-    show(table(["choice", "value", "because"], rows))
+    show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
     for named, look in draft.looks.items():
@@ -107,16 +107,11 @@ def study_screen(
     device: Device = "cpu",
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.files import check_table, write_table
-    from shipid.hybrid.training import check_device
+    from shipid.files import write_table
     from shipid.study import screen
-    from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
 
-    check_device(device)
-    plan = read_plan(study, parsed(changes))
-    file = out or Path(f"{plan.name}-screen.csv")
-    check_table(file)
+    plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     for note in screen.notes(plan, dataset, wanted):
         typer.echo(note, err=True)
@@ -149,16 +144,11 @@ def study_rotate(
     device: Device = "cpu",
 ) -> None:
     """Test on every run in turn and train on all others: how much the answer depends on the choice of the test run."""
-    from shipid.files import check_table, write_table
-    from shipid.hybrid.training import check_device
+    from shipid.files import write_table
     from shipid.study import rotate
-    from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain
 
-    check_device(device)
-    plan = read_plan(study, parsed(changes))
-    file = out or Path(f"{plan.name}-rotate.csv")
-    check_table(file)
+    plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.turns(plan, dataset, tests)
     cells = len(wanted) * len(plan.pairs) * len(set(plan.study.grid.seeds))
@@ -167,26 +157,19 @@ def study_rotate(
     frame = pd.concat(list(counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
     write_table(file, frame)
     typer.echo(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:")
-    columns, rows = ["A", "H", "least", "greatest", "H_90"], []
+    columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     for row in rotate.spread(frame).to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
-        rows.append([name, *(digits(row[column]) for column in columns), better])
-    show(table(["foundation", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
+        inside = "-" if row["coverage"] != row["coverage"] else f"{row['coverage']:.0%}"
+        rows.append([name, *(digits(row[column]) for column in columns), inside, better])
+    band = f"in band of {plan.study.bands.level:.0%}"
+    heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
+    show(table(heads, rows))
     typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
-    differences = rotate.contrasts(frame, plan).to_dict("records")
-    if differences:
-        typer.echo("paired differences over the turns [m], with a 95 % interval:")
-        pairs = [
-            (
-                row["id"],
-                row["difference"],
-                "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(row[n] for n in ("mean", "low", "high"))),
-                f"{row['above']} of {row['turns']}",
-            )
-            for row in differences
-        ]
-        show(table(["finding", "difference", "mean", "above 0"], pairs))
+    if found := rotate.turn_findings(frame, plan):
+        typer.echo("findings over the turns, in brackets 95 % intervals:")
+        show(table(["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)))
     typer.echo(f"{len(frame)} cells -> {file}")
 
 
@@ -227,24 +210,67 @@ def study_report(folder: Folder) -> None:
     typer.echo(str(write_pages(folder)))
 
 
+@app.command("check")
+def study_check(folder: Folder) -> None:
+    """Check that the files of a run's folder are whole and as they were written; ends with 1 if one is not."""
+    from shipid.study.check import check_folder
+
+    found = check_folder(folder)
+    for line in found.lines:
+        typer.echo(line)
+    if found.faults:
+        raise typer.Exit(1)
+
+
 @app.command("compare")
 def study_compare(
     folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],
 ) -> None:
     """Show findings and errors of one study in several worlds: other manoeuvres, families and training."""
-    from shipid.study.compare import compare_errors, compare_findings, read_worlds
+    from shipid.study.compare import compare_bands, compare_errors, compare_findings, read_worlds
 
     worlds = read_worlds(folders)
     findings = compare_findings(worlds)
     if len(findings):
-        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [least, greatest]"]
+        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
         values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
         show(table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True)))
     errors = compare_errors(worlds)
     errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
-    columns = ["H [m]", *(f"N_D = {amount}" for amount in wide.columns)]
+    columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     show(table(columns, wide.reset_index().to_numpy().tolist()))
+    bands = compare_bands(worlds)
+    if len(bands):
+        level = worlds[0].plan.study.bands.level
+        typer.echo(
+            f"bands of {level:.0%}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
+        )
+        columns = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
+        rows = [
+            [
+                *(str(row[name]) for name in ("family", "method", "N_D")),
+                *(f"{row[n]:.2f} [{row[f'{n}_low']:.2f}, {row[f'{n}_high']:.2f}]" for n in ("coverage", "width")),
+                str(row["worlds"]),
+            ]
+            for row in bands.to_dict("records")
+        ]
+        show(table(columns, rows))
+
+
+def _before_work(
+    study: str, changes: list[str] | None, device: str, out: Path | None, command: str
+) -> tuple[Plan, Path]:
+    """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
+    from shipid.files import check_table
+    from shipid.hybrid.training import check_device
+    from shipid.study.plan import read_plan
+
+    check_device(device)
+    plan = read_plan(study, parsed(changes))
+    file = out or Path(f"{plan.name}-{command}.csv")
+    check_table(file)
+    return plan, file
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:

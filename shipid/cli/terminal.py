@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from shipid.errors import visible
+
 if TYPE_CHECKING:
     from pandas import DataFrame
     from rich.table import Table
 
     from shipid.study.run import Event
+
+
+HANDLER = "command line"
+"""Name of the handler that writes log messages to standard error."""
 
 
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
@@ -25,9 +31,9 @@ def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> 
 
     result = Table(box=box.SIMPLE_HEAD)
     for column in columns:
-        result.add_column(Text(column))  # as text: rich would take [m] for markup
+        result.add_column(Text(visible(column)))  # as text: rich would take [m] for markup
     for row in rows:
-        result.add_row(*(Text(str(cell)) for cell in row))
+        result.add_row(*(Text(visible(str(cell))) for cell in row))
     return result
 
 
@@ -40,6 +46,44 @@ def show(table: Table) -> None:
         console.print(table)
     else:
         Console(width=200).print(table)
+
+
+@contextmanager
+def reading(log: Path) -> Iterator[Callable[[float], None]]:
+    """Give a function that says which share of a large log has been read (0 to 1), on standard error.
+
+    A terminal shows it in one line; elsewhere there is a line for every quarter.
+    """
+    last = [-1]
+    tty = sys.stderr.isatty()
+
+    def say(share: float) -> None:
+        step = int(100 * share) if tty else int(4 * share)
+        if step > last[0]:
+            last[0] = step
+            print(
+                f"{chr(13) if tty else ''}{log.name}: {share:.0%} read",
+                end="" if tty else "\n",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    try:
+        yield say
+    finally:
+        if tty and last[0] >= 0:
+            print(file=sys.stderr)
+
+
+def show_reasons(choices: list[tuple[str, str, str]]) -> None:
+    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+    from rich.console import Console
+
+    if Console().is_terminal:
+        show(table(["choice", "value", "because"], choices))
+        return
+    for path, value, why in choices:
+        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
 
 
 def digits(value: float) -> str:
@@ -133,7 +177,7 @@ def draw(events: Iterable[Event]) -> None:
         for event in events:
             line = event_line(event)
             if line:
-                typer.echo(line)
+                typer.echo(visible(line))
         return
     from rich.progress import (
         BarColumn,
@@ -157,7 +201,7 @@ def draw(events: Iterable[Event]) -> None:
         task = progress.add_task("cells", total=None)
         for event in events:
             if event.kind == "note":
-                progress.console.print(event.text, markup=False, highlight=False)
+                progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
             elif event.kind == "cell":
@@ -173,12 +217,17 @@ def draw(events: Iterable[Event]) -> None:
                 progress.update(task, completed=event.done, description=label)
 
 
-def log_to_stderr() -> None:
-    """Write the log messages of shipid to standard error."""
+def log_to_stderr(verbose: bool) -> None:
+    """Write the warnings of shipid to standard error, or all its log messages."""
     import logging
 
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
     logger = logging.getLogger("shipid")
+    for before in [one for one in logger.handlers if one.name == HANDLER]:
+        logger.removeHandler(before)
+    handler = logging.StreamHandler()
+    handler.name = HANDLER
+    handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG)
+    if verbose:
+        logger.setLevel(logging.DEBUG)

@@ -39,7 +39,7 @@ def vessel_show(
         return
     if not vessel:
         raise ShipidError("name a vessel (see `shipid vessel list`), or ask for --schema")
-    from shipid.vessel.load import load_vessel
+    from shipid.vessel.load import load_vessel, sources
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
     ship = load_vessel(vessel)
@@ -51,11 +51,11 @@ def vessel_show(
     typer.echo(
         "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
     )
-    fallback = document.get("source", "")
+    origin = sources(ship)
     rows = [
-        (path, key.split(".")[1] + (", off" if off else ""), block.get("source") or fallback)
+        (path, key.split(".")[1] + (", off" if off else ""), origin[path])
         for off in (False, True)
-        for path, key, block in term_blocks(document, off)
+        for path, key, _ in term_blocks(document, off)
     ]
     show(table(["term", "kind", "source"], rows))
     for path, _, block in term_blocks(document):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,27 +12,32 @@ import pandas as pd
 from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, unit_of
 from shipid.physics.signals import row_of
 
+Plane = np.ndarray[Any, np.dtype[np.complex128]]
+
 GAP, JITTER, FROZEN, OVERLAP = 3.0, 0.05, 0.02, 0.5
-CORRELATION, SCALE_ERROR, RATE_ERROR, PATH_ERROR = 0.8, 0.1, 0.5, 0.05
+CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
-STRETCH = 30.0
+STRETCH, WINDOW = 30.0, 10.0  # s
+SURE = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
+DELAY, DELAYS, EXPLAINED = 0.3, 3.0, 0.35  # s: least delay reported, longest tried; share of the misfit it explains
 
 
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
     """Check every run of a dataset against the clock, plausible ranges and the laws of plane motion.
 
     Returns a table with columns `check`, `run`, `value`, `unit`, `limit`, `ok`, `sentence`. A check reports what is
-    suspicious; it changes nothing. Limits are engineering judgement, wide enough for a log in good order.
+    suspicious; it changes nothing. Limits are engineering judgement, and widened by what the noise of the log makes.
     """
     by_run: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         by_run.setdefault(run, []).append(rows)
     shared = dataset.metadata.get("clock", "shared") != "run"
+    whole = {run: pd.concat(stretches) for run, stretches in by_run.items()}
     table = []
     for run, stretches in by_run.items():
-        others = dataset.frame.loc[dataset.frame["run"] != run, "t"] if shared else pd.Series(dtype=float)
+        others = {name: rows for name, rows in whole.items() if name != run}
         results = [*_clock(stretches), *_ranges(stretches), *_heading(stretches), *_path(stretches)]
-        table += [{"run": run, **row} for row in [*results, *_repetition(stretches, others)]]
+        table += [{"run": run, **row} for row in [*results, *_repetition(stretches, others, shared)]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -62,41 +68,172 @@ def _ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
             )
 
 
+def noise_of(values: Array) -> float:
+    """Standard deviation of the white noise of a smooth signal (N,), from its second differences.
+
+    E (x[i-1] - 2 x[i] + x[i+1])^2 = 6 sigma^2 for a signal that is straight over three rows; what curves adds to it, so
+    that the noise is rather too large. The median makes jumps count little.
+    """
+    if len(values) < 5:
+        return 0.0
+    return float(np.median(np.abs(np.diff(values, 2))) / (0.6745 * np.sqrt(6.0)))
+
+
+@dataclass(frozen=True)
+class _Turning:
+    """Changes of heading and integrals of r over windows (K,) [rad], and the standard deviation of their difference."""
+
+    seen: Array
+    integrated: Array
+    error: Array
+
+
+def _turning(stretches: list[pd.DataFrame]) -> _Turning:
+    """Compare heading and yaw rate over windows that do not overlap, with the error that their noise makes."""
+    seen, integrated, errors = [], [], []
+    for rows in stretches:
+        t, psi, r = (rows[name].to_numpy() for name in ("t", "psi", "r"))
+        psi = np.unwrap(psi)
+        if len(t) < 5:
+            continue
+        usual = float(np.median(np.diff(t)))
+        width = max(4, min(round(WINDOW / usual), (len(t) - 1) // 4))
+        edges = np.arange(0, len(t), width)
+        total = cumulative_integral(t, r)
+        seen.append(np.diff(psi[edges]))
+        integrated.append(np.diff(total[edges]))
+        # noise of both ends, noise of the rate, and what the trapezoid rule leaves of its curvature
+        curvature = float(np.sqrt(np.mean(np.diff(r, 2) ** 2)))
+        variance = 2 * noise_of(psi) ** 2 + width * (usual * noise_of(r)) ** 2 + width * (usual * curvature / 12) ** 2
+        errors.append(np.full(len(edges) - 1, np.sqrt(variance)))
+    join = [np.concatenate(parts) if parts else np.empty(0) for parts in (seen, integrated, errors)]
+    return _Turning(*join)
+
+
 def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
-    """d(psi)/dt (central differences) against r: correlation, k of d(psi)/dt = k r by least squares, RMS difference."""
-    long = [rows for rows in stretches if len(rows) > 2]
-    if not long:
+    """Changes of psi over windows against the integral of r: correlation, scale, and the difference beyond the noise.
+
+    A difference is reported where it is large and not made by noise: neither a noisy log in good order nor a small
+    error of an exact one fails.
+    """
+    windows = _turning(stretches)
+    if len(windows.seen) < 2:
         return
-    r = np.concatenate([rows["r"].to_numpy() for rows in long])
-    rate = np.concatenate([np.gradient(np.unwrap(rows["psi"]), rows["t"].to_numpy()) for rows in long])
-    size, error = _rms(r), _rms(rate - r)
-    if max(size, _rms(rate)) < TURNING:
+    size = _rms(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
+    change, ran = _rms(windows.seen), _rms(windows.integrated)
+    if max(size, change / WINDOW) < TURNING:
         yield _row("heading rate", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
-    product = float(np.mean(r * rate))
-    correlation = product / (size * _rms(rate) or 1.0)  # not centred: a steady turn counts
-    scale = product / (size**2 or 1.0)
+    error = windows.seen - windows.integrated
+    noise = _rms(windows.error)
+    count = len(error)
+    chance = noise * np.sqrt(1 + SURE * np.sqrt(2 / count))  # of a mean square of so many
+    noisy = _rms(error) <= chance
+    correlation = float(np.mean(windows.seen * windows.integrated)) / (
+        change * ran or 1.0
+    )  # not centred: a steady turn counts
+    power = float(np.sum(windows.integrated**2))
+    scale = float(np.sum(windows.seen * windows.integrated)) / (power or 1.0)
+    spread = _rms(windows.seen - scale * windows.integrated) / np.sqrt(power or 1.0)
     words = "; wrong sign of r or psi?" if correlation < 0 else ""
-    sentence = f"d(psi)/dt and r correlate by {correlation:.3f}{words}"
-    yield _row("heading rate", correlation, "1", CORRELATION, sentence, ok=correlation >= CORRELATION)
-    sentence = f"d(psi)/dt is {scale:.3f} times r; degrees or another unit?"
-    yield _row("heading scale", scale, "1", SCALE_ERROR, sentence, ok=abs(scale - 1) <= SCALE_ERROR)
-    yield _row(
-        "heading error", error, "rad/s", RATE_ERROR * size, f"d(psi)/dt - r is {np.degrees(error):.2g} deg/s (RMS)"
+    sentence = f"changes of psi and integrals of r correlate by {correlation:.3f}{words}"
+    yield _row("heading rate", correlation, "1", CORRELATION, sentence, ok=noisy or correlation >= CORRELATION)
+    sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r; degrees or another unit?"
+    limit = SCALE_ERROR + SURE * spread
+    yield _row("heading scale", scale, "1", limit, sentence, ok=noisy or abs(scale - 1) <= limit)
+    off, by_noise = np.degrees(_rms(error)), np.degrees(noise)
+    sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
+    yield _row("heading error", _rms(error), "rad", HEADING_ERROR * change + chance, sentence)
+    yield from _late(stretches, "heading latency", "heading", "yaw rate", lambda rows: np.unwrap(rows["psi"]), _turned)
+
+
+def _turned(rows: pd.DataFrame) -> Plane:
+    return cumulative_integral(rows["t"].to_numpy(), rows["r"].to_numpy()).astype(complex)
+
+
+def _ran(rows: pd.DataFrame) -> Plane:
+    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
+    rate = (u + 1j * v) * np.exp(1j * psi)
+    return cumulative_integral(t, rate.real) + 1j * cumulative_integral(t, rate.imag)
+
+
+def _late(
+    stretches: list[pd.DataFrame],
+    check: str,
+    what: str,
+    against: str,
+    seen: Callable[[pd.DataFrame], Any],
+    integrated: Callable[[pd.DataFrame], Plane],
+) -> Iterator[dict[str, Any]]:
+    """Delay of a signal behind the integral of its rate: where the misfit is least, if that is much less than at 0."""
+    steps = [float(np.median(np.diff(rows["t"]))) for rows in stretches if len(rows) > 1]
+    if not steps:
+        return
+    usual = max(steps)
+    longest = max(DELAYS, 3 * usual)
+    delays = np.arange(-longest, longest + usual / 4, max(usual / 2, longest / 24))
+    misfit, noise, count = np.zeros(len(delays)), 0.0, 0
+    for rows in stretches:
+        t = rows["t"].to_numpy()
+        width = WINDOW if t[-1] - t[0] > 4 * WINDOW else (t[-1] - t[0]) / 6
+        first = np.arange(t[0] + longest, t[-1] - longest - width, width)
+        if len(first) < 2 or len(t) < 8:
+            continue
+        values, total = np.asarray(seen(rows), dtype=complex), integrated(rows)
+        change = _moved(t, values, first + width) - _moved(t, values, first)
+        for index, delay in enumerate(delays):
+            ran = _moved(t, total, first + width - delay) - _moved(t, total, first - delay)
+            misfit[index] += float(np.sum(np.abs(change - ran) ** 2))
+        sigma = np.hypot(noise_of(values.real), noise_of(values.imag))
+        noise += 2 * sigma**2 * len(first)
+        count += len(first)
+    if count < 6:
+        return
+    best, none = int(np.argmin(misfit)), int(np.argmin(np.abs(delays)))
+    explained = 1.0 - misfit[best] / misfit[none] if misfit[none] > 0 else 0.0
+    # without a delay both misfits are noise, and differ by its scatter alone
+    chance = SURE * noise * np.sqrt(2 / count)
+    real = misfit[none] - misfit[best] > chance and misfit[none] > 2 * noise and explained > EXPLAINED
+    delay = float(delays[best]) if real else 0.0
+    late, other = (what, against) if delay >= 0 else (against, what)
+    sentence = (
+        f"{late} comes {abs(delay):.2g} s later than the {other} says ({100 * max(explained, 0):.0f} % of the misfit)"
     )
+    yield _row(check, abs(delay), "s", max(DELAY, 0.75 * usual), sentence)
+
+
+def _moved(t: Array, values: Plane, instants: Array) -> Plane:
+    return np.interp(instants, t, values.real) + 1j * np.interp(instants, t, values.imag)
 
 
 def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     """RMS distance between positions and integrated u, v, psi over stretches of 30 s that start together."""
+    speeds = [np.hypot(rows["u"].to_numpy(), rows["v"].to_numpy()) for rows in stretches]
     lengths = [
-        cumulative_integral(rows["t"].to_numpy(), np.hypot(rows["u"].to_numpy(), rows["v"].to_numpy()))[-1]
-        for rows in stretches
+        cumulative_integral(rows["t"].to_numpy(), speed)[-1] for rows, speed in zip(stretches, speeds, strict=True)
     ]
     error = _rms(np.concatenate([_drift(rows) for rows in stretches]))
     duration = sum(float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for rows in stretches)
     distance = sum(lengths) / duration * min(STRETCH, duration) if duration > 0 else 0.0
+    noise = _rms(np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)]))
     sentence = f"positions leave integrated velocities by {error:.2g} m (RMS) in {STRETCH:g} s, {distance:.3g} m run"
-    yield _row("path", error, "m", PATH_ERROR * distance, sentence)
+    yield _row("path", error, "m", PATH_ERROR * distance + SURE / 2 * noise, f"{sentence}; {noise:.2g} m by noise")
+    yield from _late(
+        stretches, "path latency", "position", "velocity", lambda rows: rows["north"] + 1j * rows["east"], _ran
+    )
+
+
+def _path_noise(rows: pd.DataFrame, speed: Array) -> float:
+    """Distance [m] that the noise of position, velocities and heading makes over 30 s, RMS."""
+    steps = np.diff(rows["t"])
+    if len(steps) < 4:
+        return 0.0
+    step = float(np.median(steps))
+    position, velocity = (
+        sum(noise_of(rows[name].to_numpy()) ** 2 for name in pair) for pair in (("north", "east"), "uv")
+    )
+    heading = (float(np.mean(speed)) * noise_of(np.unwrap(rows["psi"]))) ** 2
+    return float(np.sqrt(2 * position + STRETCH * step * (velocity + heading)))
 
 
 def _drift(rows: pd.DataFrame) -> Array:
@@ -123,14 +260,38 @@ def check_series(dataset: Dataset) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _repetition(stretches: list[pd.DataFrame], others: pd.Series[Any]) -> Iterator[dict[str, Any]]:
+def _repetition(
+    stretches: list[pd.DataFrame], others: dict[str, pd.DataFrame], shared: bool
+) -> Iterator[dict[str, Any]]:
     states = ["north", "east", "psi", "u", "v", "r"]
     same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
     frozen = float(same.mean()) if len(same) else 0.0
     yield _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.2g} % of the rows repeat the row before")
-    t = np.concatenate([rows["t"].to_numpy() for rows in stretches])
-    double = float(np.isin(t, others.to_numpy()).mean())
-    yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.2g} % of the rows belong to another run, too")
+    mine = pd.concat(stretches)
+    double, other = max(((_within(mine, rows, shared), name) for name, rows in others.items()), default=(0.0, ""))
+    where = f", most in {other!r}" if double > 0 else ""
+    yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.2g} % of the rows belong to another run, too{where}")
+
+
+def _within(mine: pd.DataFrame, other: pd.DataFrame, shared: bool) -> float:
+    """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
+    t = mine["t"].to_numpy()
+    if shared:
+        instants = other["t"].to_numpy()
+        at = np.clip(np.searchsorted(instants, t), 1, len(instants) - 1) if len(instants) > 1 else np.zeros(len(t), int)
+        near = np.minimum(np.abs(instants[at] - t), np.abs(instants[at - 1] - t))
+        slack = 0.25 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        share = float(np.mean(near <= slack))
+        if share > 0:
+            return share
+    moving = ["psi", "u", "v", "r"]
+    values = mine[moving].round(9)
+    lively = (values.diff() != 0).all(axis=1).to_numpy()  # a ship at rest, or held steady, is the same everywhere
+    if lively.sum() < 0.5 * len(mine):
+        return 0.0
+    keys = pd.util.hash_pandas_object(values, index=False).to_numpy()
+    known = pd.util.hash_pandas_object(other[moving].round(9), index=False).to_numpy()
+    return float(np.mean(np.isin(keys, known)))
 
 
 def _rms(values: Array) -> float:

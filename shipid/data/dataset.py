@@ -27,6 +27,7 @@ STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
 BREAK = "break"
 """Name of the flag on the first row after a break: nothing connects it to the row before."""
 
+MOST_FLAGS = 62  # bits of an integer
 _KEY = b"shipid"
 
 
@@ -157,6 +158,7 @@ def wraps(name: str) -> bool:
 
 def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     """Raise DataError unless the table holds what `Dataset` promises."""
+    check_metadata(metadata)
     if len(frame) == 0:
         raise DataError("the dataset has no rows")
     names = [str(name) for name in frame.columns]
@@ -181,6 +183,26 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
         if len(backwards):
             at = t.to_numpy()[backwards[0] + 1]
             raise DataError(f"run {run!r}: time does not increase at t = {at:g} s", path="t")
+
+
+def check_metadata(metadata: Any) -> None:
+    """Raise DataError unless the metadata are a table whose known entries have their types."""
+    if not isinstance(metadata, dict):
+        raise DataError(f"damaged metadata: {type(metadata).__name__}, must be a table")
+    kinds = {"flags": list, "units": dict, "clock": str, "repairs": list}
+    for key, kind in kinds.items():
+        if key in metadata and not isinstance(metadata[key], kind):
+            raise DataError(f"damaged metadata: must be a {kind.__name__}", path=key)
+    for name in metadata.get("flags", []):
+        if not isinstance(name, str):
+            raise DataError(f"damaged metadata: {name!r} is no name of a flag", path="flags")
+    if len(metadata.get("flags", [])) > MOST_FLAGS:
+        raise DataError(f"damaged metadata: more than {MOST_FLAGS} flags", path="flags")
+    for row in metadata.get("repairs", []):
+        if not isinstance(row, dict):
+            raise DataError(f"damaged metadata: {row!r} is no repair", path="repairs")
+    if metadata.get("clock", "shared") not in ("run", "shared"):
+        raise DataError(f"damaged metadata: clock is {metadata['clock']!r}, must be 'run' or 'shared'", path="clock")
 
 
 def _check_column(name: str, column: pd.Series[Any]) -> None:
@@ -225,7 +247,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column."""
     try:
         table = pyarrow.parquet.read_table(file)
-    except pyarrow.ArrowInvalid:
+    except (pyarrow.ArrowException, ValueError, TypeError):
         raise DataError("not a Parquet file: make one from a log with `shipid data import`", file=file) from None
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror or 'no such file'})", file=file) from None
@@ -236,5 +258,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
         return Dataset(table.to_pandas(), json.loads(stored))
     except DataError as error:
         raise DataError(error.message, file=file, path=error.path) from None
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise DataError(f"damaged metadata: {error}", file=file) from None
+    except (pyarrow.ArrowException, TypeError, KeyError, AttributeError, OverflowError) as error:
+        raise DataError(f"damaged table: {error}", file=file) from None

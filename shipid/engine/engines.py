@@ -7,15 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 from shipid.engine.adjoint import Adjoint, Loss, gradient_native
 from shipid.engine.casadi import run_casadi
 from shipid.engine.integrate import Array, Batch, Job
-from shipid.engine.native import compiler, measure_native, run_native
+from shipid.engine.libraries import NoLibrary
+from shipid.engine.native import compiler, measure_native, refuse, run_native
 from shipid.errors import ShipidError, choices
 from shipid.vessel.dynamics import Dynamics
 
-AUTO = "auto"
+AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many calls follow that compiling pays
+Result = TypeVar("Result")
 COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
 COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
@@ -100,8 +103,8 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 
 
 def named(name: str, device: str) -> Engine | None:
-    """The engine with a name; None for `auto`. ShipidError for an unknown name or an unsupported device."""
-    if name == AUTO:
+    """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
+    if name in (AUTO, REPEATED):
         return None
     if name not in ENGINES:
         raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
@@ -112,21 +115,33 @@ def named(name: str, device: str) -> Engine | None:
     return engine
 
 
-def chosen(batch: Batch, job: Job) -> Engine:
-    """The engine that `auto` selects for a rollout, by its size and the available engines."""
+def chosen(batch: Batch, job: Job, repeated: bool = False) -> Engine:
+    """The engine that `auto` selects for a rollout, by its size and the available engines; or that `repeated` does."""
     weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
     width = batch.state.shape[1] * len(batch.parameters)
-    load = Load(job.num_steps * width * (4 if job.method == "rk4" else 1) * weight, width, job.device)
+    work = job.num_steps * width * (4 if job.method == "rk4" else 1) * weight
+    load = Load(max(work, 2 * NATIVE_FROM) if repeated else work, width, job.device)
     return next(engine for engine in ENGINES.values() if engine.preferred(load) and engine.available())
 
 
-def differentiable(name: str, device: str) -> Engine:
-    """The engine with a name, for gradients; for `auto` the first that has gradients. ShipidError if it has none."""
+def done_by(asked: Engine | None, choose: Callable[[], Engine], work: Callable[[Engine], Result]) -> Result:
+    """Result of the engine that was asked for; else of the chosen one, or of another where it cannot compile here."""
+    if asked is not None:
+        return work(asked)
+    try:
+        return work(choose())
+    except NoLibrary as error:
+        refuse(error.message)
+        return work(choose())
+
+
+def differentiable(name: str, device: str) -> Callable[[], Engine]:
+    """Give the engine with a name, for gradients; for `auto` the first available. ShipidError if it has no gradient."""
     engine = named(name, device)
     able = {key: entry for key, entry in ENGINES.items() if entry.gradient is not None}
     if engine is None:
-        fit = (entry for entry in able.values() if entry.available() and (device == "cpu" or entry.any_device))
-        return next(fit)
+        fit = [entry for entry in able.values() if device == "cpu" or entry.any_device]
+        return lambda: next(entry for entry in fit if entry.available())
     if engine.gradient is None:
         raise ShipidError(f"engine {name!r} has no gradient: use {' or '.join(map(repr, able))}")
-    return engine
+    return lambda: engine

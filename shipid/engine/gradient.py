@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipid.engine.adjoint import Loss
-from shipid.engine.engines import differentiable
+from shipid.engine.adjoint import Adjoint, Loss
+from shipid.engine.engines import AUTO, Engine, differentiable, done_by
 from shipid.engine.integrate import Array, Job, Method
 from shipid.engine.rollout import SPEED_LIMIT, channels, finite, places, prepared
 from shipid.errors import ShipidError, choices
@@ -87,9 +87,14 @@ def rollout_gradient(
         raise ShipidError(f"{vessel.name} has no parameter {wrong!r}: {choices(wrong, model.parameters)}")
     order = {name: place for place, name in enumerate(model.parameters)}
     job = Job(step, num_steps, method, 1, places(keep, channels(model), vessel), device)
+    wanted = tuple(order[name] for name in names)
+
+    def gradient(engine: Engine) -> Adjoint:
+        assert engine.gradient is not None
+        return engine.gradient(model, batch, job, wanted, loss)
+
     with np.errstate(all="ignore"):
-        assert way.gradient is not None
-        adjoint = way.gradient(model, batch, job, tuple(order[name] for name in names), loss)
+        adjoint = done_by(None if engine == AUTO else way(), way, gradient)
     return Gradient(
         loss=adjoint.loss,
         parameters=adjoint.parameters.T,

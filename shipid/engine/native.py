@@ -6,17 +6,17 @@ in the user's cache (XDG_CACHE_HOME) under the digest of source, compiler and pr
 
 from __future__ import annotations
 
-import atexit
 import ctypes
 import hashlib
+import logging
 import os
 import platform
 import shutil
-import subprocess
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import product
@@ -26,11 +26,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
+from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
-from shipid.errors import ShipidError
 from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
 from shipid.vessel.dynamics import Dynamics
+
+log = logging.getLogger(__name__)
 
 OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w")  # of the C compiler
 _CALLS = {
@@ -97,16 +100,54 @@ class Target:
 
 
 @cache
-def compiler() -> str | None:
-    """Path of a C compiler that can build a shared library; None if there is none."""
-    trial = "#include <math.h>\ndouble probe(double x) { return sin(x); }"
+def _probed() -> tuple[str, bytes] | None:
+    """Path of a C compiler that can build a shared library, and a library that it built; None if there is none."""
+    trial = "#include <math.h>\ndouble run(double x) { return sin(x); }"
+    tried: set[str] = set()
     for name in ("gcc", "cc", "clang"):
         command = shutil.which(name)
-        if command is not None:
-            with tempfile.TemporaryDirectory() as folder:
-                if _compile(command, trial, Path(folder) / "probe.so", Target(1, (), "")) is None:
-                    return command
+        if command is None or os.path.realpath(command) in tried:
+            continue
+        tried.add(os.path.realpath(command))
+        with suppress(OSError), tempfile.TemporaryDirectory() as folder:
+            library = Path(folder) / "probe.so"
+            failure = build(_command(command, Target(1, (), "")), trial, library, PROBE_LIMIT)
+            if failure is None:
+                return command, library.read_bytes()
+            log.warning("the C compiler %s cannot be used (%s)", command, failure.splitlines()[0])
     return None
+
+
+_refused: list[str] = []  # why this process compiles no more, if so
+
+
+def compiler() -> str | None:
+    """Path of a C compiler whose libraries can be kept and loaded here; None if there is none."""
+    probed = None if _refused else _probed()
+    return None if probed is None or _folder() is None else probed[0]
+
+
+def engine() -> str:
+    """What computes rollouts on this machine: the native engine with its compiler and vectors, or CasADi."""
+    command = compiler()
+    if command is None:
+        return "casadi"
+    version = (compiler_version(command).splitlines() or ["?"])[0]
+    return f"native, {version}, {target().lanes} lanes"
+
+
+def refuse(reason: str) -> None:
+    """Say once that this process compiles no more, and why: from now on there is no compiler."""
+    if not _refused:
+        log.warning("engine 'native' is not used, others are slower: %s", reason)
+    _refused.append(reason)
+
+
+def _folder() -> Path | None:
+    """Folder of compiled libraries in the user's cache; None if none can be loaded here."""
+    probed = _probed()
+    wanted = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return None if probed is None else libraries.folder(wanted, probed[1])
 
 
 @cache
@@ -132,34 +173,22 @@ def target() -> Target:
     if command is None or not best.prefix:
         return best
     probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
+    probe += f"V run(V x) {{ return {best.prefix}v_tanh(x); }}"
     with tempfile.TemporaryDirectory() as folder:
-        linked = _compile(
-            command, probe + f"V probe(V x) {{ return {best.prefix}v_tanh(x); }}", Path(folder) / "p.so", best
-        )
-    return best if linked is None else Target(best.lanes, best.flags, "")
+        failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
+    return best if failure is None else Target(best.lanes, best.flags, "")
 
 
-def _compile(command: str, source: str, library: Path, wanted: Target) -> str | None:
-    """Compile C source into a shared library; the message of the compiler if it fails, else None.
-
-    command : path of the compiler. The library is written atomically.
-    """
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
-        text.write_text(source, encoding="utf-8")
-        mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-        arguments = [command, *OPTIONS, *wanted.flags, str(text), "-o", str(fresh), *mvec, "-lm"]
-        result = subprocess.run(arguments, capture_output=True, text=True)
-        if result.returncode:
-            return result.stderr.strip() or "it gave no reason"
-        os.replace(fresh, library)
-    return None
+def _command(command: str, wanted: Target) -> list[str]:
+    """Command that compiles `{source}` into the shared library `{library}`."""
+    mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
+    return [command, *OPTIONS, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
 
 
 @cache
-def _version(command: str) -> str:
+def compiler_version(command: str) -> str:
     """Version text of a compiler."""
-    return subprocess.run([command, "--version"], capture_output=True, text=True).stdout
+    return run_compiler([command, "--version"], limit=PROBE_LIMIT)[1]
 
 
 def _vector_functions(wanted: Target) -> str:
@@ -348,20 +377,6 @@ for (long front = first; front < last; front += {block}) {{
 """
 
 
-@cache
-def _folder(wanted: str) -> Path:
-    """Folder of compiled libraries: the user's cache if it is writable, else a temporary folder of this process."""
-    folder = Path(wanted) / "shipid"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        temporary = tempfile.TemporaryDirectory(prefix="shipid-")
-        atexit.register(temporary.cleanup)
-        return Path(temporary.name)
-
-
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method) -> Any:
     """The compiled function `run` of a model, from the cache if possible."""
@@ -369,35 +384,39 @@ def _library(model: Dynamics, step: float, method: Method) -> Any:
 
 
 def compiled_for(source: Callable[[], str]) -> Any:
-    """The compiled function `run` of C source; ShipidError if there is no compiler or it fails."""
+    """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
     if compiler() is None:
-        raise ShipidError("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
+        raise NoLibrary("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
     try:
         return compiled(source())
-    except ShipidError as error:
-        raise ShipidError(f"{error.message}: use engine 'torch'") from None
+    except NoLibrary as error:
+        raise NoLibrary(f"{error.message}: use engine 'torch'") from None
 
 
 def compiled(source: str) -> Any:
-    """The compiled function `run` of C source, from the cache if possible; ShipidError if the compiler fails."""
-    command = compiler()
-    assert command is not None
-    words = "\n".join([source, *OPTIONS, command, _version(command), platform.machine(), *sorted(_processor())])
-    folder = _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
-    library = folder / f"{hashlib.sha256(words.encode()).hexdigest()[:24]}.so"
+    """The compiled function `run` of C source, from the cache if possible.
+
+    A library in the cache that is damaged or may be another user's is not loaded but compiled anew. NoLibrary if the
+    compiler fails or hangs, or where nothing can be written.
+    """
+    command, folder = compiler(), _folder()
+    if command is None or folder is None:
+        raise NoLibrary("there is no C compiler")
+    words = [source, *OPTIONS, command, compiler_version(command), platform.machine(), *sorted(_processor())]
+    library = folder / f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
     try:
-        return _loaded(library)
-    except OSError:  # not there, or not whole
-        failure = _compile(command, source, library, target())
+        return load(library)
+    except OSError:
+        pass  # not there
+    except NoLibrary as error:
+        log.warning("%s: compiled anew", error.message)
+    failure = build(_command(command, target()), source, library)
     if failure is not None:
-        raise ShipidError(f"the C compiler failed ({failure.splitlines()[0]})")
-    return _loaded(library)
-
-
-def _loaded(library: Path) -> Any:
-    run = ctypes.CDLL(str(library)).run
-    run.restype = None
-    return run
+        raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")
+    try:
+        return load(library)
+    except OSError as error:
+        raise NoLibrary(f"{library} is gone ({error.strerror})") from None
 
 
 def head(wanted: Target) -> str:

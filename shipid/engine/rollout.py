@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipid.engine.engines import chosen, named
+from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
 from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
@@ -77,7 +77,8 @@ def rollout(
     helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
     engine : `native` (C on SIMD vectors and threads), `casadi` (its virtual machine, sample by sample), `torch`
-        (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is.
+        (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is; `repeated` is
+        `auto` where so many calls follow that compiling pays for any size.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
     """
     asked = named(engine, device)
@@ -89,7 +90,9 @@ def rollout(
     kept = tuple(names if keep is None else keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
     with np.errstate(all="ignore"):
-        records, worst = (asked or chosen(batch, job)).run(model, batch, job)
+        records, worst = done_by(
+            asked, lambda: chosen(batch, job, engine == REPEATED), lambda way: way.run(model, batch, job)
+        )
     return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~finite(batch), step * every)
 
 
@@ -133,7 +136,13 @@ def distances(
     model, batch = prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
     rows = model.state.index("north"), model.state.index("east")
     job = Job(step, num_steps, method, 1, rows, device)
-    way = asked or chosen(batch, job)
+    return done_by(
+        asked, lambda: chosen(batch, job, engine == REPEATED), lambda way: _distances(way, model, batch, job, goal)
+    )
+
+
+def _distances(way: Engine, model: Dynamics, batch: Batch, job: Job, goal: Array) -> Distances:
+    """Distances by one engine."""
     if way.measure is not None:
         total, counts, worst = way.measure(model, batch, job, goal.transpose(0, 2, 1))
         return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~finite(batch))

@@ -23,8 +23,10 @@ from shipid.hybrid.features import Inputs, Memory, choose_features
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Probability, Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, points_of, row_of, sound, taken, used
+from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
+from shipid.hybrid.units import taken
 
 Array = NDArray[np.float64]
 LEAF = -1  # the child of a node that has none
@@ -169,35 +171,32 @@ class Forest(Searched):
         self._grower(1, 1.0, 0)  # say at once if scikit-learn is missing
         inputs = Inputs(task.commands, self.memory)
         tables = shared_tables(task, inputs)
-        found = {}
-        for count, name in enumerate(task.cases):
-            healthy = sound(task, name)
-            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
 
     def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
         from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
 
-        begin = time.perf_counter()
+        search = Search(task, [name], self)
         targets, paths = task.targets[name], task.cases[name].paths
         basis = smooth_basis(task.windows.horizon, self.terms)
         weights = np.tensordot(basis.T, targets, 1)  # (r, S, 2)
-        physics, rows = task.cases[name].physics, list[dict[str, Any]]()
-        for number, point in enumerate(points_of(self)):
-            start, losses = time.perf_counter(), []
+        physics = task.cases[name].physics
+        for number, point in search.left(points_of(self)):
+            start, losses = time.process_time(), []
             seed = seed_of(task.seed, number)
             for training, validation in task.folds:
                 grown = self._grown(inputs, table, weights, basis, training, point, seed)
                 judged = task.instants(name).select(validation)
                 predicted = grown.predict(physics, judged, paths[:, validation])
                 losses.append(mean_square(predicted, task.windows.future[:, validation]))
-            rows.append(row_of(number, point, float(np.mean(losses)), start))
-        best = min(rows, key=lambda row: row["value"])
+            search.record({name: row_of(number, point, float(np.mean(losses)), start)})
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        best = best_of(rows)[0]
         seed = seed_of(task.seed, best["number"])
         grown = self._grown(inputs, table, weights, basis, used(task), best["params"], seed)
-        return Fitted(grown, rows, time.perf_counter() - begin)
+        return Fitted(grown, rows, search.seconds)
 
     def _grown(
         self,

@@ -5,73 +5,121 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
-from typing import Any, ClassVar, Protocol
+from itertools import count
+from math import inf, isfinite, nan
 
 import numpy as np
 import optuna
-from optuna.trial import Trial, TrialState
+from optuna.trial import TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
-from shipid.hybrid.features import Inputs, Memory, choose_features
-from shipid.hybrid.method import Array, Fitted, Index, Task, same_table, shared_tables
+from shipid.hybrid.features import Inputs, choose_features
+from shipid.hybrid.journal import distributions, frozen
+from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.training import Settings, train
+from shipid.hybrid.trials import best_of
 
 Parameters = dict[str, float]
 
 
-class Trained(Protocol):
-    """Settings of the search, see `shipid.hybrid.path_trained.PathTrained`."""
-
-    SEARCHED: ClassVar[tuple[str, ...]]
-    COUNTS: ClassVar[tuple[str, ...]]
-    LOGARITHMIC: ClassVar[tuple[str, ...]]
-
-    @property
-    def trials(self) -> int: ...  # noqa: D102
-    @property
-    def epochs(self) -> int: ...  # noqa: D102
-    @property
-    def batch(self) -> int: ...  # noqa: D102
-    @property
-    def patience(self) -> int: ...  # noqa: D102
-    @property
-    def memory(self) -> Memory: ...  # noqa: D102
-    def ranges(self) -> dict[str, tuple[float, float]]: ...  # noqa: D102
-
-
-def tune_gradient(task: Task, method: Trained) -> dict[str, Fitted]:
+def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
-    best trial. Foundations with the same inputs and the same architecture in a trial train as one stack.
+    best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
+    a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
     """
-    inputs = Inputs(task.commands, method.memory)
-    tables = shared_tables(task, inputs)
-    outputs = {key: flatten(paths) for key, paths in task.targets.items()}
-    data = {key: [_prepare(tables[key], training, validation) for training, validation in task.folds] for key in tables}
-    runs = {key: _Run(_study(seed_of(task.seed, key))) for key in outputs}
-
-    for number in range(method.trials):
-        trials = {key: run.study.ask() for key, run in runs.items()}
-        asked = {key: _suggest(trial, method) for key, trial in trials.items()}
-        for stack in _stacks(asked, tables, method.COUNTS):
-            start = time.perf_counter()
-            some = next(iter(stack))
-            results = [
-                _fit(fold, {key: outputs[key] for key in stack}, stack, method, (task.seed, number, i), task.device)
-                for i, fold in enumerate(data[some])
-            ]
-            seconds = (time.perf_counter() - start) / len(stack)
+    trainer = _Trainer(task, method)
+    names = list(task.cases)
+    search = Search(task, names, method)
+    studies = {key: _study(search.rows[key], method) for key in names}
+    best = {key: _Best() for key in names}
+    for number, _ in search.left(count()):
+        trials = {}
+        for key, study in studies.items():
+            study.sampler = _sampler(seed_of(task.seed, key, number))
+            trials[key] = study.ask(distributions(method.space()))
+        fixed = {name: getattr(method, name) for name in method.SEARCHED}
+        asked: dict[str, Parameters] = {key: fixed | trial.params for key, trial in trials.items()}
+        rows: dict[str, Row] = {}
+        for stack in trainer.stacks(asked):
+            start = time.process_time()
+            results = trainer.train(stack, number)
+            seconds = (time.process_time() - start) / len(stack)
             for key, parameters in stack.items():
-                runs[key].record(parameters, [result[key] for result in results], seconds)
-        for key, run in runs.items():
-            run.tell(trials[key])
+                rows[key] = _row(number, parameters, results[key], seconds)
+                best[key].consider(rows[key], results[key])
+        for key, trial in trials.items():
+            if rows[key]["state"] == "complete":
+                studies[key].tell(trial, rows[key]["value"])
+            else:
+                studies[key].tell(trial, state=TrialState.FAIL)
+        search.record({key: rows[key] for key in names})
         if task.on_trial is not None:
-            task.on_trial(number + 1, method.trials)
+            task.on_trial(number + 1, search.count or number + 1)
+    return {key: trainer.fitted(key, search, best[key]) for key in names}
 
-    return {key: run.fitted(inputs) for key, run in runs.items()}
+
+@dataclass
+class _Best:
+    """The networks of the best trial that was trained here; none at first."""
+
+    number: int = -1
+    value: float = inf
+    networks: tuple[Network, ...] = ()
+
+    def consider(self, row: Row, results: Sequence[_Result]) -> None:
+        if row["state"] == "complete" and row["value"] < self.value:
+            self.number, self.value = row["number"], row["value"]
+            self.networks = tuple(result.network for result in results)
+
+
+class _Trainer:
+    """What all trials share: inputs, targets and folds."""
+
+    def __init__(self, task: Task, method: PathTrained) -> None:
+        self.task, self.method = task, method
+        self.inputs = Inputs(task.commands, method.memory)
+        self.tables = shared_tables(task, self.inputs)
+        self.outputs = {key: flatten(paths) for key, paths in task.targets.items()}
+        self.data = {
+            key: [_prepare(table, training, validation) for training, validation in task.folds]
+            for key, table in self.tables.items()
+        }
+
+    def stacks(self, asked: Mapping[str, Parameters]) -> list[dict[str, Parameters]]:
+        """Group models by inputs and architecture, in the order of their first member."""
+        stacks: dict[tuple[object, ...], dict[str, Parameters]] = {}
+        for key, parameters in asked.items():
+            alike = (same_table(self.tables[key]), *(parameters[name] for name in self.method.COUNTS))
+            stacks.setdefault(alike, {})[key] = parameters
+        return list(stacks.values())
+
+    def train(self, stack: Mapping[str, Parameters], number: int) -> dict[str, list[_Result]]:
+        """Train the networks of a stack in a trial: model -> a result of each fold."""
+        outputs = {key: self.outputs[key] for key in stack}
+        folds = [
+            _fit(fold, outputs, stack, self.method, (self.task.seed, number, i), self.task.device)
+            for i, fold in enumerate(self.data[next(iter(stack))])
+        ]
+        return {key: [results[key] for results in folds] for key in stack}
+
+    def fitted(self, key: str, search: Search, best: _Best) -> Fitted:
+        """The networks of the best trial; those of an earlier session are trained once more, in the same stack."""
+        rows = search.rows[key]
+        seconds = sum(row["seconds"] for row in rows)
+        kept = best_of(rows)
+        if not kept:
+            return Fitted(None, rows, seconds)
+        number, networks = kept[0]["number"], best.networks
+        if number != best.number:
+            asked = {name: mine[number]["params"] for name, mine in search.rows.items()}
+            stack = next(stack for stack in self.stacks(asked) if key in stack)
+            networks = tuple(result.network for result in self.train(stack, number)[key])
+        return Fitted(Compensator(self.inputs, networks, kept[0]["params"]), rows, seconds)
 
 
 @dataclass(frozen=True)
@@ -95,37 +143,11 @@ class _Result:
     status: str
 
 
-class _Run:
-    """The study of one model: its rows and its best networks so far."""
-
-    def __init__(self, study: optuna.Study) -> None:
-        self.study = study
-        self.rows: list[dict[str, Any]] = []
-        self.seconds = 0.0
-        self.best_value = inf
-        self.best_parameters: Parameters = {}
-        self.best_networks: tuple[Network, ...] = ()
-
-    def record(self, parameters: Parameters, results: Sequence[_Result], seconds: float) -> None:
-        value = float(np.mean([result.loss for result in results]))
-        complete = isfinite(value) and all(result.status == "ok" for result in results)
-        row = {"number": len(self.rows), "params": parameters, "value": value, "seconds": seconds}
-        row |= {"epochs": max(r.epochs for r in results), "state": "complete" if complete else "diverged"}
-        self.rows.append(row)
-        self.seconds += seconds
-        if complete and value < self.best_value:
-            self.best_value, self.best_parameters = value, parameters
-            self.best_networks = tuple(result.network for result in results)
-
-    def tell(self, trial: Trial) -> None:
-        if self.rows[-1]["state"] == "complete":
-            self.study.tell(trial, self.rows[-1]["value"])
-        else:
-            self.study.tell(trial, state=TrialState.FAIL)
-
-    def fitted(self, inputs: Inputs) -> Fitted:
-        found = Compensator(inputs, self.best_networks, self.best_parameters) if self.best_networks else None
-        return Fitted(found, self.rows, self.seconds)
+def _row(number: int, parameters: Parameters, results: Sequence[_Result], seconds: float) -> Row:
+    value = float(np.mean([result.loss for result in results]))
+    complete = isfinite(value) and all(result.status == "ok" for result in results)
+    row = {"number": number, "params": parameters, "value": value if complete else nan, "seconds": seconds}
+    return row | {"epochs": max(r.epochs for r in results), "state": "complete" if complete else "diverged"}
 
 
 def _prepare(table: Mapping[str, Array], training: Index, validation: Index) -> _Data:
@@ -140,7 +162,7 @@ def _fit(
     data: _Data,
     targets: Mapping[str, Array],
     stack: Mapping[str, Parameters],
-    method: Trained,
+    method: PathTrained,
     entropy: tuple[int, ...],
     device: str,
 ) -> dict[str, _Result]:
@@ -180,30 +202,15 @@ def _fit(
     }
 
 
-def _stacks(
-    asked: Mapping[str, Parameters], tables: Mapping[str, Mapping[str, Array]], counts: Sequence[str]
-) -> list[dict[str, Parameters]]:
-    """Group models by inputs and architecture, in the order of their first member."""
-    stacks: dict[tuple[object, ...], dict[str, Parameters]] = {}
-    for key, parameters in asked.items():
-        alike = (same_table(tables[key]), *(parameters[name] for name in counts))
-        stacks.setdefault(alike, {})[key] = parameters
-    return list(stacks.values())
-
-
-def _study(seed: int) -> optuna.Study:
-    """Make a study in memory with TPE as the paper's Optuna had it: later defaults differ."""
+def _study(rows: Sequence[Row], method: PathTrained) -> optuna.Study:
+    """Make a study in memory that knows the trials so far."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
-    return optuna.create_study(direction="minimize", sampler=sampler)
+    study = optuna.create_study(direction="minimize")
+    where = distributions(method.space())
+    study.add_trials([frozen(row, where) for row in rows])
+    return study
 
 
-def _suggest(trial: Trial, method: Trained) -> Parameters:
-    """Take each hyperparameter from the trial where the method has a range, else from the method."""
-    parameters: Parameters = {name: getattr(method, name) for name in method.SEARCHED}
-    for name, (low, high) in method.ranges().items():
-        if name in method.COUNTS:
-            parameters[name] = trial.suggest_int(name, int(low), int(high))
-        else:
-            parameters[name] = trial.suggest_float(name, low, high, log=name in method.LOGARITHMIC)
-    return parameters
+def _sampler(seed: int) -> optuna.samplers.TPESampler:
+    """TPE as the paper's Optuna had it: later defaults differ."""
+    return optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)

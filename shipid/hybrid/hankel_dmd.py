@@ -25,9 +25,11 @@ from shipid.hybrid.features import MOTIONS, choose_features, feature_table, step
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.search import Search
+from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import diverged, mean_square, ridges_of, row_of, solve, some_of, sound, taken, used
+from shipid.hybrid.trials import best_of, fit_each, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.units import solve, taken
 
 Array = NDArray[np.float64]
 MISSED = ("missed.u", "missed.v", "missed.r")
@@ -168,6 +170,7 @@ class HankelDMD(Searched):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
     RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: tuple[PositiveFloat, ...] = (2.0, 4.0, 8.0)
@@ -184,42 +187,37 @@ class HankelDMD(Searched):
         """Return the names of the hyperparameters that differ between trials."""
         return ("delays", *self.ranges())
 
+    def choices(self) -> dict[str, tuple[float, ...]]:
+        """Return what is searched among some values: the delays."""
+        return {"delays": self.delays}
+
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve the law for every foundation; the best delays and ridge, solved with all windows, are the corrector."""
-        found = {}
-        for count, name in enumerate(task.cases):
-            points = [{"delays": delays} for delays in self.delays]
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points)
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        points = [{"delays": delays} for delays in self.delays]
+        return fit_each(task, self, lambda: points, lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin = time.perf_counter()
+        search = Search(task, [name], self)
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
-        rows: list[dict[str, Any]] = []
-        for number, seconds in enumerate(self.delays):
-            start = time.perf_counter()
+        for number, seconds in search.left(self.delays):
+            start = time.process_time()
             table = _true_table(task, name, steps, steps_of(seconds, task.windows.step))
-            errors = np.zeros(len(ridges))
-            for fold, (training, validation) in enumerate(task.folds):
-                law = self._law(task, table, steps, steps.of(training), seconds, ridges)
-                judged = some_of(validation, self.samples, seed_of(task.seed, fold))
-                instants = task.instants(name).select(np.tile(judged, len(ridges)))
-                found = HankelCorrector(law, seconds, {}).predict(task.cases[name].physics, instants, np.empty(0))
-                future = task.windows.future[:, judged]
-                errors += [mean_square(path, future) for path in np.split(found, len(ridges), axis=1)]
-            best = int(errors.argmin())
-            value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {"delays": seconds, "ridge": ridges[best]}, value, start))
-        complete = [row for row in rows if row["state"] == "complete"]
-        if not complete:
-            return Fitted(None, rows, time.perf_counter() - begin)
-        params = min(complete, key=lambda row: row["value"])["params"]
+
+            def solved(
+                training: Index, table: Mapping[str, Array] = table, seconds: float = seconds
+            ) -> HankelCorrector:
+                return HankelCorrector(self._law(task, table, steps, steps.of(training), seconds, ridges), seconds, {})
+
+            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
+            search.record({name: row_of(number, {"delays": seconds, "ridge": ridge}, value, start)})
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        params = best_of(rows)[0]["params"]
         table = _true_table(task, name, steps, steps_of(params["delays"], task.windows.step))
         law = self._law(task, table, steps, steps.of(used(task)), params["delays"], [params["ridge"]])
         corrector = HankelCorrector(replace(law, weights=law.weights[0]), params["delays"], params)
-        return Fitted(corrector, rows, time.perf_counter() - begin)
+        return Fitted(corrector, rows, search.seconds)
 
     def _law(
         self,

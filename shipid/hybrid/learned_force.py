@@ -22,9 +22,11 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
-from shipid.hybrid.units import solve, used
+from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
+from shipid.hybrid.units import solve
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -106,29 +108,23 @@ class LearnedForce(Searched):
 
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""
-        return (
-            [self.ridge]
-            if isinstance(self.ridge, float)
-            else [float(r) for r in np.geomspace(*self.ridge, self.trials)]
-        )
+        return ridges_of(self.ridge, self.trials)
 
     def _fit(self, task: Task, name: str) -> Fitted:
         case, instants, future = task.cases[name], task.instants(name), task.windows.future
-        if not np.isfinite(case.paths).all():
-            blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-            return Fitted(
-                None, [{"number": i, "params": {"ridge": r}, **blank} for i, r in enumerate(self.ridges())], 0.0
-            )
-        begin = time.perf_counter()
+        if not sound(task, name):
+            return diverged(self, ({"ridge": ridge} for ridge in self.ridges()))
+        search = Search(task, [name], self, again=True)  # a trial starts from the one before
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        everything, steps = used(task), true_steps(task, name)
-        trials: list[dict[str, Any]] = []
-        best = (np.inf, self.ridges()[0])
+        measured = replace(
+            case, physics=replace(case.physics, observer=None)
+        )  # single steps start from measured states
+        everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
         starts: dict[int, Array | None] = {}
-        for number, ridge in enumerate(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
-            start, losses, most = time.perf_counter(), [], 0
+        for number, ridge in search.left(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
+            start, losses, most = time.process_time(), [], 0
             for fold, (training, validation) in enumerate(task.folds):
                 seed = seed_of(task.seed, name, fold)
                 trainer = self._trainer(task, name, instants, future, training, steps, seed)
@@ -136,18 +132,17 @@ class LearnedForce(Searched):
                 starts[fold], most = weights, max(most, count)
                 losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
             value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
-            state = "complete" if np.isfinite(value) else "diverged"
-            trials.append({"number": number, "params": {"ridge": ridge}, "value": value, "state": state})
-            trials[-1] |= {"epochs": most, "seconds": time.perf_counter() - start}
-            best = min(best, (value, ridge)) if np.isfinite(value) else best
+            search.record({name: row_of(number, {"ridge": ridge}, value, start, most)})
             if task.on_trial is not None:
                 task.on_trial(number + 1, len(self.ridges()))
-        if not np.isfinite(best[0]):
-            return Fitted(None, trials, time.perf_counter() - begin)
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        ridge = min((row["value"], row["params"]["ridge"]) for row in best_of(rows))[1]
         trainer = self._trainer(task, name, instants, future, everything, steps, seed_of(task.seed, name))
-        weights, _ = trainer.solve(best[1], None)
-        corrector = ForceCorrector(trainer.block(weights), {"ridge": best[1]})
-        return Fitted(corrector, trials, time.perf_counter() - begin)
+        weights, _ = trainer.solve(ridge, None)
+        corrector = ForceCorrector(trainer.block(weights), {"ridge": ridge})
+        return Fitted(corrector, rows, search.seconds)
 
     def _trainer(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, Self
@@ -60,6 +61,26 @@ class Case:
     paths: Array
 
 
+Row = dict[str, Any]
+Space = Mapping[str, Any]
+
+
+class Journal(Protocol):
+    """A record of searches on disk, see `shipid.hybrid.journal`."""
+
+    def rows(self, cell: str) -> list[Row]:
+        """Return the trials of a search that ended, in order."""
+
+    def count(self, cell: str) -> int | None:
+        """Return how many trials a search by budget was found to have."""
+
+    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
+        """Append trials to searches: cell -> rows, each with the next number."""
+
+    def decide(self, cells: Sequence[str], count: int) -> None:
+        """Write how many trials some searches have."""
+
+
 @dataclass(frozen=True)
 class Task:
     """What a method is fitted to: foundations on the same windows.
@@ -76,6 +97,8 @@ class Task:
     estimates : foundation -> what its observer knows at the instants (S,), where it has one.
     on_trial : called with (trials done, trials in all) after each trial.
     device : a PyTorch device.
+    journal : where searches are written as they go and read back; without one they are kept in memory.
+    cells : foundation -> name of its search in the journal.
     """
 
     cases: Mapping[str, Case]
@@ -88,6 +111,8 @@ class Task:
     estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     on_trial: Callable[[int, int], None] | None = None
     device: str = "cpu"
+    journal: Journal | None = None
+    cells: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if any(len(part) == 0 for fold in self.folds for part in fold):
@@ -112,19 +137,24 @@ class Fitted:
     trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
         (`complete` or `diverged`).
     seconds : time spent on this foundation, its share of what is done for several at once.
+    left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
+        window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where
+        the method has them only from further fits: `shipid.hybrid.refits`.
     """
 
     corrector: Corrector | None
     trials: list[dict[str, Any]]
     seconds: float
+    left_out: Array | None = None
 
 
-class Method(BaseModel):
+class Method(BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
     compensates : whether anything is learned from data.
     meets_none : whether it works without physics.
+    meets_observer : whether it starts from the filtered state of physics with an observer, under the slow force.
     corrector : the class that a saved predictor is rebuilt with.
     """
 
@@ -132,6 +162,7 @@ class Method(BaseModel):
     validation: ClassVar[str] = "share"
     compensates: ClassVar[bool] = True
     meets_none: ClassVar[bool] = True
+    meets_observer: ClassVar[bool] = True
     corrector: ClassVar[type[Any]]
 
     @property
@@ -147,9 +178,9 @@ class Method(BaseModel):
         """Number of the best trials that make the corrector, at most."""
         return 1
 
+    @abstractmethod
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Fit every foundation of a task; name of the foundation -> result."""
-        raise NotImplementedError
 
 
 def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:

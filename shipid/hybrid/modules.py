@@ -26,23 +26,11 @@ from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import (
-    Seen,
-    Units,
-    diverged,
-    mean_square,
-    part_of,
-    points_of,
-    ridges_of,
-    row_of,
-    solve,
-    some_of,
-    sound,
-    taken,
-    used,
-)
+from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 from shipid.physics import TERMS
 from shipid.vessel.schema import behind, term_blocks
 
@@ -218,6 +206,7 @@ class Modules(Searched):
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6
@@ -234,15 +223,10 @@ class Modules(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
-        found = {}
-        for count, name in enumerate(task.cases):
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin, physics = time.perf_counter(), task.cases[name].physics
+        search, physics = Search(task, [name], self), task.cases[name].physics
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         modules = tuple(modules_of(physics))
         if not modules:
@@ -250,27 +234,22 @@ class Modules(Searched):
                 "the vessel has no hull, thruster or rudder whose factor could be learned", path="modules"
             )
         parts = shares(without(physics), steps.at, steps.free, steps.step)
-        rows: list[dict[str, Any]] = []
-        for number, point in enumerate(points_of(self)):
-            start = time.perf_counter()
-            errors = np.zeros(len(ridges))
-            for fold, (training, validation) in enumerate(task.folds):
-                found = self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
-                judged = some_of(validation, self.samples, seed_of(task.seed, fold))
-                instants = task.instants(name).select(np.tile(judged, len(ridges)))
-                paths = np.split(found.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
-                errors += [mean_square(path, task.windows.future[:, judged]) for path in paths]
-            best = int(errors.argmin())
-            value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
-        complete = [row for row in rows if row["state"] == "complete"]
-        if not complete:
-            return Fitted(None, rows, time.perf_counter() - begin)
-        row = min(complete, key=lambda row: row["value"])
+        for number, point in search.left(points_of(self)):
+            start = time.process_time()
+
+            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> ModulesCorrector:
+                return self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
+
+            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
+            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        row = best_of(rows)[0]
         params = row["params"]
         everything = steps.of(used(task))
         found = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
-        return Fitted(found, rows, time.perf_counter() - begin)
+        return Fitted(found, rows, search.seconds)
 
     def _solved(
         self,

@@ -21,23 +21,11 @@ from shipid.errors import ResultError
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.units import (
-    Seen,
-    Units,
-    diverged,
-    mean_square,
-    part_of,
-    points_of,
-    ridges_of,
-    row_of,
-    solve,
-    some_of,
-    sound,
-    taken,
-    used,
-)
+from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.units import Seen, Units, part_of, solve, taken
 
 Array = NDArray[np.float64]
 
@@ -134,6 +122,7 @@ class OneStep(Searched):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12
@@ -153,37 +142,32 @@ class OneStep(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        found = {}
-        for count, name in enumerate(task.cases):
-            found[name] = self._fit(task, name) if sound(task, name) else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        begin = time.perf_counter()
+        search = Search(task, [name], self)
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         table = feature_table(steps.at.columns, task.commands)
-        rows: list[dict[str, Any]] = []
-        for number, point in enumerate(points_of(self)):
-            start = time.perf_counter()
-            errors = np.zeros(len(ridges))
-            for fold, (training, validation) in enumerate(task.folds):
+        for number, point in search.left(points_of(self)):
+            start = time.process_time()
+
+            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> OneStepCorrector:
                 head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
-                errors += self._errors(task, name, head, some_of(validation, self.samples, seed_of(task.seed, fold)))
-            best = int(errors.argmin())
-            value = float(errors[best]) / len(task.folds)
-            rows.append(row_of(number, {**point, "ridge": ridges[best]}, value, start))
-        kept = sorted((row for row in rows if row["state"] == "complete"), key=lambda row: row["value"])
+                return OneStepCorrector(task.commands, (head,), {})
+
+            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
+            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
+        rows = search.rows[name]
+        kept = best_of(rows)
         if not kept:
-            return Fitted(None, rows, time.perf_counter() - begin)
+            return Fitted(None, rows, search.seconds)
         everything, heads = steps.of(used(task)), []
         for row in kept[: self.averaged]:
             params = row["params"]
             head = self._head(steps, table, everything, params, row["number"], [params["ridge"]], task.seed)
             heads.append(Head(head.units, head.surge[0], head.sway_yaw[0]))
         corrector = OneStepCorrector(task.commands, tuple(heads), kept[0]["params"])
-        return Fitted(corrector, rows, time.perf_counter() - begin)
+        return Fitted(corrector, rows, search.seconds)
 
     def _head(
         self,
@@ -203,11 +187,3 @@ class OneStep(Searched):
         even, odd = units.parts(here)
         surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
         return Head(units, surge, solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:])
-
-    def _errors(self, task: Task, name: str, head: Head, windows: Index) -> Array:
-        """Mean squared error [m^2] per coordinate of the path on some windows, for each ridge."""
-        count = len(head.surge)
-        instants = task.instants(name).select(np.tile(windows, count))
-        paths = OneStepCorrector(task.commands, (head,), {}).predict(task.cases[name].physics, instants, np.empty(0))
-        each = np.split(paths, count, axis=1)
-        return np.array([mean_square(path, task.windows.future[:, windows]) for path in each])

@@ -7,7 +7,7 @@ Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import exp, log
 from typing import Annotated, Any, ClassVar
 
@@ -104,26 +104,29 @@ class PathDrawn(Searched):
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
-        mirror = ("mirror",) if 0 < self.mirror < 1 else ()
-        return (*self.ranges(), *mirror, *(("memory",) if self.choose else ()))
+        return (*self.ranges(), *self.choices())
 
     def num_chosen(self) -> int:
         """Return how many of the best trials make the compensator, at most."""
         return self.averaged
 
-    def points(self) -> list[dict[str, float]]:
-        """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0."""
+    def choices(self) -> dict[str, tuple[float, ...]]:
+        """Return what is searched among some values: the mirror, and which memory is taken."""
+        mirror = {"mirror": (0.0, 1.0)} if 0 < self.mirror < 1 else {}
+        memory = {"memory": tuple(float(i) for i in range(len(self.memories)))} if self.choose else {}
+        return {**mirror, **memory}
+
+    def points(self) -> Iterator[dict[str, float]]:
+        """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0; endless by budget."""
         ranges = {name: pair for name, pair in self.ranges().items() if name != "ridge"}
         fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
-        found = []
-        for number, shares in enumerate(spread(len(ranges) + 1, self.trials)):
+        for number, shares in enumerate(spread(len(ranges) + 1, None if self.budget else self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
                 point["memory"] = float(number % len(self.memories))
             for share, (name, (low, high)) in zip(shares[1:], ranges.items(), strict=True):
                 point[name] = exp(log(low) + share * (log(high) - log(low)))
-            found.append(point)
-        return found
+            yield point
 
     def path(self) -> list[float]:
         """Return the ridges that every trial is solved with, evenly spread by their logarithm."""

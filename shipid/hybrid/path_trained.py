@@ -41,7 +41,7 @@ class PathTrained(Searched):
         "weight_decay",
     )
     COUNTS: ClassVar[tuple[str, ...]] = ("layers", "units")
-    LOGARITHMIC: ClassVar[tuple[str, ...]] = ("learning_rate", "weight_decay")
+    LINEAR: ClassVar[tuple[str, ...]] = ("input_dropout", "hidden_dropout")
     corrector: ClassVar[type[Any]] = Compensator
 
     layers: PositiveInt | tuple[PositiveInt, PositiveInt] = (1, 3)

@@ -60,10 +60,7 @@ class Physics:
         What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see `assumed`.
         """
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
-        columns, zero = instants.columns, np.zeros(len(instants))
-        with np.errstate(invalid="ignore"):  # a diverged path is flagged, and no news to the caller
-            x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
-        return np.stack([x, y], axis=-1), result.diverged
+        return np.stack(_in_frame(instants, north, east), axis=-1), result.diverged
 
     def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = "auto") -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
@@ -73,10 +70,7 @@ class Physics:
         engine : as in `rollout`.
         """
         result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
-        columns, zero = instants.columns, np.zeros(len(instants))
-        origin = columns.get("north", zero), columns.get("east", zero), columns["psi"]
-        with np.errstate(invalid="ignore"):
-            x, y = to_frame(north[:, 0], east[:, 0], *origin)
+        x, y = _in_frame(instants, north[:, 0], east[:, 0])
         return {"x": x, "y": y, **{name: result[name][1:, 0] for name in MOTION}}
 
     def reached(self, instants: Instants) -> dict[str, Array]:
@@ -119,8 +113,7 @@ class Physics:
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""
-        origin = (instants.columns.get(name, np.zeros(len(instants))) for name in ("north", "east", "psi"))
-        goal = np.stack(from_frame(future[..., 0], future[..., 1], *origin), axis=-1)
+        goal = np.stack(from_frame(future[..., 0], future[..., 1], *_origin(instants)), axis=-1)
         if drift is not None:
             goal = goal - self.step * np.arange(1, len(future) + 1)[:, None, None] * drift.T
         return goal
@@ -203,6 +196,19 @@ class Physics:
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
         start = {name: columns.get(name, zero) for name in model.state}
         return start, commands, environment, slow, drift
+
+
+def _origin(instants: Instants) -> tuple[Array, Array, Array]:
+    """Place and heading (S,) at the instants; zero where they are not among the columns."""
+    zero = np.zeros(len(instants))
+    columns = instants.columns
+    return columns.get("north", zero), columns.get("east", zero), columns.get("psi", zero)
+
+
+def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
+    """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged is not finite."""
+    with np.errstate(invalid="ignore"):  # it is flagged, and no news to the caller
+        return to_frame(north, east, *_origin(instants))
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:

@@ -26,8 +26,10 @@ from shipid.hybrid.features import Inputs, Memory, choose_features, feature_tabl
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.units import diverged, mean_square, part_of, points_of, row_of, sound, taken
+from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
+from shipid.hybrid.units import part_of, taken
 
 Array = NDArray[np.float64]
 LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
@@ -222,37 +224,38 @@ class Recurrent(Searched):
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         inputs = Inputs(task.commands, self.memory)
         tables = shared_tables(task, inputs)
-        found = {}
-        for count, name in enumerate(task.cases):
-            healthy = sound(task, name)
-            found[name] = self._fit(task, name, inputs, tables[name]) if healthy else diverged(points_of(self))
-            if task.on_trial is not None:
-                task.on_trial(count + 1, len(task.cases))
-        return found
+        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
 
     def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
         from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
 
-        begin, rows, trained = time.perf_counter(), list[dict[str, Any]](), []
+        search, trained = Search(task, [name], self), dict[int, tuple[GatedNetwork, ...]]()
         basis = smooth_basis(task.windows.horizon, self.terms)
         targets = task.targets[name]
-        for number, point in enumerate(points_of(self)):
-            start, losses, networks, most = time.perf_counter(), [], [], 0
+
+        def networks_of(number: int, point: Mapping[str, float]) -> tuple[tuple[GatedNetwork, ...], int]:
+            """A network of each fold, and the most epochs that one took."""
+            found = []
             for fold, (training, validation) in enumerate(task.folds):
                 seed = seed_of(task.seed, name, number, fold)
-                network, epochs = self._trained(task, name, table, targets, basis, training, validation, point, seed)
+                found.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
+            return tuple(network for network, _ in found), max(epochs for _, epochs in found)
+
+        for number, point in search.left(points_of(self)):
+            start, losses = time.process_time(), []
+            trained[number], most = networks_of(number, point)
+            for network, (_, validation) in zip(trained[number], task.folds, strict=True):
                 here = {key: values[validation] for key, values in table.items()}
                 predicted = network.predict(here, task.instants(name).select(validation), task.commands)
                 losses.append(mean_square(predicted, targets[:, validation]))
-                networks.append(network)
-                most = max(most, epochs)
-            rows.append(row_of(number, point, float(np.mean(losses)), start, most))
-            trained.append(tuple(networks))
-        best = min(rows, key=lambda row: row["value"])
-        if best["state"] != "complete":
-            return Fitted(None, rows, time.perf_counter() - begin)
-        corrector = RecurrentCorrector(inputs, self.past, trained[best["number"]], best["params"])
-        return Fitted(corrector, rows, time.perf_counter() - begin)
+            search.record({name: row_of(number, point, float(np.mean(losses)), start, most)})
+        rows = search.rows[name]
+        if not best_of(rows):
+            return Fitted(None, rows, search.seconds)
+        best = best_of(rows)[0]
+        number, params = best["number"], best["params"]
+        networks = trained[number] if number in trained else networks_of(number, params)[0]  # of an earlier session
+        return Fitted(RecurrentCorrector(inputs, self.past, networks, params), rows, search.seconds)
 
     def _reader(self, task: Task, table: Mapping[str, Array], training: Index) -> Reader:
         """Statistics of the training windows alone."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
 from typing import Annotated, ClassVar, Self
 from zlib import crc32
 
@@ -15,17 +18,34 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
 
 
+@dataclass(frozen=True)
+class Span:
+    """Where a hyperparameter is searched: from low to high, by its logarithm or not, in whole numbers or not."""
+
+    low: float
+    high: float
+    log: bool = True
+    whole: bool = False
+
+
 class Searched(Method):
     """A method that tries sets of hyperparameters and keeps the best by validation.
+
+    SEARCHED : names of the settings that may be ranges. COUNTS : whole numbers. LINEAR : not by their logarithm.
 
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
+    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials are made as fit,
+        by the time that the first ones take (`shipid.hybrid.search`), one at least.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ()
+    COUNTS: ClassVar[tuple[str, ...]] = ()
+    LINEAR: ClassVar[tuple[str, ...]] = ()
 
     trials: PositiveInt = 50
+    budget: PositiveFloat | None = None
 
     @validator(mode="after")
     def _ranges_rise(self) -> Self:
@@ -42,17 +62,30 @@ class Searched(Method):
         """Return the names of the hyperparameters that differ between trials."""
         return tuple(self.ranges())
 
+    def choices(self) -> dict[str, tuple[float, ...]]:
+        """Return what is searched among some values: name -> values."""
+        return {}
 
-def spread(num_dims: int, num_points: int) -> list[list[float]]:
+    def space(self) -> dict[str, Span | tuple[float, ...]]:
+        """Return where each hyperparameter that differs between trials is searched: a span, or some values."""
+        spans = {
+            name: Span(low, high, log=name not in (*self.COUNTS, *self.LINEAR), whole=name in self.COUNTS)
+            for name, (low, high) in self.ranges().items()
+        }
+        return {**spans, **self.choices()}
+
+
+def spread(num_dims: int, num_points: int | None = None) -> Iterator[list[float]]:
     """Spread points evenly over the unit cube, any number of them, the first in the middle: an additive recurrence.
 
     Point k is frac(1/2 + k / phi^j) in dimension j = 1 ... d with phi^(d+1) = phi + 1 (Roberts, "The unreasonable
-    effectiveness of quasirandom sequences", 2018).
+    effectiveness of quasirandom sequences", 2018). Without a number of points it never ends.
     """
     phi = 2.0
     for _ in range(60):  # the fixed point phi = (1 + phi)^(1 / (d + 1)) contracts by at least a half
         phi = (1.0 + phi) ** (1.0 / (num_dims + 1))
-    return [[(0.5 + k / phi**j) % 1.0 for j in range(1, num_dims + 1)] for k in range(num_points)]
+    for k in count() if num_points is None else range(num_points):
+        yield [(0.5 + k / phi**j) % 1.0 for j in range(1, num_dims + 1)]
 
 
 def seed_of(*entropy: int | str) -> int:

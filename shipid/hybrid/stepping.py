@@ -3,7 +3,7 @@
 After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where physics is
 integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a. By `euler`, which errs there by half a
 step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
-Steps start from measured states: an observer of the physics is not used.
+Steps start from measured states: physics with an observer are refused.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.engine.native import compiler
+from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
@@ -35,12 +35,18 @@ class Stepper:
     ----------
     physics : as in a case.
     instants : S instants of prediction; commands are held or planned.
+
+    Raises
+    ------
+    DataError : for physics with an observer.
     """
 
     def __init__(self, physics: Physics, instants: Instants) -> None:
+        if physics.observer is not None:
+            raise DataError("steps start from measured states: physics with an observer cannot be corrected by step")
         self.instants = instants
         self.columns = {name: values for name, values in instants.columns.items() if name in KEPT or "." in name}
-        self.reached = replace(physics, observer=None).reached(instants)
+        self.reached = physics.reached(instants)
 
     def at(self, k: int, motion: Mapping[str, Array]) -> Instants:
         """What holds at the start of step k = 0..T-1, given u, v, r and psi (S,) then."""
@@ -59,8 +65,8 @@ def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
-    engine = "native" if len(at) * physics.horizon > WORTH_COMPILING and compiler() is not None else "auto"
-    found = replace(physics, horizon=1, observer=None).states(at, engine=engine)
+    engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO
+    found = replace(physics, horizon=1).states(at, engine=engine)
     after = np.stack([found[name][0] for name in MOTIONS], axis=1)
     if physics.integrator == "euler":
         return after, None

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, log
 from typing import Any, Self
 
 import numpy as np
@@ -14,9 +12,7 @@ from numpy.typing import NDArray
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import choose_features, group_of
-from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.mirror import reflection as mirror_of
-from shipid.hybrid.settings import Searched, spread
 
 Array = NDArray[np.float64]
 MADE_OF = ("mean", "std", "weight", "offset")
@@ -119,58 +115,3 @@ def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Arr
     product = axes.T @ (scaled.T @ targets) / len(scaled)
     values = np.maximum(values, 0.0)
     return np.stack([axes @ (product / (values + ridge)[:, None]) / scale[:, None] for ridge in ridges])
-
-
-def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> list[dict[str, float]]:
-    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm."""
-    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
-    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
-    return [
-        {**fixed, **{n: exp(log(a) + s * (log(b) - log(a))) for s, (n, (a, b)) in zip(at, ranges.items(), strict=True)}}
-        for at in spread(max(len(ranges), 1), method.trials if ranges else 1)
-        for at in [at[: len(ranges)]]
-    ]
-
-
-def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
-    """Ridges that every trial is solved with, evenly spread by their logarithm."""
-    return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
-
-
-def diverged(points: Sequence[Mapping[str, float]]) -> Fitted:
-    """The result where the physics is not finite: no corrector, every trial diverged."""
-    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(points)], 0.0)
-
-
-def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
-    """The row of a trial that began at `start` by `time.perf_counter`."""
-    state = "complete" if np.isfinite(value) else "diverged"
-    seconds = time.perf_counter() - start
-    return {
-        **{"number": number, "params": dict(params), "value": value},
-        **{"seconds": seconds, "epochs": epochs, "state": state},
-    }
-
-
-def used(task: Task) -> Index:
-    """Indices of the windows that train or validate in any fold."""
-    return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
-
-
-def sound(task: Task, name: str) -> bool:
-    """Whether the physics of a foundation is finite on all windows of the folds."""
-    return bool(np.isfinite(task.cases[name].paths[:, used(task)]).all())
-
-
-def some_of(windows: Index, most: int, seed: int) -> Index:
-    """At most so many of the windows, drawn without replacement, in order."""
-    if len(windows) <= most:
-        return windows
-    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
-
-
-def mean_square(paths: Array, future: Array) -> float:
-    """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
-    value = float(np.square(paths - future).mean())
-    return value if np.isfinite(value) else float("inf")

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[int, float], object]
 TOLERANCE = 1e-10  # relative change of objective and factors at which the search ends
 MOST_EVALUATIONS = 200
+MOST_RESTARTS, STRIDES = 40, 8  # searches after the first; halvings of the Gauss-Newton step between them
+LEFT, RANK = 1e-6, 1e-9  # relative fall of the objective that is worth another search; relative rank of a Jacobian
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
 NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
@@ -169,11 +171,48 @@ class _Search:
             raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
-        """Run the trust region over the free factors; the status: `ok`, `not converged` or `stopped`."""
+        """Run the trust region over the free factors; the status: `ok`, `not converged` or `stopped`.
+
+        Kinks of the equations (|v|, |r|) stop the short steps of a region that has become small, though a long
+        Gauss-Newton step along the valley still goes down. Where one does, the search goes on from there with a fresh
+        region and scale.
+        """
         if self.stops():
             return "stopped"
         if not self.free.any():
             return "ok"
+        word = self._minimise(tolerance, most)
+        for _ in range(MOST_RESTARTS):
+            if word != "ok" or not self._stride():
+                break
+            word = self._minimise(tolerance, most)
+        return word
+
+    def _stride(self) -> bool:
+        """Take the longest Gauss-Newton step, halved again and again, that lowers the objective; False where none does.
+
+        The step is over the free factors that no bound stops. A fall of less than `LEFT` of the objective is none.
+        """
+        begin = self.best
+        free = self.free & ~self.pushed()
+        J = begin.J[:, free]
+        scale = np.linalg.norm(J, axis=0)
+        scale = np.where(scale > 0, scale, 1.0)
+        step = np.linalg.lstsq(J / scale, begin.f, rcond=RANK)[0]
+        worth = LEFT * begin.objective
+        if float(np.square(J / scale @ step).sum()) <= worth:
+            return False
+        for halved in range(STRIDES):
+            factors = begin.factors.copy()
+            factors[free] -= 0.5**halved * step / scale
+            factors = np.clip(factors, self.problem.unknown.low, self.problem.unknown.high)
+            there = evaluate(self.problem, factors, Point(begin.at.nuisances, begin.at.away))
+            if there.objective < begin.objective - worth:
+                self.last = self.best = there
+                return True
+        return False
+
+    def _minimise(self, tolerance: float, most: int) -> str:
         low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
         result = least_squares(
             lambda x: self._at(x).f,

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
-from shipid.engine.native import compiler
+from shipid.engine.libraries import NoLibrary
+from shipid.engine.native import compiler, refuse
 from shipid.errors import DataError, DocumentError
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
@@ -194,9 +195,9 @@ class Predictions:
         seen, self.weight, self.time = (
             np.array(list(each)) for each in zip(*map(self._seen, problem.segments), strict=True)
         )
-        self.native = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and compiler() is not None
-        self.known: Array = pack(known) if self.native else known
-        self.seen: Array = pack(seen) if self.native else seen
+        compiled = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and compiler() is not None
+        self.steps = known, seen
+        self.packed = (pack(known), pack(seen)) if compiled else None
 
     def __len__(self) -> int:
         return len(self.run)
@@ -231,6 +232,16 @@ class Predictions:
         y = np.array([segment.columns[name][at] for name in layout.signals]).T
         return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
 
+    def _run(self, x: Array, fixed: Array) -> Array:
+        """Outputs of all predictions by the compiled library, or by CasADi where they are few or it cannot be made."""
+        if self.packed is not None:
+            try:
+                return run_compiled(self.problem.layout, x, fixed, *self.packed)
+            except NoLibrary as error:
+                refuse(error.message)
+                self.packed = None
+        return run_machine(self.problem.layout, x, fixed, *self.steps)
+
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
         """Initial states (S, nn) from the log, and their derivatives (S, nn, nq) to the nuisances (R, nq) [SI]."""
         model, count = self.problem.model, len(self)
@@ -261,8 +272,7 @@ class Predictions:
         x[:, rows] = 1.0
         fixed = self.problem.fixed(factors, nuisances)[self.run]
         with np.errstate(all="ignore"):
-            run = run_compiled if self.native else run_machine
-            record = run(self.problem.layout, x, fixed, self.known, self.seen)
+            record = self._run(x, fixed)
         r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
         R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).swapaxes(3, 4)
         return Evaluation(r, R.reshape(-1, r.shape[1], R.shape[4])[:count])

@@ -42,7 +42,7 @@ WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.
 }
 
 
-class Identify(BaseModel):
+class Identify(documents.Checked, BaseModel):
     """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
     weights : standard deviations of the signals [m/s, rad/s, rad, m]. Units of the nuisance widths: standard deviations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +26,10 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
+from shipid.logs.admit import check_log
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
-from shipid.logs.readers import Format, TextFormat, read_table, seconds
-from shipid.logs.repairs import FLAGS, REPAIRS, WrapInterpolation, apply_repairs, interpolate_at
+from shipid.logs.readers import Format, Progress, TextFormat, read_table, require_file, seconds
+from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
@@ -46,7 +48,9 @@ class Imported:
     origin: tuple[float, float] | None
 
 
-def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = ()) -> Dataset:
+def import_log(
+    mapping: Mapping, file: str | Path, *, without: Iterable[str] = (), progress: Progress | None = None
+) -> Dataset:
     """Turn a log into a dataset as its mapping declares; nothing is repaired that is not declared.
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, position on the Earth to north and
@@ -59,6 +63,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     mapping : what the columns are, from `read_mapping`.
     file : the log; with `source.runs`, the folder of its files.
     without : kinds of repair to leave out.
+    progress : called with the share of a large log that has been read, 0 to 1.
 
     Raises
     ------
@@ -68,6 +73,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     for kind in off:
         if kind not in REPAIRS:
             raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)
+    check_log(source)
     digest = digest_of(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
@@ -77,11 +83,11 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
             path="source.sha256",
         )
     logs = runs_of(mapping.source, source)
-    parts = [_imported(mapping, log, off) for log in logs.values()]
+    parts = [_imported(mapping, log, off, progress) for log in logs.values()]
     rows = parts[0].rows
     metadata = {
         "vessel": mapping.vessel,
-        "source": {**mapping.source.model_dump(exclude_none=True), "log": source.name, "sha256": digest},
+        "source": {**mapping.source.model_dump(exclude_defaults=True), "log": source.name, "sha256": digest},
         "mapping": {"name": mapping.name, "digest": mapping.digest},
         "rows": sum(part.read for part in parts),
         "clock": "shared" if mapping.source.runs is None else "run",
@@ -92,6 +98,7 @@ def import_log(mapping: Mapping, file: str | Path, *, without: Iterable[str] = (
     if parts[0].origin is not None:
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
+    kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in logs}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     if mapping.source.runs is None:
         segments = mapping.segment or (_whole(rows, mapping, source),)
@@ -106,11 +113,19 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         return {log.stem: log}
-    before, _, after = source.runs.partition("*")
-    files = sorted(log.glob(source.runs))
+    left = {log / name for name in source.skip}
+    files = sorted(file for file in log.glob(source.runs) if file.is_file() and file not in left)
     if not files:
         raise DataError(f"no file {source.runs!r} in this folder", file=log, path="source.runs")
-    return {file.name.removeprefix(before).removesuffix(after): file for file in files}
+    return {run_of(file, log, source.runs): file for file in files}
+
+
+def run_of(file: Path, folder: Path, pattern: str) -> str:
+    """Return the name of the run in a file: what a single star stands for, else its path in the folder, less ending."""
+    if pattern.count("*") == 1 and "/" not in pattern:
+        before, _, after = pattern.partition("*")
+        return file.name.removeprefix(before).removesuffix(after)
+    return file.relative_to(folder).with_suffix("").as_posix()
 
 
 def digest_of(mapping: Mapping, log: Path) -> str:
@@ -123,14 +138,16 @@ def digest_of(mapping: Mapping, log: Path) -> str:
 
 def sha256_of(file: Path) -> str:
     """Return the SHA-256 of a file in hex; raises DataError if it cannot be read."""
+    require_file(file)
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
 
 
-def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
-    rows, first, read = _columns(mapping, file)
+def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Progress | None) -> Imported:
+    rows, first, read = _columns(mapping, file, progress)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
     rows, records = apply_repairs(rows, wrapping, off)
@@ -138,6 +155,11 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...]) -> Imported:
     rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)
+    fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
+    others = [
+        repair.model_copy(update={"turn": fixed}) if isinstance(repair, Latency) and repair.turn is None else repair
+        for repair in others
+    ]
     rows, more = apply_repairs(rows, others, off)
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
@@ -164,9 +186,10 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
+def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> tuple[pd.DataFrame, Records, int]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
-    log = read_table(file, mapping.format, mapping.clock.source)
+    here = {column.source for column in mapping.columns.values() if not column.file}
+    log = read_table(file, mapping.format, mapping.clock.source, here, progress)
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
     records = _passed_over(log)
     files = {"": (log, t, mapping.format, file)}
@@ -176,11 +199,23 @@ def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
         times = _instants(table, entry.clock, entry.format, beside, f"file.{name}.clock")
         files[name] = (table, times, entry.format, beside)
         records += _passed_over(table)
-    channels = {}
+    channels: dict[str, Channel] = {}
+    for name, column in mapping.columns.items():
+        table, _, _, beside = files[column.file or ""]
+        _column(table, column.source, beside, f"columns.{name}.from")
+    uses = Counter((column.file or "", column.source) for column in mapping.columns.values())
     for name, column in mapping.columns.items():
         table, times, form, beside = files[column.file or ""]
         numbers = _numbers(table, column.source, form, beside, f"columns.{name}.from")
-        channels[name] = (times - column.latency, numbers * (column.sign * column.factor * to_si(column.unit, name)))
+        unit = to_si(column.unit, name)
+        factor = column.sign * column.factor * unit
+        values = numbers * factor if factor != 1.0 else numbers
+        uses[column.file or "", column.source] -= 1
+        if not uses[column.file or "", column.source]:
+            table.pop(column.source)  # of a large log there is room for one copy only
+        values = values + column.offset * unit if column.offset else values
+        channels[name] = (times - column.latency if column.latency else times, values)
+    read = len(log)
     if mapping.resamples:
         t = _common_clock(channels, t, mapping.clock.step, file)
         gap = mapping.clock.max_gap or np.inf
@@ -190,13 +225,16 @@ def _columns(mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, int]:
         records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
     else:
         columns = {name: values for name, (_, values) in channels.items()}
-    return pd.DataFrame({"t": t, **columns}).assign(flags=np.zeros(len(t), dtype=np.int64)), records, len(log)
+    return pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False), records, read
 
 
 def _passed_over(table: pd.DataFrame) -> Records:
     count = int(table.attrs.get("unreadable", 0))
     note = "no NMEA 0183 sentence, or its checksum fails"
-    return [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
+    records: Records = [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
+    ragged = table.attrs.get("ragged", [])
+    note = f"lines with another number of cells, the first is line {ragged[0]}" if ragged else ""
+    return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
@@ -205,6 +243,8 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
         t = seconds(_column(log, clock.source, file, f"{path}.from"))
     else:
         t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+    if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
+        return evenly(t, clock.every, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
     if len(wrong):
         row = int(wrong[0]) + 1
@@ -216,6 +256,49 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
             what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
     return t
+
+
+def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float64]:
+    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s].
+
+    The rows run on from the first; where the column pauses for more than its rounding, they start anew. Raises
+    DataError where the column leaves the instants by more than it is rounded.
+    """
+    even, _ = even_clock(t, every)
+    rounding = rounding_of(t)
+    off = np.abs(even - t)
+    if np.any(off > rounding + every):
+        row = int(np.argmax(off > rounding + every))
+        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate or pauses"
+        raise DataError(message, file=file, path=f"row {row + 1}, clock.every")
+    return even
+
+
+def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
+    """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
+    steps = np.diff(t)
+    pauses = np.flatnonzero(steps > 2.0 * rounding_of(t)[1:] + 3.0 * every) + 1
+    even = np.empty(len(t))
+    for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
+        count = np.arange(last - first)
+        even[first:last] = t[first:last][0] + every * count
+        shift = np.median(t[first:last] - even[first:last]) if len(pauses) else np.median(t[:last] - even[:last])
+        even[first:last] += shift
+    return even, len(pauses)
+
+
+def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far a rounded column of time may be from the truth in each row [s]: its step to the next other value.
+
+    Of numbers written with a few digits the step grows with the number; the largest so far is taken.
+    """
+    values = np.unique(t)
+    if len(values) < 3:
+        return np.full(len(t), np.inf)
+    steps = np.diff(values)
+    near = np.append(steps, steps[-1])
+    usual = pd.Series(near).rolling(9, center=True, min_periods=1).median().to_numpy()
+    return np.asarray(np.maximum.accumulate(usual)[np.searchsorted(values, t)])
 
 
 def _common_clock(
@@ -302,14 +385,33 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
     """Unwrap angles, and turn winds "from" into "towards"."""
     turned: dict[str, NDArray[np.float64]] = {}
     for name, column in columns.items():
+        if column.direction != "from" and not column.wrap:
+            continue
         values = rows[name].to_numpy().copy()
         if column.direction == "from":
             values += np.pi
         if column.wrap:
             known = np.isfinite(values)
-            values[known] = np.unwrap(values[known])
+            if known.all():
+                _unwrap(values)
+            else:
+                values[known] = np.unwrap(values[known])
         turned[name] = values
     return rows.assign(**turned)
+
+
+def _unwrap(values: NDArray[np.float64]) -> None:
+    """Unwrap an angle (N,) [rad] in place, bit by bit as `numpy.unwrap` does, with a quarter of its memory."""
+    steps = np.diff(values)
+    places = np.flatnonzero(~(np.abs(steps) < np.pi))
+    jumps = steps[places]
+    del steps
+    if len(places):
+        nearest = np.mod(jumps + np.pi, 2 * np.pi) - np.pi
+        nearest[(nearest == -np.pi) & (jumps > 0)] = np.pi
+        corrections = np.zeros(len(values))
+        corrections[places + 1] = nearest - jumps
+        values += np.cumsum(corrections, out=corrections)
 
 
 def _projected(rows: pd.DataFrame, mapping: Mapping) -> tuple[pd.DataFrame, tuple[float, float]]:
@@ -394,18 +496,22 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
         removed |= missing & ~short
         note = f"{int((missing & ~short).sum())} rows removed"
         records.append({"kind": "interpolated", "column": name, "count": int(short.sum()), "note": note})
-    kept = t[~removed]
+    kept = t[~removed] if removed.any() else t
     if len(kept) < 2:
         raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
     if max_gap is not None and max_gap < np.median(np.diff(t)):
         message = f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s"
         raise DataError(message, file=file, path="clock.max_gap")
-    broken = np.diff(kept, prepend=kept[0]) > (np.inf if max_gap is None else max_gap)
+    broken = np.append(False, np.diff(kept) > (np.inf if max_gap is None else max_gap))
     if broken.any():
         note = f"gaps longer than {max_gap:g} s"
         records.append({"kind": BREAK, "column": "", "count": int(broken.sum()), "note": note})
-    rows = rows.assign(**filled, flags=flags).loc[~removed].reset_index(drop=True)
-    return rows.assign(flags=rows["flags"] | np.where(broken, 1 << FLAGS.index(BREAK), 0)), records
+    rows = rows.assign(**filled, flags=flags)
+    if removed.any():
+        rows = rows.loc[~removed].reset_index(drop=True)
+    if broken.any():
+        rows = rows.assign(flags=rows["flags"] | np.where(broken, 1 << FLAGS.index(BREAK), 0))
+    return rows, records
 
 
 def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
@@ -424,13 +530,14 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
             message = f"run {segment.run!r}, {start:g} to {end:g} s, is not in the log, {t[0]:g} to {t[-1]:g} s"
             raise DataError(message, file=file, path=f"segment.{index}")
-        runs.append(_named(rows.loc[inside].reset_index(drop=True), segment.run))
-    return pd.concat(runs, ignore_index=True)
+        part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
+        runs.append(_named(part, segment.run))
+    return runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
 
 
 def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:
-    named = rows.copy()
-    named.insert(0, "run", pd.Series([run] * len(rows), dtype="str"))
+    named = rows.copy(deep=False)
+    named.insert(0, "run", pd.Series(run, index=rows.index, dtype="str"))
     return named
 
 

@@ -43,17 +43,22 @@ INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
+Manoeuvre = Literal["zigzag", "turning", "speed run", "transit"]
 
 
 class Source(Strict):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
-    With `runs`, a pattern such as `Z_*.dat`, the log is a folder. Every file of that name is one run with a
-    separate clock; the text matched by the star is the name of the run.
+    With `runs`, a pattern such as `Z_*.dat` or `**/*.csv`, the log is a folder. Every file of that name is one run with
+    a separate clock. Its name is what the star stands for, or, of a pattern with more stars or with sub-folders, the
+    path without its ending. `skip` are files, by their path in the folder, that are left out. `manoeuvres` says what
+    runs are.
     """
 
     file: str | None = None  # relative to the data folder
-    runs: str | None = Field(default=None, pattern=r"^[^*/]*\*[^*/]*$")
+    runs: str | None = Field(default=None, pattern=r"^([^/.][^/]*/)*[^/*]*\*[^/]*$")  # never above the folder
+    skip: tuple[str, ...] = ()
+    manoeuvres: dict[str, Manoeuvre] = Field(default_factory=dict)
     url: str | None = None
     sha256: str | None = Field(default=None, pattern="^[0-9a-f]{64}$")
     citation: str | None = None
@@ -63,13 +68,15 @@ class Source(Strict):
 class Clock(Strict):
     """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
 
-    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants.
+    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants. With
+    `every` [s] the rows of the log are that far apart, and its column of time is only their rounded time.
     """
 
     source: str = Field(alias="from")
     unit: str = "s"
     max_gap: float | None = Field(default=None, gt=0)
     step: float | None = Field(default=None, gt=0)
+    every: float | None = Field(default=None, gt=0)
 
 
 class FileClock(Strict):
@@ -95,7 +102,7 @@ class Origin(Strict):
 
 
 class Column(Strict):
-    """One column of the dataset: value = sign * factor * (source column in `unit`), then turned as declared.
+    """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
     Its samples are of `latency` [s] before their time stamp; `interpolation` is the rule between samples.
     """
@@ -104,6 +111,7 @@ class Column(Strict):
     unit: str
     file: str | None = None
     factor: float = 1.0
+    offset: float = 0.0
     sign: Literal[-1, 1] = 1
     frame: Literal["body", "earth"] = "body"
     direction: Literal["towards", "from"] | None = None
@@ -134,7 +142,7 @@ class Segment(Strict):
     run: str = Field(min_length=1)
     start: float
     end: float
-    manoeuvre: Literal["zigzag", "turning", "speed run", "transit"] | None = None
+    manoeuvre: Manoeuvre | None = None
 
 
 class Resample(Strict):
@@ -184,15 +192,18 @@ def read_mapping(name: str | Path) -> Mapping:
     _check_instants(mapping, file)
     _check_segments(mapping, file)
     clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
+    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
-            if column not in mapping.columns:
+            if column not in repairable:
                 raise DocumentError(
-                    f"no column {column!r} to repair: {choices(column, mapping.columns)}",
+                    f"no column {column!r} to repair: {choices(column, repairable)}",
                     file=file,
                     path=f"repair.{index}.columns",
                 )
-            if isinstance(repair, WrapInterpolation) and not mapping.columns[column].wrap:
+            if isinstance(repair, WrapInterpolation) and not (
+                column in mapping.columns and mapping.columns[column].wrap
+            ):
                 message = f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair"
                 raise DocumentError(message, file=file, path=f"repair.{index}.columns")
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]

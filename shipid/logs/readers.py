@@ -7,7 +7,9 @@ are returned as written, as text or numbers; the mapping gives units and meaning
 from __future__ import annotations
 
 import codecs
+import io
 import re
+import stat
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +28,12 @@ from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 LOOKED_AT = 300  # lines that a guess at the format looks at
+WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
+LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
+TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?\s*"
+DOTTED = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S")
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
+Progress = Callable[[float], None]
 
 
 class Format(Strict):
@@ -46,6 +53,7 @@ class TextFormat(Format):
     header: bool = True
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
     missing: tuple[str, ...] = ("", "nan", "NaN")
+    ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header
 
     @field_validator("separator")
     @classmethod
@@ -79,17 +87,43 @@ class NmeaFormat(Format):
     time: Literal["fix", "line"] = "fix"
 
 
-def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
+def require_file(file: Path) -> int:
+    """Return the size of a file in bytes; raises DataError where it is no file: absent, a folder, a device, a pipe."""
+    try:
+        state = file.stat()
+        if stat.S_ISDIR(state.st_mode):
+            raise DataError("cannot be read (it is a folder)", file=file)
+        if not stat.S_ISREG(state.st_mode):
+            raise DataError("a device or a pipe, not a file: save what it says to a file first", file=file)
+        return state.st_size
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror})", file=file) from None
+
+
+def read_table(
+    file: Path, form: Format, clock: str, columns: Iterable[str] = (), progress: Progress | None = None
+) -> pd.DataFrame:
     """Read a log as its format says; `attrs["unreadable"]` counts the lines that were skipped.
+
+    Parameters
+    ----------
+    clock : name of the column of time. columns : names of the others that are needed; a large text is read for them
+        alone, as numbers where they are.
+    progress : called with the share of a large log that has been read, 0 to 1.
 
     Raises
     ------
     DataError : with the log, the key of the format or the row, and what would be right.
     """
+    size = require_file(file)
+    if size == 0:
+        raise DataError("the file is empty", file=file)
     try:
-        if file.stat().st_size == 0:
-            raise DataError("the file is empty", file=file)
-        table: pd.DataFrame = READERS[form.kind].read(file, form, clock)
+        table: pd.DataFrame | None = None
+        if isinstance(form, TextFormat) and size > LARGE and columns:
+            table = _large_text(file, form, {clock, *columns}, progress, size)
+        if table is None:
+            table = READERS[form.kind].read(file, form, clock)
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
     if len(table) < 2:
@@ -98,31 +132,82 @@ def read_table(file: Path, form: Format, clock: str) -> pd.DataFrame:
 
 
 def seconds(dates: pd.Series[Any]) -> Array:
-    """Dates in ISO 8601 or of pandas as seconds since 1970 (UTC where no zone is said); NaN where there is none."""
-    moments = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
+    """Return dates as seconds since 1970 (UTC where no zone is said), times of day as seconds since midnight.
+
+    Read are ISO 8601, dates of pandas, day.month.year and year/month/day with a time; a time of day goes on after
+    midnight. NaN where there is none.
+    """
+    if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
+        said = dates.dropna().astype(str)
+        if len(said) and said.str.fullmatch(TIME_OF_DAY).all():
+            return _since_midnight(dates)
+        for pattern in DOTTED:
+            moments = pd.to_datetime(dates, format=pattern, utc=True, errors="coerce")
+            if len(said) and moments.notna().mean() > 0.5:
+                rest = pd.to_datetime(dates, format=pattern.replace(".%f", ""), utc=True, errors="coerce")
+                return _since_1970(moments.fillna(rest))
+    return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+
+
+def _since_1970(moments: pd.Series[Any]) -> Array:
     since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
     return np.array(since, dtype=np.float64)
+
+
+def _since_midnight(times: pd.Series[Any]) -> Array:
+    parts = times.astype("string").str.strip().str.replace(",", ".").str.split(":", expand=True)
+    numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+    since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
+    since[np.isnan(numbers[:, 0])] = np.nan
+    return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY), dtype=np.float64)
 
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     with file.open("rb") as stream:
-        if b"\0" in stream.read(4096) and not form.encoding.startswith(("utf-16", "utf-32")):
+        head = stream.read(LONGEST_LINE)
+        if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
             raise DataError(
                 "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding",
                 file=file,
                 path="format.encoding",
             )
+    widest(head, form.separator, file)
+    return parse_text(file, form, file)
+
+
+def widest(head: bytes, separator: str, file: Path) -> None:
+    """Raise DataError where a line in the first bytes of a log has more cells than any log has."""
+    mark = b" " if separator == "whitespace" else separator.encode()
+    for line in head.split(b"\n", LOOKED_AT)[:LOOKED_AT]:
+        count = line.count(mark) + 1
+        if count > WIDEST:
+            raise DataError(
+                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table turned over?", file=file
+            )
+
+
+def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.DataFrame:
+    """Read text as a table of text; `file` is the log that errors name.
+
+    Lines without any value are left out. A line with more or fewer cells than the header is an error, or left out and
+    counted in `attrs["ragged"]` (their line numbers) if `form.ragged` says so.
+    """
+    width = _width(source, form)
     try:
         table = pd.read_csv(
-            file,
+            source,
             sep=r"\s+" if form.separator == "whitespace" else form.separator,
             encoding=form.encoding,
             skiprows=form.skip_rows,
             comment=form.comment,
             header=None,
+            names=range(width),
+            index_col=False,
             dtype=str,
             keep_default_na=False,
+            skip_blank_lines=False,
+            on_bad_lines="error" if form.ragged == "refuse" else "skip",
         )
     except UnicodeDecodeError as error:
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
@@ -133,17 +218,140 @@ def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
     except (pd.errors.ParserError, ValueError) as error:
         message = f"not a table with this separator ({error}): check separator and skip_rows"
         raise DataError(message, file=file, path="format.separator") from None
-    if form.names is not None and len(form.names) != table.shape[1]:
-        message = f"{len(form.names)} names for the {table.shape[1]} columns of the log"
-        raise DataError(message, file=file, path="format.names")
-    if form.names is not None:
-        table.columns = pd.Index(form.names)
-    elif form.header:
-        table.columns = pd.Index([str(name).strip() for name in table.iloc[0]])
-        table = table.iloc[1:].reset_index(drop=True)
+    blank = np.ones(len(table), dtype=bool)
+    for name in table:
+        blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
+    table = table.loc[~blank]
+    if not len(table):
+        message = f"nothing is left after {form.skip_rows} skipped lines"
+        raise DataError(message, file=file, path="format.skip_rows")
+    names, table = _named_columns(table, form, file)
+    table, ragged = _without_ragged(table, names, form, file)
+    table.columns = pd.Index(names)
+    table.attrs["ragged"] = ragged
+    return table.reset_index(drop=True)
+
+
+def _width(source: Path | io.StringIO, form: TextFormat) -> int:
+    """Return the largest number of cells in the first lines after those that are skipped."""
+    if isinstance(source, Path):
+        with source.open("rb") as stream:
+            lines = stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace").splitlines()
     else:
-        table.columns = pd.Index([str(number + 1) for number in range(table.shape[1])])
-    return table
+        lines = source.getvalue()[: LONGEST_LINE // 8].splitlines()
+    lines = lines[form.skip_rows : form.skip_rows + LOOKED_AT]
+    if form.separator == "whitespace":
+        return max((len(line.split()) for line in lines), default=1) or 1
+    counts = [len(re.sub(r'"[^"]*"', "", line).split(form.separator)) for line in lines]
+    return max(counts, default=1)
+
+
+def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:
+    """Return a name for every column, empty where the header has none, and the rows below the header."""
+    filled = [bool(table[name].fillna("").str.strip().ne("").any()) for name in table]
+    width = max((index + 1 for index, one in enumerate(filled) if one), default=1)
+    if form.names is not None:
+        if len(form.names) != width and len(form.names) != table.shape[1]:
+            message = f"{len(form.names)} names for the {width} columns of the log"
+            raise DataError(message, file=file, path="format.names")
+        names = [*form.names, *[""] * (table.shape[1] - len(form.names))]
+        return names, table
+    if form.header:
+        return ["" if pd.isna(name) else str(name).strip() for name in table.iloc[0]], table.iloc[1:]
+    return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
+
+
+def _without_ragged(
+    table: pd.DataFrame, names: list[str], form: TextFormat, file: Path
+) -> tuple[pd.DataFrame, list[int]]:
+    """Return the rows with one cell for every name, and the line numbers of the others; refuse them if so declared."""
+    named = [index for index, name in enumerate(names) if name]
+    beyond = [index for index in range(len(names)) if index > (named[-1] if named else 0)]
+    wrong = np.zeros(len(table), dtype=bool)
+    for index in named[-1:]:  # a short line lacks the last cells
+        wrong |= table.iloc[:, index].isna().to_numpy()
+    for index in beyond:
+        wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
+    lines = [int(number) + 1 + form.skip_rows for number in table.index[wrong]]
+    if len(lines) > len(table) / 2:
+        message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
+        raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
+    if lines and form.ragged == "refuse":
+        row = table.iloc[int(np.argmax(wrong))]
+        cells = int(row.notna().to_numpy().nonzero()[0].max()) + 1
+        count = len(named) if not beyond or cells < beyond[0] else beyond[0]
+        more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
+        message = (
+            f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'"
+        )
+        raise DataError(message, file=file, path=f"line {lines[0]}")
+    return (table.loc[~wrong] if lines else table), lines
+
+
+def _large_text(
+    file: Path, form: TextFormat, wanted: set[str], progress: Progress | None, size: int
+) -> pd.DataFrame | None:
+    """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done.
+
+    What cannot be read so (blanks as separator, comments, text among the numbers, ragged lines) is left to the slow and
+    thorough way, which names the place.
+    """
+    import pyarrow.csv as arrow
+
+    if form.separator == "whitespace" or form.comment is not None or form.ragged == "drop":
+        return None
+    with file.open("rb") as stream:
+        head = stream.read(1_000_000)
+    if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
+        return None
+    widest(head, form.separator, file)
+    text = head.decode(form.encoding, "replace").rpartition("\n")[0]
+    first = parse_text(io.StringIO(text), form.model_copy(update={"ragged": "drop"}), file)
+    names = [str(name) for name in first.columns]
+    places = [index for index, name in enumerate(names) if name in wanted]
+    if {names[index] for index in places} != wanted or len(places) != len(wanted):
+        return None
+    plain = {
+        index: pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any() for index in places
+    }
+    skip = form.skip_rows + int(form.header and form.names is None)
+    table: dict[int, list[Any]] = {index: [] for index in places}
+    try:
+        reader = arrow.open_csv(
+            file,
+            arrow.ReadOptions(
+                column_names=[str(i) for i in range(len(names))],
+                skip_rows=skip,
+                encoding=form.encoding,
+                block_size=8_000_000,
+                use_threads=True,
+            ),
+            arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
+            arrow.ConvertOptions(
+                include_columns=[str(index) for index in places],
+                column_types={str(i): pyarrow.float64() if plain[i] else pyarrow.string() for i in places},
+                null_values=list(form.missing),
+                strings_can_be_null=True,
+                decimal_point=form.decimal,
+            ),
+        )
+        rows = 0
+        for batch in reader:
+            rows += batch.num_rows
+            for place, column in zip(places, batch.columns, strict=True):
+                table[place].append(column.to_numpy(zero_copy_only=False))
+            if progress is not None and rows:
+                progress(min(1.0, rows * (len(text) / max(1, len(first))) / size))
+    except (pyarrow.ArrowException, UnicodeError, ValueError):
+        return None
+    joined: dict[str, Any] = {}
+    for place in places:
+        joined[names[place]] = np.concatenate(table.pop(place)) if table[place] else np.empty(0)
+    return pd.DataFrame(joined, copy=False)
+
+
+def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
+    return column.str.replace(",", ".") if form.decimal == "," else column
 
 
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:

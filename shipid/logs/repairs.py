@@ -77,6 +77,18 @@ class LeverArm(Repair):
     moves: Literal["both", "position", "velocity"] = "both"
 
 
+class Latency(Repair):
+    """An earth-fixed signal comes `seconds` [s] late: what was logged at t was true at t - seconds.
+
+    `signal`: `position`, `velocity` (over ground, however it was logged), `heading` or `yaw rate`. `turn`: whether u
+    and v turn with a heading; by default where the log has them earth-fixed, or as speed and course.
+    """
+
+    signal: Literal["position", "velocity", "heading", "yaw rate"]
+    seconds: float
+    turn: bool | None = None
+
+
 class Break(Repair):
     """Time is missing inside `intervals` of the log's clock: rows strictly inside go, the run is broken there."""
 
@@ -171,6 +183,45 @@ def move_origin(rows: pd.DataFrame, repair: LeverArm) -> Outcome:
     return _all_rows(moved, f"sensor {repair.x:g} m forward{side} of the origin")
 
 
+def take_earlier(rows: pd.DataFrame, repair: Latency) -> Outcome:
+    """Shift: x(t) <- x(t + d), x interpolated in an unbroken stretch; a velocity as v e^(i psi), turned back by psi(t).
+
+    Rows whose t + d lies outside the stretch are removed.
+    """
+    t = rows["t"].to_numpy()
+    broken = (rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1
+    stretch = np.cumsum(broken)
+    psi = rows["psi"].to_numpy()
+    names = {"position": ("north", "east"), "heading": ("psi",), "yaw rate": ("r",), "velocity": ("u", "v")}[
+        repair.signal
+    ]
+    missing = [name for name in names if name not in rows]
+    if missing:
+        return Outcome(rows, np.zeros(len(rows), dtype=bool), 0, f"no {missing[0]} is logged: nothing to shift")
+    ground = (rows["u"] + 1j * rows["v"]).to_numpy() * np.exp(1j * psi) if {"u", "v"} <= set(rows.columns) else None
+    inside, healed = np.zeros(len(t), dtype=bool), {name: rows[name].to_numpy().copy() for name in names}
+    moved = None if ground is None else ground.copy()
+    for part in np.unique(stretch):
+        here = np.flatnonzero(stretch == part)
+        at = t[here] + repair.seconds
+        inside[here] = (at >= t[here[0]]) & (at <= t[here[-1]])
+        for name in names:
+            healed[name][here] = np.interp(at, t[here], rows[name].to_numpy()[here])
+        if moved is not None and ground is not None and repair.signal == "velocity":
+            moved[here] = np.interp(at, t[here], ground.real[here]) + 1j * np.interp(at, t[here], ground.imag[here])
+    if moved is not None and (repair.signal == "velocity" or (repair.signal == "heading" and repair.turn)):
+        body = moved * np.exp(-1j * (healed["psi"] if repair.signal == "heading" else psi))
+        healed |= {"u": body.real, "v": body.imag}
+    first = np.zeros(len(t), dtype=bool)
+    kept = np.flatnonzero(inside)
+    first[kept[np.append(True, np.diff(stretch[kept]) > 0)] if len(kept) else kept] = True
+    begins = first & (stretch > stretch[0])
+    flags = rows["flags"].to_numpy() | np.where(begins, 1 << FLAGS.index(BREAK), 0)
+    result = rows.assign(**healed, flags=flags).loc[inside].reset_index(drop=True)
+    note = f"{repair.signal} taken {repair.seconds:g} s later, {int((~inside).sum())} rows at the ends removed"
+    return Outcome(result, np.ones(len(result), dtype=bool), len(result), note)
+
+
 def break_runs(rows: pd.DataFrame, repair: Break) -> Outcome:
     """Remove rows strictly inside each interval; the first row after it is touched, and so a break."""
     t = rows["t"].to_numpy()
@@ -196,6 +247,7 @@ REPAIRS: dict[str, tuple[type[Repair], Callable[[pd.DataFrame, Any], Outcome]]] 
     "scale": (Scale, scale),
     "heading_offset": (HeadingOffset, turn_heading),
     "lever_arm": (LeverArm, move_origin),
+    "latency": (Latency, take_earlier),
 }
 FLAGS = ("interpolated", *REPAIRS)
 """Names of the bits of the column `flags` of an imported log, lowest first."""

@@ -40,7 +40,7 @@ class Finding:
 
     id: str
     claim: str
-    verdict: Literal["confirmed", "refuted", "undecided"]
+    verdict: Literal["confirmed", "refuted", "undecided", "not testable"]
     evidence: str
 
 
@@ -56,6 +56,7 @@ class Snapshot:
     truth : (T + 1, 2) true x, y from the instant of prediction on [m].
     paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; physics has N_D = 0.
     wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
+    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m]; only where there is one.
     """
 
     run: str
@@ -65,6 +66,7 @@ class Snapshot:
     truth: Floats
     paths: Mapping[PathKey, Floats]
     wind: tuple[float, float] | None = None
+    bands: Mapping[PathKey, Floats] = field(default_factory=dict)
 
 
 def _empty(*columns: str) -> pd.DataFrame:
@@ -101,6 +103,7 @@ class ReportContent:
     repairs : kind, column, count, note.
     provenance : label -> value.
     study_document, command : the document as TOML text and the command that reproduces the study.
+    best : the physics model that validation prefers at the largest amount of data; every figure means it by "best".
     frames : further frames by name, for sections that show something new.
     """
 
@@ -127,4 +130,5 @@ class ReportContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     study_document: str = ""
     command: str = ""
+    best: str = ""
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)

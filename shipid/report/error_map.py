@@ -14,9 +14,9 @@ from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
 from shipid.report.contours import contour, length, nice_levels, smoothed
 from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line
 from shipid.report.gain import gain, unplotted
-from shipid.report.palette import GRID, INK, MUTED, level
+from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import families, trained
+from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, metres, number
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
@@ -25,9 +25,12 @@ MOST_LINES = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
 SHORT = 12  # characters of a name at the axis
-CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
-# Triangles of a box whose corners 0-3 are the floor and 4-7 the top; the floor is never seen.
-FACES = [(4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7)]
+WIDE, ASIDE, BACK = (
+    0.34,
+    0.45,
+    0.11,
+)  # of the oblique bars: half a width; how far aside and up (of the highest) an N_D is
+SHADE = "rgba(0,0,0,0.28)"
 
 
 class Spot(NamedTuple):
@@ -61,16 +64,45 @@ def error_map(content: ReportContent) -> Figure | None:
         how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is H, mean over "
         "seeds. Hatched: H is not below that of pure data-driven at the same N_D."
         + (lined if pieces else "")
-        + " The bars show the same cells, models in the order of A; drag with the mouse to turn them."
+        + " The bars show the same cells, models in the order of A; the front row is the largest N_D."
         + unplotted(content),
         alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
         "the table of cells.",
         height=HEIGHT,
         views={"0": [Panel(_flat(rows, counts, spots, span, pieces))], "1": [Panel(_bars(rows, counts, spots, span))]},
-        controls=[Control("View", ["map", "3-D bars"])],
+        controls=[Control("View", ["map", "bars"])],
         chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [],
         scale=Scale("position error, mean, H [m]", *span, "--heat"),
     )
+
+
+def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: str) -> Figure | None:
+    """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`."""
+    rows = _rows(content)
+    counts = sorted({int(size) for size in content.cells.N_D})
+    means = trained(content)
+    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+        return None
+    spots = [spot._replace(words=_plainly(spot)) for spot in _spots(content, means, rows)]
+    span = (float(means.H.min()), float(means.H.max()))
+    good = [spot for spot in spots if math.isfinite(spot.H)]
+    best, worst = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
+    said = f"From {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
+    return Figure(
+        id=id,
+        title=title,
+        takeaway=f"{said}N_D = {worst.size}).",
+        how=how,
+        alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
+        height=HEIGHT,
+        views={"": [Panel(_flat(rows, counts, spots, span, []))]},
+        scale=Scale(scale, *span, "--heat"),
+    )
+
+
+def _plainly(spot: Spot) -> str:
+    """Hover text of a quantity that is not H."""
+    return f"<b>{label(spot.model)}</b>, N_D = {spot.size}<br>{metres(spot.H)}"
 
 
 def _rows(content: ReportContent) -> pd.DataFrame:
@@ -85,8 +117,8 @@ def _rows(content: ReportContent) -> pd.DataFrame:
 
 def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> list[Spot]:
     errors = {(str(model), int(size)): float(H) for model, size, H in zip(means.model, means.N_D, means.H, strict=True)}
-    pure = set(rows.model[rows.family == DATA_DRIVEN])
-    learned = {size: H for (model, size), H in errors.items() if model in pure}
+    pure, rival = set(rows.model[rows.family == DATA_DRIVEN]), data_driven(content)
+    learned = {size: H for (model, size), H in errors.items() if model == rival}
     place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
     spots = []
     for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=True):
@@ -206,7 +238,9 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
         if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
             values.append(float(tick))
     strips = rows[rows.A.isna()]
-    names = ["no model" if row.family == DATA_DRIVEN else _shortened(str(row.model)) for row in strips.itertuples()]
+    only = (strips.family == DATA_DRIVEN).sum() == 1
+    named = ["no model" if only and row.family == DATA_DRIVEN else str(row.model) for row in strips.itertuples()]
+    names = [_shortened(name) for name in named]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
@@ -238,73 +272,68 @@ def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[go.Scatter], lis
 
 
 def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float]) -> go.Figure:
-    """One box per model and N_D, as in the paper's Fig. 8."""
-    good = [spot for spot in spots if math.isfinite(spot.H)]
+    """One box per model and N_D, as in the paper's Fig. 8, drawn obliquely: heights of the front are true."""
     depth = {size: len(counts) - 1 - i for i, size in enumerate(counts)}
-    boxes = [_box(spot.row, depth[spot.size], spot.H) for spot in good]
-    corners = np.concatenate(boxes)
-    faces = np.concatenate([np.array(FACES) + 8 * i for i in range(len(boxes))])
-    mesh = go.Mesh3d(
-        **dict(zip("xyz", corners.T.astype(np.float32), strict=True)),
-        **dict(zip("ijk", faces.T, strict=True)),
-        facecolor=[f"var(--heat-{level(spot.H, span)})" for spot in good for _ in FACES],
-        flatshading=True,
-        lighting={"ambient": 0.85, "diffuse": 0.35, "specular": 0.0, "roughness": 1.0},
-        hovertext=[f"{label(s.model)}, N_D = {s.size}: H {metres(s.H)}" for s in good for _ in range(8)],
-        hoverinfo="text",
-    )
-    bad = [spot for spot in spots if not math.isfinite(spot.H)]
-    failed = go.Scatter3d(
-        x=[spot.row for spot in bad],
-        y=[depth[spot.size] for spot in bad],
-        z=[0] * len(bad),
-        mode="markers",
-        marker={"symbol": "x", "size": 3, "color": "var(--bad)"},
-        hovertext=[spot.words for spot in bad],
-        hoverinfo="text",
-    )
-    return go.Figure([mesh, failed], _stage(rows, counts, span))
+    back = BACK * span[1]
+    traces = []
+    for spot in sorted(spots, key=lambda spot: (-depth[spot.size], spot.row)):  # what is nearer covers the rest
+        if not math.isfinite(spot.H):
+            x, y = _oblique(spot.row, depth[spot.size], 0.0, back)
+            traces.append(go.Scatter(x=[x], y=[y], mode="markers", marker={"symbol": "x", "color": "var(--bad)"}))
+        else:
+            colour = f"var(--heat-{level(spot.H, span)})"
+            body, side = _box(spot.row, depth[spot.size], spot.H, back)
+            traces += [_face(body, colour, INK), _face(side, SHADE, SHADE)]
+        traces[-1].update(text=f"{label(spot.model)}, N_D = {spot.size}: H {metres(spot.H)}", hoverinfo="text")
+    return go.Figure(traces, _stage(rows, counts, span, back))
 
 
-def _box(row: int, column: int, height: float) -> Floats:
-    """Corners (8, 3) of a bar: the floor, then the top."""
-    floor = [(row + 0.7 * (a - 0.5), column + 0.7 * (b - 0.5)) for a, b in CORNERS]
-    return np.array([(*point, z) for z in (0.0, height) for point in floor])
+def _oblique(x: float, depth: float, height: float, back: float) -> tuple[float, float]:
+    """Place on the page of a point at a model, so many N_D behind the front, at a height [m]."""
+    return x + ASIDE * depth, height + back * depth
 
 
-def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float]) -> dict[str, Any]:
+def _box(row: int, depth: int, height: float, back: float) -> tuple[Floats, Floats]:
+    """Outlines (k, 2) of a bar: front, top and right side, set apart by points that are no numbers; the side alone."""
+    near, far, left, right = depth - WIDE, depth + WIDE, row - WIDE, row + WIDE
+    front = [(left, near, 0.0), (right, near, 0.0), (right, near, height), (left, near, height)]
+    top = [(left, near, height), (right, near, height), (right, far, height), (left, far, height)]
+    side = [(right, near, 0.0), (right, far, 0.0), (right, far, height), (right, near, height)]
+    outlines = [np.array([_oblique(*corner, back) for corner in [*face, face[0]]]) for face in (front, top, side)]
+    hole = np.full((1, 2), np.nan)
+    return np.concatenate([outlines[0], hole, outlines[1], hole, outlines[2]]), outlines[2]
+
+
+def _face(outline: Floats, fill: str, edge: str) -> go.Scatter:
+    """Draw a filled outline, whose text shows wherever the pointer is over it."""
+    x, y = outline.T.round(4)
+    ink = {"color": edge, "width": 0.6}
+    return go.Scatter(x=x, y=y, mode="lines", fill="toself", fillcolor=fill, line=ink, hoveron="fills", name="")
+
+
+def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float], back: float) -> dict[str, Any]:
     """Lay out the bars: the largest N_D in front, since H falls with N_D and short bars hide nothing."""
-    shown = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), 8)).round().astype(int))
-    by_model = {
-        "tickvals": shown.tolist(),
-        "ticktext": [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]],
-        "range": [-0.7, len(rows) - 0.3],
-    }
-    some = np.unique(np.linspace(0, len(counts) - 1, min(len(counts), 4)).round().astype(int))
-    by_size = {
-        "tickvals": (len(counts) - 1 - some).tolist(),
-        "ticktext": [str(counts[i]) for i in some],
-        "range": [-0.7, len(counts) - 0.3],
-    }
-    scene = {
-        "xaxis": _side("models by A [m]", **by_model),
-        "yaxis": _side("N_D [1]", **by_size),
-        "zaxis": _side("H [m]", range=[0, 1.02 * span[1]], nticks=6),
-        "aspectmode": "manual",
-        "aspectratio": {"x": 1.9, "y": 1.25, "z": 0.9},
-        "camera": {
-            "eye": {"x": -0.5, "y": -1.95, "z": 1.25},
-            "center": {"x": -0.04, "y": 0, "z": -0.1},
-            "projection": {"type": "orthographic"},
-        },
-    }
-    plot = layout({}, {}, margin={"l": 0, "r": 0, "t": 0, "b": 0}, scene=scene)
-    return {key: value for key, value in plot.items() if key not in ("xaxis", "yaxis")}
+    last, deep = len(rows) - 1, len(counts) - 1
+    shown = np.unique(np.linspace(0, last, min(len(rows), 8)).round().astype(int))
+    words = [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
+    x = axis("models by A [m]", tickvals=shown.tolist(), ticktext=words, showgrid=False)
+    top = 1.03 * max(span[1] + back * deep, back * (deep + 1))
+    y = axis("H [m] of the front row", range=[0, top], tickvals=_heights(span[1]))
+    some = np.unique(np.linspace(0, deep, min(len(counts), 5)).round().astype(int))
+    places = [_oblique(last + 0.55, deep - i, 0.0, back) for i in some]
+    notes = [
+        {"x": place[0], "y": place[1], "text": f"N_D = {counts[i]}", "showarrow": False, "xanchor": "left"}
+        | {"yanchor": "bottom", "font": {"size": 11, "color": INK}}
+        for i, place in zip(some, places, strict=True)
+    ]
+    x["range"] = [-0.7, last + ASIDE * deep + 0.25 * (last + ASIDE * deep) + 0.9]
+    return layout(x, y, hovermode="closest", annotations=notes, margin=MARGIN)
 
 
-def _side(title: str, **options: Any) -> dict[str, Any]:
-    base = {"gridcolor": GRID, "color": INK, "backgroundcolor": "rgba(0,0,0,0)", "showspikes": False, "zeroline": False}
-    return {**base, "title": {"text": title, "font": {"size": 12}}, "tickfont": {"size": 11}, **options}
+def _heights(most: float) -> list[float]:
+    """About five round heights up to the highest bar."""
+    step = min((s for s in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if most / s <= 6), default=most)
+    return [round(step * k, 3) for k in range(int(most / step) + 1)]
 
 
 def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
@@ -317,13 +346,13 @@ def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     text += f"N_D = {worst.size})"
     judged = {spot.size for spot in good if spot.model in pure}
     physics = [spot for spot in good if spot.model not in pure and spot.size in judged]
-    worse = [spot for spot in physics if spot.worse]
+    worse, rival = [spot for spot in physics if spot.worse], "pure data-driven"
     if not physics:
         return f"{text}."
     if not worse:
-        return f"{text}; physics helps in all {counted(len(physics), 'cell')}."
+        return f"{text}; H is below that of {rival} in all {counted(len(physics), 'cell')} with physics."
     limit = float(np.nanmin([accuracy[spot.model] for spot in worse] + [math.inf]))
-    text += f"; in {len(worse)} of {counted(len(physics), 'cell')} physics does not help"
+    text += f"; in {len(worse)} of {counted(len(physics), 'cell')} with physics H is not below that of {rival}"
     below = sum(float(accuracy[spot.model]) < limit for spot in physics)
     return text + (f", none of them below A = {metres(limit)}." if below else ".")
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,13 +14,15 @@ import plotly.graph_objects as go
 from shipid.report import tables
 from shipid.report.content import Floats, Indices, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
-from shipid.report.palette import DASHES, INK, NAIVE, styles
+from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres
 
 BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
+PIXELS = 540  # twice the height of the error over time
+LONGEST = 14  # characters of a name beside a line
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
 
@@ -33,7 +37,10 @@ def horizon(content: ReportContent) -> Figure | None:
     for (i, (word, column)), (j, size) in itertools.product(enumerate(statistics), enumerate(counts)):
         traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
         y = axis(f"position error, {word} [m]", rangemode="tozero")
-        plot = layout(axis("time ahead [s]", rangemode="tozero"), y, hovermode="x unified")
+        names = _names_at_the_end(traces, float(means[column].max()))
+        reach = float(means.ahead.max())
+        x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
+        plot = layout(x, y, hovermode="x unified", annotations=names)
         views[f"{i}-{j}"] = [Panel(go.Figure(traces, plot))]
     return Figure(
         id="horizon",
@@ -67,7 +74,7 @@ def over_time(content: ReportContent) -> Figure | None:
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(means[means.N_D.isin([0, counts[-1]])]),
+        takeaway=_takeaway_time(content, means[means.N_D.isin([0, counts[-1]])]),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below."
         + _drawn(content)
@@ -82,8 +89,11 @@ def over_time(content: ReportContent) -> Figure | None:
 
 def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
     """Legend of a close-up: models by colour, sources by dash."""
-    looks = styles(content)
-    chips = [Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width) for name in exemplars(content)]
+    looks = close_styles(content)
+    chips = [
+        Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width, symbol=looks[name].symbol)
+        for name in exemplars(content)
+    ]
     words = {"cooperative": "compensated or data-driven", "physics": "physics alone", "naive": "constant velocity"}
     return chips + [
         Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, DASHES[source])
@@ -104,7 +114,11 @@ def _settled(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
 def _drawn(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), exemplars(content)
-    return "" if len(shown) >= total else f" Of {total} models, the middle one of each family by A: {listed(shown, 6)}."
+    return (
+        ""
+        if len(shown) >= total
+        else f" Of {total} models, the middle one of each family by A, and the best in validation: {listed(shown, 6)}."
+    )
 
 
 def _size_control(counts: Sequence[int]) -> Control:
@@ -112,8 +126,9 @@ def _size_control(counts: Sequence[int]) -> Control:
 
 
 def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
-    looks, pure, traces = styles(content), data_driven(content), []
-    for key, mine in means.groupby(["model", "source"], sort=False):
+    looks, pure, traces = close_styles(content), data_driven(content), []
+    groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
+    for key, mine in groups:  # what has no physics first: thick ink must not cover the others
         model, source = (str(part) for part in key)
         x, y = mine[across].to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
@@ -122,7 +137,23 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         keep = _visible(x, y)
         traces.append(line(name, x[keep], y[keep], keys, line={"dash": DASHES[source], **ink}))
+        if model and source == "cooperative":
+            mark = {"symbol": looks[model].symbol, "size": 7, "color": ink["color"], "maxdisplayed": 9}
+            traces[-1].update(mode="lines+markers", marker=mark)
     return traces
+
+
+def _names_at_the_end(traces: Sequence[go.Scatter], most: float) -> list[dict[str, Any]]:
+    """Names beside the ends of the compensated lines, moved apart where they would collide."""
+    ends = sorted((float(t.y[-1]), float(t.x[-1]), t) for t in traces if t.mode == "lines+markers" and len(t.y))
+    notes, lowest = [], -math.inf
+    for height, place, trace in ends:
+        lowest = max(height, lowest + 0.055 * most)
+        short = trace.name.removesuffix(", compensated")
+        short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
+        font = {"size": 11, "color": trace.line.color}
+        notes.append({"x": place, "y": lowest, "text": short, "xanchor": "left", "xshift": 8, "font": font})
+    return [{**note, "showarrow": False, "align": "left"} for note in notes]
 
 
 def _word(source: str) -> str:
@@ -130,11 +161,11 @@ def _word(source: str) -> str:
 
 
 def _visible(x: Floats, y: Floats) -> Indices:
-    """Points of a line that a plot of 2,000 pixels can tell apart; a line with gaps is kept whole."""
+    """Points of a line that the height of the plot can tell apart; a line with gaps is kept whole."""
     if not np.isfinite(y).all() or len(y) < 3:
         return np.arange(len(y))
     span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]
-    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / 2000)
+    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / PIXELS)
 
 
 def _changes(values: Floats) -> Indices:
@@ -195,7 +226,8 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     alone = end[end.source == "physics"].set_index("model")["mean"]
     if together.empty:
         return "No compensated model gave a prediction."
-    best, pure = str(together.idxmin()), data_driven(content)
+    pure = data_driven(content)
+    best = content.best if content.best in together.index else str(together.index[0])
     text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
     return text + (
@@ -203,13 +235,14 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     )
 
 
-def _takeaway_time(means: pd.DataFrame) -> str:
+def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
     together = means[means.source == "cooperative"]
     if together.empty:
         return "No compensated model gave a prediction."
-    best = str(together.groupby("model").error.mean().idxmin())
+    names = list(together.model)
+    best = content.best if content.best in names else str(names[0])
     worst = together[together.model == best].nlargest(1, "error").iloc[0]
-    text = f"{best}, the best of those drawn, errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    text = f"{best} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
     same = means[means.model.eq(best) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)]
     return f"{text} on average over the horizon" + (
         f", where its physics alone errs by {metres(float(same.error.iloc[0]))}." if len(same) else "."

@@ -101,7 +101,7 @@ def _lines(
 ) -> go.Figure:
     sizes = sorted(content.cells.N_D.unique())
     traces = []
-    for name, style in looks.items():
+    for name, style in reversed(looks.items()):  # what has no physics first: it must not cover the others
         mine = means[means.model == name].set_index("N_D")[statistic.cell]
         if mine.empty:
             continue
@@ -139,14 +139,12 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     parts = []
     for size in (means.N_D.min(), means.N_D.max()):
         here = means[means.N_D.eq(size)].set_index("model").H
-        best = str(here.idxmin())
-        text = f"at N_D = {size}, {best} is best with H = {metres(here[best])}"
-        if pure and pure in here.index and len(here) > 1:
-            physics = here.drop(pure)
-            text += f"; {int((physics < here[pure]).sum())} of {len(physics)} physics models beat pure data-driven "
-            text += f"({metres(here[pure])})"
-        parts.append(text)
-    return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}."
+        known = [f"{name} has H = {metres(here[name])}" for name in (content.best, pure) if name in here.index]
+        parts.append(
+            f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
+        )
+    said = f" {content.best} is the best in validation." if content.best else ""
+    return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}.{said}"
 
 
 def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
@@ -233,8 +231,13 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
         return "No cell gave a result."
     before = content.models.set_index("model").A.reindex(after.index).dropna()
     better = before.index[after[before.index] < before]
-    best, pure = str(after.idxmin()), data_driven(content)
-    text = f"{best} predicts best, H = {metres(after[best])}; compensation improves {len(better)} of "
+    best, pure = content.best, data_driven(content)
+    text = (
+        f"{best}, best in validation, has H = {metres(after[best])}; compensation"
+        if best in after.index
+        else "Compensation"
+    )
+    text += f" improves {len(better)} of "
     text += f"{counted(len(before), 'physics model')}"
     if pure and pure in after.index:
         text += f"; pure data-driven has H = {metres(after[pure])}"

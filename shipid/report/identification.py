@@ -297,19 +297,21 @@ def manoeuvres(content: IdentificationContent) -> Table | None:
     if content.manoeuvres.empty:
         return None
     noted = bool(content.manoeuvres["note"].ne("").any())
+    banded = "low" in content.manoeuvres
     rows = [
         [
             text(row["manoeuvre"]),
             text(row["measure"]),
-            *(_short(row[name]) for name in (BEFORE, AFTER)),
+            *(_short(row[name]) for name in (BEFORE, AFTER, *(("low", "high") if banded else ()))),
             text(row["unit"]),
             *[Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] * noted,
         ]
         for row in content.manoeuvres.to_dict("records")
     ]
-    head = ["manoeuvre", "measure", BEFORE, AFTER, "unit", *["why missing"] * noted]
+    head = ["manoeuvre", "measure", BEFORE, AFTER, *["band from", "to"] * banded, "unit", *["why missing"] * noted]
     takeaway = "Simulated in calm deep water from a Froude number of 0.2."
-    numeric = [False, False, True, True, False, *[False] * noted]
+    takeaway += " The band is what the uncertainty of the estimates leaves open." if banded else ""
+    numeric = [False, False, True, True, *[True, True] * banded, False, *[False] * noted]
     return Table("manoeuvres", "Standard manoeuvres", takeaway, head, numeric, rows)
 
 

@@ -24,15 +24,34 @@
     // Dragging would catch a finger that only wants to scroll the page.
     const coarse = matchMedia("(pointer: coarse)").matches;
     layout.dragmode = coarse ? false : "zoom";
-    if (layout.scene) {
-      layout.scene.dragmode = coarse ? false : "turntable";
-      // A scene fits its height; where the page is narrow it has to shrink.
-      const room = Math.min(1, plot.clientWidth / plot.clientHeight / 1.65);
-      const { x, y, z } = layout.scene.aspectratio;
-      layout.scene.aspectratio = { x: x * room, y: y * room, z: z * Math.min(1, 1.7 * room) };
-    }
     layout.uirevision = view;
     Plotly.react(plot, data, layout, CONFIG);
+  }
+
+  // Every figure can be taken away: as an image, or as the numbers of its lines.
+  function csv(plot) {
+    const rows = [["line", "x", "y", "shown"]];
+    for (const trace of plot.data) {
+      const x = [...(trace.x || [])], y = [...(trace.y || [])];
+      x.forEach((value, i) => rows.push([trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1]));
+    }
+    const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replace(/"/g, '""')}"` : value);
+    return rows.map((row) => row.map(cell).join(",")).join("\n") + "\n";
+  }
+
+  function save(figure, kind) {
+    figure.querySelectorAll(".plot").forEach((plot, i) => {
+      const filename = `${document.title.split(":")[0]}-${figure.id}${i ? `-${i + 1}` : ""}`.replace(/[^\w.-]+/g, "-");
+      if (kind !== "csv") {
+        Plotly.downloadImage(plot, { format: kind, filename, width: plot.clientWidth, height: plot.clientHeight, scale: 2 });
+        return;
+      }
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(new Blob([csv(plot)], { type: "text/csv" }));
+      link.download = `${filename}.csv`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
   }
 
   // Every figure: its hidden lines, its controls, and `redraw` which reads both.
@@ -49,8 +68,30 @@
       });
     }
     for (const control of figure.querySelectorAll(".control")) control.addEventListener("input", update);
+    for (const button of figure.querySelectorAll(".save button")) {
+      button.addEventListener("click", () => save(figure, button.dataset.kind));
+    }
+    whenSeen(figure, update);
+  }
+
+  // A figure is drawn when it comes near the window, so that the first is there at once.
+  const waiting = new Map();
+  const watcher = new IntersectionObserver((entries) => {
+    for (const entry of entries) if (entry.isIntersecting) drawNow(entry.target);
+  }, { rootMargin: "600px" });
+
+  function drawNow(figure) {
+    const update = waiting.get(figure);
+    if (!update) return;
+    waiting.delete(figure);
+    watcher.unobserve(figure);
     redraws.push(update);
     update();
+  }
+
+  function whenSeen(figure, update) {
+    waiting.set(figure, update);
+    watcher.observe(figure);
   }
 
   const chosen = (figure) =>
@@ -96,7 +137,12 @@
       x: aside, y: ahead, mode: "lines", meta: windows.lines[line].keys, line: windows.lines[line].line,
       hovertemplate: `${escaped(windows.lines[line].name)}<extra></extra>`,
     }));
-    const data = [truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
+    const bands = shown.filter((path) => path.length > 5).map(([line, , , , , ahead, aside]) => ({
+      x: aside, y: ahead, mode: "lines", meta: [...windows.lines[line].keys, "band"], hoverinfo: "skip",
+      line: { color: windows.lines[line].line.color, width: 0.5 }, opacity: 0.15,
+      fill: "toself", fillcolor: windows.lines[line].line.color,
+    }));
+    const data = [...bands, truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
     const layout = { ...windows.layout };
     if (panel.spans) {
       layout.xaxis = { ...layout.xaxis, range: panel.spans[0] };
@@ -179,6 +225,7 @@
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   addEventListener("beforeprint", () => {
     root.dataset.theme = "light";
+    for (const figure of [...waiting.keys()]) drawNow(figure);
     for (const details of document.querySelectorAll("details")) details.open = true;
     repaint();
   });

@@ -10,12 +10,13 @@ from typing import Any, Protocol
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from shipid.errors import ResultError
+from shipid.files import write_text
 from shipid.report import palette, paths
 from shipid.report.content import Finding, ReportContent, Sentence
 from shipid.report.figure import Figure
+from shipid.report.glossary import glossed
 from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
 from shipid.report.sections import SECTIONS
 from shipid.report.wording import bound, number
@@ -82,7 +83,7 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "bound": bound}
+    environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
@@ -100,7 +101,7 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=Markup(get_plotlyjs()),
+        plotly=Markup(_resource("vendor/plotly-cartesian.min.js")),
     )
 
 
@@ -116,10 +117,9 @@ def write_report(content: ReportContent, file: Path) -> Path:
 
 
 def write(text: str, file: Path) -> Path:
-    """Write text, making the folder if need be; ResultError if the place cannot be written."""
+    """Write text whole or not at all, making the folder if need be; ResultError if the place cannot be written."""
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8", newline="\n")
+        write_text(file, text)
     except OSError as error:
         raise ResultError(f"cannot be written ({error.strerror})", file=file) from None
     return file

@@ -5,14 +5,16 @@ Figures hold `var(--...)` instead of colours, so that one figure serves a light,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 from plotly.colors import sample_colorscale
 
 from shipid.report.content import DATA_DRIVEN, ReportContent
-from shipid.report.selection import FEW_MODELS, families
+from shipid.report.selection import FEW_MODELS, exemplars, families
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
 LEVELS = 24
@@ -60,18 +62,37 @@ def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
     return float(physics.min()), float(physics.max())
 
 
-def styles(content: ReportContent) -> dict[str, Style]:
+@lru_cache(maxsize=4)  # every figure asks for it
+def styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
     result = {}
     for index, row in enumerate(frame.itertuples()):
         if row.family == DATA_DRIVEN:
-            result[str(row.model)] = Style(INK, "x", 3.5)
+            result[str(row.model)] = _without_physics(sum(style.colour == INK for style in result.values()))
             continue
         colour = category(index) if span is None else _by_accuracy(float(str(row.A)), span)
         result[str(row.model)] = Style(colour, SYMBOLS[kinds.index(row.family) % len(SYMBOLS)], 2.0)
     return result
+
+
+def close_styles(content: ReportContent) -> dict[str, Style]:
+    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink."""
+    frame, result = families(content), {}
+    of_family = dict(zip(frame.model.astype(str), frame.family, strict=True))
+    physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]
+    for index, name in enumerate(physics):
+        result[name] = Style(category(index), SYMBOLS[index % len(SYMBOLS)], 2.0)
+    for name in exemplars(content):
+        if of_family[name] == DATA_DRIVEN:
+            result[name] = _without_physics(len([other for other in result if of_family[other] == DATA_DRIVEN]))
+    return result
+
+
+def _without_physics(number: int) -> Style:
+    """Ink: thick for the first model without physics, thin for others."""
+    return Style(INK, "x" if number == 0 else "cross", 3.0 if number == 0 else 1.5)
 
 
 def level(value: float, span: tuple[float, float]) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pandas as pd
 from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
-FEW_RUNS = 12  # test runs in the error-over-time figure and the window browser
+FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 
 
 def spread(items: Sequence[str], count: int) -> list[str]:
@@ -20,8 +21,12 @@ def spread(items: Sequence[str], count: int) -> list[str]:
     return [items[i] for i in np.linspace(0, len(items) - 1, count).round().astype(int)]
 
 
+@lru_cache(maxsize=4)  # every figure asks for it
 def families(content: ReportContent) -> pd.DataFrame:
-    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last."""
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last.
+
+    The frame is shared by all who ask: not to be changed.
+    """
     known = content.models[["model", "family", "A"]]
     trained = content.cells[["model", "family", "A"]]
     joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})
@@ -42,13 +47,16 @@ def middles(content: ReportContent) -> dict[str, str]:
     frame = families(content)
     kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
     groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
-    return {str(family): str(group.model.iloc[len(group) // 2]) for family, group in groups}
+    # Of the rivals without physics the first is meant wherever one is named.
+    return {
+        str(family): str(group.model.iloc[0 if family == DATA_DRIVEN else len(group) // 2]) for family, group in groups
+    }
 
 
 def exemplars(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A."""
+    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
     names = [str(name) for name in families(content).model]
-    middle = set(middles(content).values())
+    middle = {*middles(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
 
 

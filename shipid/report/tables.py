@@ -58,6 +58,8 @@ CELLS = {
     "H": ("H [m]", 2),
     "H_90": ("H_90 [m]", 2),
     "rms": ("rms [m]", 2),
+    "coverage": ("in band [1]", 2),
+    "width": ("radius of band [m]", 2),
     "status": ("status", None),
     "seconds": ("time [s]", 0),
     "trials": ("trials [1]", 0),

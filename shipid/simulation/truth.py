@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.document import Checked
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
@@ -30,7 +31,7 @@ MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies
 MOVED = ("n_rpm", "alpha_deg", "start_speed", "actuators_at")  # keys of a manoeuvre
 
 
-class Truth(BaseModel):
+class Truth(Checked, BaseModel):
     """The `[truth]` block of a study: a vessel, its manoeuvres, weather, sea and sensors.
 
     Every quantity is drawn uniformly from its range by hash(seed, manoeuvre, quantity), so that additional manoeuvres
@@ -57,10 +58,8 @@ class Truth(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _moved(cls, data: Any) -> Any:
-        key = next((key for key in MOVED if isinstance(data, Mapping) and key in data), None)
-        if key is not None:
-            block = f'[[truth.manoeuvre]], kind = "turning", {key} = {data[key]!r}'
-            raise ValueError(f"{key} belongs to the manoeuvres: write {block}")
+        if isinstance(data, Mapping) and (moved := old_keys(data)):
+            raise ValueError(moved)
         return data
 
     @model_validator(mode="after")
@@ -79,6 +78,13 @@ class Truth(BaseModel):
     def length(self) -> float:
         """Length [s] of every log: run-up and duration, in whole intervals."""
         return int((self.run_up + self.duration) / self.interval + 1e-9) * self.interval
+
+
+def old_keys(block: Mapping[str, Any]) -> str:
+    """What to write instead of the keys of a manoeuvre that a [truth] of version 0.1 held; empty where it has none."""
+    moved = [key for key in MOVED if key in block]
+    instead = ", ".join(['[[truth.manoeuvre]], kind = "turning"', *(f"{key} = {block[key]!r}" for key in moved)])
+    return f"{' and '.join(moved)} belong to the manoeuvres: write {instead}" if moved else ""
 
 
 def check_truth(truth: Truth, vessel: Vessel) -> None:

@@ -1,17 +1,30 @@
-"""From results to words: the answer in sentences."""
+"""From results to words: the answer in sentences.
+
+Every comparison is paired over test manoeuvres; brackets are 95 % intervals. "Best" is always the model that validation
+prefers at the largest amount of data, never the one with the lowest error on the test.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
+from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
+from shipid.study.evidence import Contrasts, contrasts
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells, naive_summary
-from shipid.study.verdict import interval, metres, named, runs, words
+from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few, words
+from shipid.study.worth import Estimate, break_even, runs_without_physics
+
+FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds whose orders react to the ship
 
 
 def by_model(results: Results) -> pd.DataFrame:
-    """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D, with the range of H.
+    """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D.
 
     The method is the one that the study judges by. Failed cells are left out.
     """
@@ -24,39 +37,123 @@ def by_model(results: Results) -> pd.DataFrame:
         H=("H", "mean"),
         H_90=("H_90", "mean"),
         rms=("rms", "mean"),
-        low=("H", "min"),
-        high=("H", "max"),
         seeds=("H", "size"),
         loss=("loss", "mean"),
     )
     return frame.reset_index()
 
 
+def best_model(results: Results) -> str | None:
+    """Name of the physics model with the lowest validation loss at the largest amount of data; None without one.
+
+    Models that were identified are left out where there are others: they were fitted to their validation runs, too, so
+    their loss says too little. So are families that a study sets aside.
+    """
+    table = by_model(results)
+    table = table[~table["family"].isin(results.plan.aside)]
+    top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
+    fair = top[~top["family"].isin(results.plan.identified)]
+    chosen = top if fair.empty else fair
+    return None if chosen.empty else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Names of models that are shown to be better than a rival, shown to be worse, and the others."""
+
+    better: list[str]
+    worse: list[str]
+    open: list[str]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the sentences of one study are made from: `rows` are `by_model` without families set aside."""
+
+    results: Results
+    rows: pd.DataFrame
+    best: str
+
+    @property
+    def smallest(self) -> int:
+        """Least N_D."""
+        return int(self.rows["N_D"].min())
+
+    @property
+    def largest(self) -> int:
+        """Greatest N_D."""
+        return int(self.rows["N_D"].max())
+
+    @cached_property
+    def table(self) -> ErrorTable:
+        """Errors by test manoeuvre."""
+        return error_table(self.results, list(self.rows["model"].unique()))
+
+    def at(self, amount: int) -> pd.DataFrame:
+        """Rows of physics models at an amount of data."""
+        return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
+
+    def place(self, amount: int) -> int:
+        """Place of an amount in the table."""
+        return self.table.amounts.index(amount)
+
+    def H(self, model: str, amount: int) -> str:
+        """H of a model with its interval, in words."""
+        row = self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)].iloc[0]
+        return metres(float(row["H"])) + self.spread(model, amount)
+
+    def spread(self, model: str, amount: int) -> str:
+        """Interval of the H of a model; empty where there is none."""
+        if model not in self.table.H:
+            return ""
+        found = self.table.compare([[(1.0, model, self.place(amount))]])
+        return interval(float(found.low[0]), float(found.high[0]))
+
+    def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
+        """Who is better (above 0), who worse; by sign alone where there are too few test manoeuvres."""
+        if too_few(self.table.runs):
+            above, below = differences.mean > 0, differences.mean <= 0
+        else:
+            above, below = shown(differences.above), shown(differences.below)
+        pairs = list(zip(models, above, below, strict=True))
+        return Sides(
+            [m for m, up, _ in pairs if up], [m for m, _, down in pairs if down], [m for m, u, d in pairs if not u | d]
+        )
+
+    @property
+    def fixed(self) -> list[str]:
+        """Physics models whose numbers do not depend on the cell and that have a result in every one."""
+        names = self.at(self.largest)
+        names = names[~names["family"].isin(self.results.plan.identified)]
+        return [str(m) for m in names["model"] if m in self.table.H and m in self.table.A]
+
+
 def answer(results: Results) -> list[tuple[str, str]]:
-    """Four to nine sentences built from the results, each with the anchor of the figure that carries it."""
+    """A few sentences built from the results, each with the anchor of the figure that carries it."""
     claims, every_model = results.plan.study.claims, by_model(results)
-    table = every_model[~every_model["family"].isin(results.plan.aside)]
+    rows = every_model[~every_model["family"].isin(results.plan.aside)]
     sentences = [(text, "cells") for text in _caveats(results)]
-    learning = [way.name for way in results.plan.methods if way.method.compensates]
+    learning = results.plan.learning
     if len(learning) > 1:
         spoken = f"The study has {len(learning)} methods that learn from data; these sentences speak of "
         sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
-    largest = int(table["N_D"].max()) if len(table) else 0
-    top = table[table["N_D"] == largest]
-    physics = top[top["family"] != NO_MODEL]
-    if physics.empty:
+    largest = int(rows["N_D"].max()) if len(rows) else 0
+    best = best_model(results)
+    if best is None:
         where = f" at {runs(largest)}" if largest else ""
         return [*sentences, (f"No cell with physics has a result{where}, so nothing can be said yet.", "cells")]
-    best = physics.iloc[int(physics["loss"].argmin())]  # chosen by validation, never by the test
-    chart = "map" if _has_map(table) else "gain"
-    sentences.append((_headline(best, largest, results.test.horizon * results.test.step), "gain"))
-    pure = table[table["family"] == NO_MODEL].set_index("N_D")
+    case = Case(results, rows, best)
+    chart = "map" if _has_map(rows) else "gain"
+    pure = rows[rows["family"] == NO_MODEL]
+    judged = NO_MODEL in case.table.H
+    if judged and (good := _good_enough(case)):
+        sentences.append((good, chart))
     if len(pure):
-        cells = judged_cells(results)
-        failed = cells[(cells["status"] != "ok") & (cells["family"] != NO_MODEL)]
-        every = "every physics model" + (" with a result" if len(failed) else "")
-        sentences += [(_worth(table, pure, best), chart), (_harm(table, pure, every), chart)]
-    known = physics[physics["A"] > 0]  # an exact model has no error that could be left
+        sentences.append((_enough_runs(case, pure.set_index("N_D")), chart))
+    sentences.append((_headline(case), "gain"))
+    sentences += [(text, chart) for text in _physics_or_none(case, judged)]
+    known = case.at(largest)
+    known = known[known["A"] > 0]  # an exact model has no error that could be left
     if len(known):
         left = known["H"] / known["A"]
         share = f"{left.min():.0%}" + (f" to {left.max():.0%}" if len(known) > 1 else "")
@@ -65,13 +162,10 @@ def answer(results: Results) -> list[tuple[str, str]]:
             f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
         )
         sentences.append((text, "horizon"))
-    if harmed := _alone(physics):
-        sentences.append((harmed, "gain"))
-    if trend := _trend(table):
-        sentences.append((trend, "gain"))
-    sentences.append((_floor(top, largest, naive_summary(results)["mean"]), "gain"))
+    sentences += [(text, "gain") for text in (*_alone(case), *_trend(case), _floor(case))]
     nominal = every_model[every_model["family"] == claims.nominal] if claims else every_model[:0]
-    return [*sentences, *((text, "gain") for text in _nominal(nominal, largest))]
+    sentences += [(text, "gain") for text in _nominal(nominal, largest)]
+    return [*sentences, *((text, "cells") for text in _how_to_read(case))]
 
 
 def _has_map(table: pd.DataFrame) -> bool:
@@ -79,27 +173,107 @@ def _has_map(table: pd.DataFrame) -> bool:
     return table["N_D"].nunique() > 1 and table[table["family"] != NO_MODEL]["model"].nunique() > 1
 
 
-def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
-    """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
-    return [
-        f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "
-        f"coefficient, such as waves, Euler steps and held commands, and {metres(row['H'])}{_spread(row)} compensated "
-        f"with {runs(largest)}."
-        for _, row in nominal[nominal["N_D"] == largest].iterrows()
-    ]
+def _ahead(case: Case) -> str:
+    return f"{case.results.test.horizon * case.results.test.step:g} s"
 
 
-def _headline(best: pd.Series, largest: int, ahead: float) -> str:
+def _good_enough(case: Case) -> str:
+    """How good physics must be to pay, at the smallest and at the largest amount of data."""
+    parts, limits = [], False
+    every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
+    if not any(sides.better or sides.worse for sides in every.values()):
+        amounts = " or ".join(map(str, every))
+        models = _any(len(case.at(case.largest)))
+        return f"How good must the physics be? With {amounts} runs the test cannot tell {models} from no physics."
+    for amount, sides in every.items():
+        found = break_even(case.table, case.fixed, case.place(amount))
+        if not sides.better and not sides.worse:
+            parts.append(f"with {runs(amount)} the test cannot tell {_any(len(sides.open))} from no physics")
+        elif found is None:
+            parts.append(f"with {runs(amount)} {_counted(sides, 'no physics')}")
+        else:
+            parts.append(f"with {runs(amount)} {_limit(found)}")
+            limits = True
+    begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
+    return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
+
+
+def _any(count: int) -> str:
+    return "the physics model" if count == 1 else f"any of {count} physics models"
+
+
+def _limit(found: Estimate) -> str:
+    """Up to which error of its own physics pays, in words."""
+    least, most = found.limits
+    if found.above:
+        low = f" [at least {_length(found.low)}]" if np.isfinite(found.low) and found.low < most else ""
+        return f"physics pays even with an error of {metres(most)} of its own, the worst tried{low}"
+    if found.below:
+        high = f" [at most {_length(found.high)}]" if np.isfinite(found.high) and found.high > least else ""
+        return f"physics does not pay even with an error of {metres(least)} of its own, the best tried{high}"
+    bounds = ""
+    if np.isfinite(found.low):
+        low = f"under {_length(least)}" if found.low <= least else _length(found.low)
+        bounds = f" [{low}, {f'over {_length(most)}' if found.high >= most else _length(found.high)}]"
+    return f"physics pays if its own error A is below about {_length(found.value)} m{bounds}"
+
+
+def _length(value: float) -> str:
+    """A length with two digits: more would be pretence."""
+    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+
+
+def _against_none(case: Case, amount: int) -> Sides:
+    """Which physics models do better than none, at an amount of data."""
+    models = [str(name) for name in case.at(amount)["model"] if name in case.table.H]
+    if not models:
+        return Sides([], [], [])
+    return case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
+
+
+def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
+    """What the best model has with the fewest runs, and how many runs that takes without physics."""
+    fewest, largest, best = case.smallest, case.largest, case.best
+    if fewest == largest:
+        return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
+    first = case.rows[(case.rows["model"] == best) & (case.rows["N_D"] == fewest)]
+    if first.empty:
+        return f"{best} has no result at {runs(fewest)}, so its worth in runs is unknown."
+    begins = f"How many runs? With {runs(fewest)}, {best} (best in validation) has {case.H(best, fewest)} mean error"
+    if best not in case.table.H or NO_MODEL not in case.table.H:
+        return f"{begins}; without physics not every cell has a result, so its worth in runs is unknown."
+    found = runs_without_physics(case.table, best, case.place(fewest))
+    bounds = f" [{_count(found.low, found)}, {_count(found.high, found)}]" if np.isfinite(found.low) else ""
+    if found.above:
+        least = f" [at least {found.low:.0f}]" if np.isfinite(found.low) and not found.low >= found.limits[1] else ""
+        text = f"without physics {runs(largest)} are not enough for that{least}: they give {case.H(NO_MODEL, largest)}"
+    elif found.below:
+        text = f"without physics the same {runs(fewest)} do as well{bounds}, {case.H(NO_MODEL, fewest)}"
+    else:
+        text = (
+            f"without physics the same error takes about {found.value:.0f} runs{bounds}, interpolated between amounts"
+        )
+    return f"{begins}; {text}."
+
+
+def _count(value: float, found: Estimate) -> str:
+    """A number of runs, which may be a bound."""
+    if value >= found.limits[1]:
+        return f"over {value:.0f}"
+    return f"{value:.0f} or fewer" if value <= found.limits[0] else f"{value:.0f}"
+
+
+def _headline(case: Case) -> str:
     """What the model that validation prefers does at the largest amount of data."""
-    return (
-        f"With {runs(largest)}, {best['model']} (best in validation; {metres(best['A'])} mean error on its own) "
-        f"predicts {ahead:g} s ahead with {metres(best['H'])} mean error{_spread(best)}; nine errors in ten are below "
-        f"{metres(best['H_90'])}."
+    row = case.at(case.largest).set_index("model").loc[case.best]
+    told = "" if case.smallest < case.largest else "best in validation; "
+    text = (
+        f"With {runs(case.largest)}, {case.best} ({told}{metres(row['A'])} mean error on its own) "
+        f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
+        f"below {metres(row['H_90'])}"
     )
-
-
-def _spread(row: pd.Series) -> str:
-    return interval(row["low"], row["high"], int(row["seeds"]))
+    pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
+    return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."
 
 
 def _caveats(results: Results) -> list[str]:
@@ -117,67 +291,139 @@ def _caveats(results: Results) -> list[str]:
     return found
 
 
-def _harm(table: pd.DataFrame, pure: pd.DataFrame, every: str) -> str:
-    """Which physics models do no better than none, at the largest and at the smallest amount of data."""
-    largest, smallest = int(table["N_D"].max()), int(table["N_D"].min())
-    if largest not in pure.index:
-        return f"There is no result without physics at {runs(largest)}, so it is unknown whether physics harms there."
-
-    def harming(amount: int) -> list[str]:
-        rows = table[(table["N_D"] == amount) & (table["family"] != NO_MODEL)]
-        return [str(name) for name in rows[rows["H"] >= float(pure["H"].loc[amount])]["model"]]
-
-    if names := harming(largest):
-        verb = "does" if len(names) == 1 else "do"
-        return f"At {runs(largest)} {named(names)} {verb} no better than no physics at all."
-    better = f"t {runs(largest)} {every} does better than none."
-    if smallest in pure.index and (names := harming(smallest)):
-        verb = "harms" if len(names) == 1 else "harm"
-        return f"At {runs(smallest)} {named(names)} {verb}: no physics at all does as well or better; a{better}"
-    return f"A{better}"
+def _physics_or_none(case: Case, judged: bool) -> list[str]:
+    """Which physics models, compensated, beat none and which harm, at the smallest and the largest amount of data."""
+    if not judged:
+        where = runs(case.largest)
+        return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
+    every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
+    told = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
+    return [f"At {runs(amount)} {_counted(sides, 'no physics')}." for amount, sides in told.items()]
 
 
-def _alone(physics: pd.DataFrame) -> str:
+def _counted(sides: Sides, rival: str) -> str:
+    """Who is better than a rival and who is worse, as one sentence."""
+    count = len(sides.better) + len(sides.worse) + len(sides.open)
+    if len(sides.better) == count:
+        return f"every physics model with a result does better than {rival}"
+    parts = [f"{len(sides.better) or 'none'} of {count} physics models does better than {rival}"]
+    if len(sides.better) > 1:
+        parts = [f"{len(sides.better)} of {count} physics models do better than {rival}"]
+    if sides.worse:
+        parts.append(f"{named(sides.worse)} {'does' if len(sides.worse) == 1 else 'do'} worse")
+    if sides.open:
+        parts.append(f"for {named(sides.open)} the test cannot tell")
+    return "; ".join(parts)
+
+
+def _alone(case: Case) -> list[str]:
     """Which models are better without their compensator, and the best physics alone if nothing compensated beats it."""
-    names = list(physics[physics["H"] >= physics["A"]]["model"])
-    if not names:
-        return ""
-    text = f"Compensation makes {named(names)} no better than {'it is' if len(names) == 1 else 'they are'} alone"
-    alone = physics.iloc[int(physics["A"].argmin())]
-    if alone["A"] <= physics["H"].min():
-        text += f"; {alone['model']} alone has {metres(alone['A'])}, less than any compensated model"
-    return f"{text}."
+    models = case.fixed
+    if not models:
+        return []
+    place = case.place(case.largest)
+    own = case.table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in models])
+    sides = case.sides(models, own)
+    parts = []
+    if sides.worse:
+        parts.append(f"Compensation harms {named(sides.worse)}.")
+    if sides.open:
+        parts.append(f"It is not shown that compensation helps {named(sides.open)}.")
+    accuracy = {model: case.table.mean(model, ALONE) for model in models}
+    first = min(models, key=accuracy.__getitem__)
+    if parts and accuracy[first] <= min(case.table.mean(model, place) for model in models):
+        parts[-1] = parts[-1][:-1] + f"; {first} alone has {metres(accuracy[first])}, less than any compensated model."
+    return parts
 
 
-def _trend(table: pd.DataFrame) -> str:
-    """Which models are no better at the largest amount of data than at the smallest; empty where all are."""
-    H = table.pivot(index="model", columns="N_D", values="H")
-    least, most = H.columns.min(), H.columns.max()
-    names = [str(name) for name in H.index[H[most] >= H[least]]] if least != most else []
-    verb = "is" if len(names) == 1 else "are"
-    return f"With {runs(int(most))} {named(names)} {verb} no better than with {least}." if names else ""
+def _trend(case: Case) -> list[str]:
+    """Which models are worse with the most data than with the least; empty where none is."""
+    if case.smallest == case.largest:
+        return []
+    models = [str(name) for name in dict.fromkeys(case.rows["model"]) if name in case.table.H]
+    first, last = case.place(case.smallest), case.place(case.largest)
+    sides = case.sides(models, case.table.compare([[(1.0, m, first), (-1.0, m, last)] for m in models]))
+    parts = []
+    if sides.worse:
+        verb = "is" if len(sides.worse) == 1 else "are"
+        parts.append(f"With {runs(case.largest)} {named(sides.worse)} {verb} no better than with {case.smallest}.")
+    if sides.open:
+        parts.append(
+            f"It is not shown that {runs(case.largest)} serve {named(sides.open)} better than {case.smallest}."
+        )
+    return parts
 
 
-def _floor(top: pd.DataFrame, largest: int, floor: float) -> str:
+def _floor(case: Case) -> str:
     """Which models do no better than constant motion, at the largest amount of data."""
-    names = [str(name) for name in top[top["H"] >= floor]["model"]]
-    beats = f"{named(names)} {'does' if len(names) == 1 else 'do'} not beat it" if names else "every model beats it"
-    return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(largest)} {beats}."
+    results, table, place = case.results, case.table, case.place(case.largest)
+    rows = case.rows[case.rows["N_D"] == case.largest]
+    models = [str(name) for name in rows["model"] if name in table.H]
+    floor = naive_summary(results)["mean"]
+    _, run = np.unique(results.test.run, return_inverse=True)
+    still = np.bincount(run, results.naive.mean(axis=0)) / np.bincount(run)
+    if not models:
+        return f"Keeping u, v and r constant gives {metres(floor)}."
+    errors = np.stack([table.by_run(model, place) for model in models])
+    training = np.array([table.mean(model, place) for model in models]) * table.noise[place]
+    sides = case.sides(models, contrasts(still - errors, table.counts, training))
+    if len(sides.better) == len(models):
+        return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model beats it."
+    others = [*sides.worse, *sides.open]
+    verb = "does" if len(others) == 1 else "do"
+    begins = f"Keeping u, v and r constant gives {metres(floor)}"
+    return f"{begins}: at {runs(case.largest)} {named(others)} {verb} not beat it."
 
 
-def _worth(table: pd.DataFrame, pure: pd.DataFrame, best: pd.Series) -> str:
-    """How many runs pure data-driven needs for what the best physics does with the fewest."""
-    fewest = int(table["N_D"].min())
-    if table["N_D"].max() == fewest:
-        return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
-    first = table[(table["model"] == best["model"]) & (table["N_D"] == fewest)]
-    if first.empty:
-        return f"{best['model']} has no result at {runs(fewest)}, so its worth in runs is unknown."
-    level = float(first["H"].iloc[0])
-    here = f"with {runs(fewest)} {best['model']} has {metres(level)}"
-    enough, last = pure[pure["H"] <= level], int(pure.index.max())
-    if enough.empty:
-        return f"Without physics {runs(last)} give {metres(float(pure['H'].loc[last]))}; {here}."
-    if int(enough.index.min()) == fewest:
-        return f"Without physics {runs(fewest)} do as well, {metres(float(pure['H'].loc[fewest]))}: {here}."
-    return f"Without physics it takes {runs(int(enough.index.min()))} to do as well: {here}."
+def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
+    """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
+    return [
+        f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "
+        f"coefficient, such as waves, Euler steps and held commands, and {metres(row['H'])} compensated "
+        f"with {runs(largest)}."
+        for _, row in nominal[nominal["N_D"] == largest].iterrows()
+    ]
+
+
+def _how_to_read(case: Case) -> list[str]:
+    """What "no physics" is, what identified models and known commands mean, and what the brackets are."""
+    plan, table, found = case.results.plan, case.table, []
+    judged = next(way.method for way in plan.methods if way.name == plan.judged)
+    mirrored = getattr(judged, "mirror", 0.0) > 0
+    if NO_MODEL in table.H and mirrored:
+        text = '"No physics" may use that port and starboard are mirror images, which is a little physics'
+        if PLAIN in table.H:
+            first, last = (table.mean(PLAIN, case.place(amount)) for amount in (case.smallest, case.largest))
+            mirrored_first = table.mean(NO_MODEL, case.place(case.smallest))
+            text += (
+                f"; without that it has {metres(first)} at {runs(case.smallest)} instead of {metres(mirrored_first)}"
+            )
+            text += f", and {metres(last)} at {runs(case.largest)}" if case.largest > case.smallest else ""
+        found.append(f"{text}.")
+    top = case.at(case.largest)
+    fitted = top[top["family"].isin(plan.identified)]
+    if len(fitted) and not fitted["model"].eq(case.best).any():
+        lowest = fitted.iloc[int(fitted["loss"].argmin())]
+        found.append(
+            "Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
+            f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
+        )
+    if plan.study.prediction.commands == "known" and _may_react(case.results):
+        found.append(
+            "The orders of the next seconds were known. In a zigzag they tell when the heading will reach its limit, "
+            "so these errors show at best what knowing the plan can give: an upper bound of its worth."
+        )
+    if note := too_few(table.runs):
+        found.append(f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another.")
+    else:
+        found.append(
+            f"Brackets are 95 % intervals over {manoeuvres(table.runs)} of one world; lists of names are corrected for "
+            "their length (Holm)."
+        )
+    return found
+
+
+def _may_react(results: Results) -> bool:
+    """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by her heading."""
+    truth = results.plan.study.truth
+    return truth is None or any(getattr(one, "kind", "") in FEEDBACK for one in truth.manoeuvre)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from shipid.errors import ResultError, ShipidError
+from shipid.study.evidence import over_worlds
 from shipid.study.findings import findings
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, read_results
@@ -44,7 +45,10 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
 
 
 def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
-    """One row per finding and key number: id, claim, verdicts, number, mean, low, high over the worlds that have it."""
+    """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
+
+    low and high are Student's 95 % interval over worlds, not a number from fewer than two.
+    """
     found = [findings(results) for results in worlds]
     rows = []
     for same in zip(*found, strict=True):
@@ -54,7 +58,8 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
         for name in names or [""]:
             values = pd.Series([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
             row = {"id": same[0]["id"], "claim": same[0]["claim"], "verdicts": verdicts, "number": name}
-            rows.append({**row, "mean": values.mean(), "low": values.min(), "high": values.max()})
+            low, high = over_worlds(values.to_numpy())
+            rows.append({**row, "mean": values.mean(), "low": low, "high": high})
     return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
 
 
@@ -72,3 +77,24 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
         parts.append(means.reset_index().assign(world=world))
     grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)["H"]
     return grouped.agg(mean="mean", low="min", high="max", worlds="size").reset_index()
+
+
+def compare_bands(worlds: Sequence[Results]) -> pd.DataFrame:
+    """Coverage and width [m] of the bands per family, method and N_D: means over members and seeds, then over worlds.
+
+    Columns: family, method, N_D, coverage, coverage_low, coverage_high, width, width_low, width_high, worlds (that have
+    a band); without rows where no cell has one.
+    """
+    parts = []
+    for results in worlds:
+        keys = ["family", "method", "N_D", "status", "coverage", "width"]
+        good = results.cells.reindex(columns=keys).astype({"coverage": float, "width": float})
+        good = good[(good["status"] == "ok") & good["coverage"].notna()]
+        parts.append(good.groupby(["family", "method", "N_D"], sort=False)[["coverage", "width"]].mean().reset_index())
+    grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)
+    named = {
+        f"{name}{suffix}": (name, how)
+        for name in ("coverage", "width")
+        for suffix, how in (("", "mean"), ("_low", "min"), ("_high", "max"))
+    }
+    return grouped.agg(**named, worlds=("width", "size")).reset_index()

@@ -8,23 +8,32 @@ from pathlib import Path
 
 import pandas as pd
 
-from shipid.files import write_text
+from shipid.errors import ResultError
+from shipid.files import write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
-from shipid.study import advise, memory
+from shipid.report.comparison import write_comparison
+from shipid.report.methods import MethodsContent
+from shipid.study import advise, bands, memory, methods, store
 from shipid.study import results as parts
 from shipid.study.findings import findings
+from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
 from shipid.study.store import write_results
 
 log = logging.getLogger(__name__)
 
-ANSWER, SUMMARY, REPORT = "answer.txt", "summary.md", "report.html"
+ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
     "kinds": parts.kinds_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
+    "coverage": bands.coverage_frame,
+    "coverage_groups": bands.groups_frame,
+    "coverage_runs": bands.worst_frame,
+    "no_band": bands.refused_frame,
+    "methods": methods.methods_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
@@ -34,7 +43,7 @@ def report_content(results: Results) -> ReportContent:
     return ReportContent(
         title=results.plan.study.question,
         name=results.plan.name,
-        answer=[Sentence(text, figure) for text, figure in advise.answer(results)],
+        answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=parts.naive_summary(results),
@@ -51,6 +60,7 @@ def report_content(results: Results) -> ReportContent:
         provenance=parts.provenance_words(results),
         study_document=results.plan.text(),
         command=parts.reproducing_command(results),
+        best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
         frames={name: frame(results) for name, frame in FRAMES.items()},
     )
 
@@ -58,8 +68,14 @@ def report_content(results: Results) -> ReportContent:
 def write_pages(folder: Path) -> Path:
     """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
 
+    A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
+    with `methods.csv` beside it.
+
     Raises ResultError if the folder holds no run or cannot be written.
     """
+    plan = store.stored_plan(folder)
+    if plan.parts:
+        return _write_parts(plan, folder)
     results = read_results(folder)
     write_results(folder, results.cells)
     content = report_content(results)
@@ -68,3 +84,32 @@ def write_pages(folder: Path) -> Path:
     report = write_report(content, folder / REPORT)
     log.debug("report written: %s", report)
     return report
+
+
+def _write_parts(plan: Plan, folder: Path) -> Path:
+    """Write the pages of all parts that have results, and the page that compares methods over them."""
+    cells: list[pd.DataFrame] = []
+    notes: dict[str, str] = {}
+    for name, part in plan.parts.items():
+        mine = store.part_folder(folder, name)
+        if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.batches):
+            notes[name] = "no cell is finished yet"
+            continue
+        write_pages(mine)
+        results = read_results(mine)
+        cells.append(methods.method_cells(results, part.condition, name))
+        notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
+    if not cells:
+        raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
+    frame = methods.compared(methods.joined(cells), plan.judged)
+    write_table(folder / METHODS, frame)
+    content = MethodsContent(
+        title=plan.study.question,
+        name=plan.name,
+        frames={"methods": frame},
+        provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
+        study_document=plan.text(),
+        command=parts.command_of(plan),
+    )
+    write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
+    return write_comparison(content, folder / REPORT)

@@ -1,46 +1,60 @@
 """Findings S1-S7 (method, section 4): verdicts on the map H(A, N_D) of a simulated study.
 
 All are taken over the members of the moderate and the high family that have a result in every cell; a member that
-failed anywhere is left out and named. Unless said otherwise a finding is a condition on H(model, N_D): confirmed if it
-holds for the mean over seeds and for every seed, undecided if only for the mean, else refuted.
+failed anywhere is left out and named. The unit of evidence is the test manoeuvre: "shown" means a paired difference
+whose 95 % interval over test manoeuvres is free of 0 (`shipid.study.evidence`). A claim about all needs each of its
+differences shown; a claim about some, and a list of names, is corrected for how many could have been (Holm). A finding
+is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres decide nothing.
 
 S1 : every moderate member has a lower H than pure data-driven at the smallest N_D, and more than half of them have it
     at every N_D.
-S2 : for every model, pure data-driven included, the rank correlation of H and N_D is at most -0.5 and H is lower at
-    the largest N_D than at the smallest; refuted only if H is not lower there, for the mean over seeds.
-S3 : at every N_D the rank correlation of H and A over physics models is at least 0.5; the median slope of H over A
-    [m/m] is positive at the smallest N_D and lower at the largest, and its rank correlation with N_D is at most -0.5;
-    refuted only if, for the mean over seeds, H does not rise with A at some N_D or the slope does not fall.
-S4 : at the largest N_D at least one high member beats pure data-driven and at least one does not; and H of those that
-    do not varies more, as standard deviation over seeds by mean, averaged over N_D, than that of the moderate members
-    in the median. Never decided with fewer than five seeds: each is another nested order of runs.
-S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 gives S1-S4 the same verdicts; refuted if
-    it is below 0.8 or H_90 turns a confirmed finding into a refuted one, or the other way round.
-S6 : a moderate member with a small N_D (at most half of the largest) beats pure data-driven with a larger one, and one
-    beats physics alone that is more accurate than that member's physics. Confirmed if a pair of each kind holds in
-    every seed, undecided if only for the mean, else refuted.
-S7 : at the smallest N_D the roughness of pure data-driven paths is more than 1.5 times that of the true paths, and
-    that of the cooperative models in the median is not.
+S2 : for every model, pure data-driven included, H falls along ln N_D (slope by least squares over all N_D).
+S3 : at every N_D H rises along ln A over the physics models, and it rises more steeply at the smallest N_D than at the
+    largest; and neither the rise nor its fall would come by chance if the models had their A in any other order.
+S4 : at the largest N_D at least one high member is better than pure data-driven and at least one is worse; and over the
+    seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
+    Never decided with fewer than five seeds.
+S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
+    below 0.8 or H_90 confirms what H refutes, or the other way round.
+S6 : a moderate member with a small N_D (at most half of the largest) is better than pure data-driven with the next
+    larger one, and one is better than physics alone that is more accurate than its physics.
+S7 : at the smallest N_D the roughness of pure data-driven paths is more than 1.5 times that of the true paths, and that
+    of the cooperative models, in the mean, is less. Not testable where the compensation is a polynomial of time.
 
-The thresholds are free: the paper gives none.
+The thresholds are free: the paper gives none. Error rates of every rule: docs/findings.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtr
 
-from shipid.metrics import median_slope, rank_correlation, roughness
-from shipid.study.plan import NO_MODEL
+from shipid.metrics import rank_correlation, roughness
+from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
+from shipid.study.evidence import LEVEL, Contrasts, at_least, by_chance, contrasts
+from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, judged_cells
-from shipid.study.verdict import Finding, Verdict, interval, metres, named, undecided, verdict
+from shipid.study.verdict import (
+    Finding,
+    Verdict,
+    every,
+    manoeuvres,
+    measured,
+    metres,
+    named,
+    shown,
+    some,
+    too_few,
+    undecided,
+    verdict,
+    weakest,
+)
 
 Array = NDArray[np.float64]
-Condition = Callable[[Mapping[str, Array]], bool]  # on H: model -> (amounts,)
 CLAIMS = {
     "S1": "every moderate cooperative model beats pure data-driven at the smallest N_D, and most keep the lead",
     "S2": "H falls with N_D for every model",
@@ -50,9 +64,7 @@ CLAIMS = {
     "S6": "moderate models with small N_D beat pure data-driven with a larger one, and more accurate physics alone",
     "S7": "paths of pure data-driven at small N_D are rough, those of cooperative models are not",
 }
-TREND = 0.5  # S2, S3: rank correlation from which something rises or falls
-TOLERANCE = 0.05  # S2: a step that rises by less is counted apart
-FEWEST_MODELS = 4  # S3: fewer points are no trend
+FEWEST_MODELS = 5  # S3: an order of fewer comes by chance too often
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
 ROUGH = 1.5  # S7: times the roughness of the true paths
@@ -61,15 +73,12 @@ MOST_PAIRS = 2  # S6: of each kind, in words
 
 @dataclass(frozen=True)
 class Grid:
-    """H or H_90 [m] of one study: model -> (amounts, seeds), for members that have a result in every cell."""
+    """The errors that S1-S6 judge, and which members belong to the moderate and the high family."""
 
-    amounts: tuple[int, ...]
-    seeds: tuple[int, ...]
+    table: ErrorTable
     moderate: tuple[str, ...]
     high: tuple[str, ...]
-    A: Mapping[str, float]
-    H: Mapping[str, Array]
-    left_out: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
     @property
     def physics(self) -> tuple[str, ...]:
@@ -77,20 +86,13 @@ class Grid:
         return (*self.moderate, *self.high)
 
     @property
-    def mean(self) -> dict[str, Array]:
-        """Model -> (amounts,), mean over seeds."""
-        return {model: values.mean(axis=1) for model, values in self.H.items()}
+    def amounts(self) -> tuple[int, ...]:
+        """N_D, rising."""
+        return self.table.amounts
 
-    def judge(self, holds: Condition, weakly: Condition | None = None) -> Verdict:
-        """Verdict on a condition, asked of the mean over seeds and of each seed; refuted where `weakly` fails too."""
-        on_average = holds(self.mean)
-        each = ({model: values[:, k] for model, values in self.H.items()} for k in range(len(self.seeds)))
-        return verdict(on_average and all(holds(one) for one in each), (weakly or holds)(self.mean))
-
-    def value(self, model: str, amount: int) -> str:
-        """H of a model at the amount of this place, with its range over seeds."""
-        values = self.H[model][amount]
-        return metres(values.mean()) + interval(values.min(), values.max(), len(values))
+    def value(self, model: str, place: int) -> str:
+        """H of a model, in words."""
+        return metres(self.table.mean(model, place))
 
 
 def simulation_findings(results: Results) -> list[Finding]:
@@ -98,16 +100,19 @@ def simulation_findings(results: Results) -> list[Finding]:
     H, H_90 = read_grid(results, "H"), read_grid(results, "H_90")
     if isinstance(H, str) or isinstance(H_90, str):
         return undecided(CLAIMS, str(H))
-    four = (_S1, _S2, _S3, _S4)
-    by_H, by_H_90 = [judged(H) for judged in four], [judged(H_90) for judged in four]
-    found = [*by_H, _S5(H, H_90, by_H, by_H_90), _S6(H), _S7(results, H)]
-    if not H.left_out:
-        return found
-    left_out = f"; left out for want of results: {named(H.left_out)}"
-    return [Finding(**{**finding, "evidence": finding["evidence"] + left_out}) for finding in found]
+    found = [*judged(H, H_90), _S7(results, H)]
+    few, left_out = too_few(H.table.runs), named(H.left_out)
+    notes = [*([few] if few else []), *([f"left out for want of results: {left_out}"] if left_out else [])]
+    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in found]
 
 
-def read_grid(results: Results, metric: str) -> Grid | str:
+def judged(H: Grid, H_90: Grid) -> list[Finding]:
+    """Verdicts on S1-S6 from tables of both metrics."""
+    by_H, by_H_90 = ([RULES[key](grid) for key in ("S1", "S2", "S3", "S4")] for grid in (H, H_90))
+    return [*by_H, _S5(H, H_90, by_H, by_H_90), RULES["S6"](H)]
+
+
+def read_grid(results: Results, metric: Metric) -> Grid | str:
     """H or H_90 of a finished study as a grid, or the reason why there is none."""
     claims, cells = results.plan.study.claims, judged_cells(results)
     assert claims is not None
@@ -116,25 +121,21 @@ def read_grid(results: Results, metric: str) -> Grid | str:
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
         return "pure data-driven has no result in every cell"
-    amounts, seeds = tuple(sorted(set(cells["N_D"]))), tuple(sorted(set(cells["seed"])))
-    if len(amounts) < 2:
+    if cells["N_D"].nunique() < 2:
         return "the findings are about a growing N_D, and the study has one"
     members = {
         family: [one.name for one in results.plan.foundations if one.family == family]
         for family in (claims.moderate, claims.high)
     }
-    sound = {family: tuple(name for name in names if name not in failed) for family, names in members.items()}
-    moderate, high = sound[claims.moderate], sound[claims.high]
-    wide = cells.set_index(["model", "N_D", "seed"])[metric].unstack("seed")
-    return Grid(
-        amounts=tuple(int(amount) for amount in amounts),
-        seeds=tuple(int(seed) for seed in seeds),
-        moderate=moderate,
-        high=high,
-        A={str(model): float(A) for model, A in cells.groupby("model")["A"].mean().items() if model != NO_MODEL},
-        H={model: wide.loc[model].to_numpy(dtype=float) for model in (*moderate, *high, NO_MODEL)},
-        left_out=tuple(name for names in members.values() for name in names if name in failed),
-    )
+    table = error_table(results, [name for names in members.values() for name in names], metric)
+    sound = {
+        family: tuple(name for name in names if name in table.H and name in table.A)
+        for family, names in members.items()
+    }
+    left_out = tuple(name for names in members.values() for name in names if name not in table.H or name not in table.A)
+    kept = (*sound[claims.moderate], *sound[claims.high])
+    table = replace(table, A={name: table.A[name] for name in kept})
+    return Grid(table, sound[claims.moderate], sound[claims.high], left_out)
 
 
 def _finding(key: str, found: Verdict, evidence: str, **numbers: float) -> Finding:
@@ -145,172 +146,181 @@ def _without(key: str, what: str) -> Finding:
     return _finding(key, "undecided", f"no {what} model has a result in every cell")
 
 
-def _lead(H: Mapping[str, Array], members: tuple[str, ...]) -> Array:
-    """(members, amounts): whether a member has a lower H than pure data-driven."""
-    return np.array([H[model] < H[NO_MODEL] for model in members])
+def _range(found: Contrasts) -> str:
+    """The least and the greatest of some differences, with their intervals."""
+    least, most = int(found.mean.argmin()), int(found.mean.argmax())
+    return measured(found, least) + (f" to {measured(found, most)}" if least != most else "")
 
 
 def _S1(grid: Grid) -> Finding:
     if not grid.moderate:
         return _without("S1", "moderate")
-
-    def holds(H: Mapping[str, Array]) -> bool:
-        lead = _lead(H, grid.moderate)
-        return bool(lead[:, 0].all() and lead.all(axis=1).mean() > 0.5)
-
-    lead, count, first, last = _lead(grid.mean, grid.moderate), len(grid.moderate), grid.amounts[0], grid.amounts[-1]
-    at_first = [grid.mean[model][0] for model in grid.moderate]
+    count, amounts, table = len(grid.moderate), grid.amounts, grid.table
+    leads = [table.against(NO_MODEL, grid.moderate, place) for place in range(len(amounts))]
+    begins = verdict(every(leads[0].above), some(leads[0].below))
+    most = count // 2 + 1
+    ahead, behind = (np.array([at_least(side, most) for side in sides]) for sides in _sides(leads))
+    keeps = verdict(every(ahead), some(behind))
+    won = [int(shown(lead.above).sum()) for lead in leads]
+    plain = ""
+    if PLAIN in table.H:
+        over_plain = shown(table.against(PLAIN, grid.moderate, 0).above).sum()
+        plain = f" ({over_plain} of {count} beat networks without mirror symmetry, {metres(table.mean(PLAIN, 0))})"
     evidence = (
-        f"at N_D = {first}, {lead[:, 0].sum()} of {count} moderate models ({metres(min(at_first))} to "
-        f"{metres(max(at_first))}) beat pure data-driven ({grid.value(NO_MODEL, 0)}); "
-        f"{lead.all(axis=1).sum()} of {count} lead at every N_D, {lead[:, -1].sum()} of {count} at {last}"
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models beat pure data-driven "
+        f"({grid.value(NO_MODEL, 0)}), by {_range(leads[0])}{plain}; that most keep the lead is {keeps}: "
+        f"{', '.join(f'{number} at {N}' for number, N in zip(won[1:], amounts[1:], strict=True))}"
     )
     numbers = {
-        f"share in the lead at N_D = {first}": lead[:, 0].mean(),
-        "share in the lead at every N_D": lead.all(axis=1).mean(),
-        f"share in the lead at N_D = {last}": lead[:, -1].mean(),
+        f"share shown to lead at N_D = {N}": number / count
+        for number, N in ((won[0], amounts[0]), (won[-1], amounts[-1]))
     }
-    return _finding("S1", grid.judge(holds), evidence, **numbers)
+    return _finding("S1", weakest((begins, keeps)), evidence, **numbers)
+
+
+def _sides(found: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
+    return [one.above for one in found], [one.below for one in found]
+
+
+def _slope(x: Array) -> Array:
+    """Weights of the slope by least squares over x, for a doubling of what x is the logarithm of."""
+    centred = x - x.mean()
+    weights: Array = np.log(2) * centred / np.square(centred).sum()
+    return weights
 
 
 def _S2(grid: Grid) -> Finding:
-    amounts = np.array(grid.amounts, dtype=float)
-
-    def falls(H: Array) -> bool:
-        return rank_correlation(amounts, H) <= -TREND and H[-1] < H[0]
-
-    means = grid.mean
-    trends = {model: rank_correlation(amounts, H) for model, H in means.items()}
-    fallen = [model for model, H in means.items() if falls(H)]
-    left = float(np.median([H[-1] / H[0] for H in means.values()]))
-    steps = np.array([H[1:] / H[:-1] for H in means.values()])
+    weights = -_slope(np.log(np.array(grid.amounts, dtype=float)))
+    models = [*grid.physics, NO_MODEL]
+    places = range(len(grid.amounts))
+    falls = grid.table.compare([[(float(weights[k]), model, k) for k in places] for model in models])
+    fallen = shown(falls.above)
+    left = float(np.median([grid.table.mean(model, places[-1]) / grid.table.mean(model, 0) for model in models]))
     evidence = (
-        f"{len(fallen)} of {len(means)} models fall from N_D = {amounts[0]:g} to {amounts[-1]:g}, to {left:.0%} in the "
-        f"median (rank correlation {min(trends.values()):.2f} to {max(trends.values()):.2f}); {(steps < 1).sum()} of "
-        f"{steps.size} steps fall, {(steps > 1 + TOLERANCE).sum()} rise by more than {TOLERANCE:.0%}"
+        f"H of {fallen.sum()} of {len(models)} models falls, by {_range(falls)} for twice the runs; "
+        f"N_D = {grid.amounts[-1]} leaves {left:.0%} of the error at {grid.amounts[0]} in the median"
     )
-    if len(fallen) < len(means):
-        evidence += f"; not: {named(model for model in means if model not in fallen)}"
+    if not fallen.all():
+        evidence += f"; not shown for: {named(m for m, good in zip(models, fallen, strict=True) if not good)}"
     return _finding(
         "S2",
-        grid.judge(
-            lambda H: all(falls(values) for values in H.values()),
-            weakly=lambda H: all(bool(values[-1] < values[0]) for values in H.values()),
-        ),
+        verdict(every(falls.above), some(falls.below)),
         evidence,
         **{
-            "share of models that fall": len(fallen) / len(means),
-            "share of steps that fall": float((steps < 1).mean()),
-            f"H at N_D = {amounts[-1]:g} / at {amounts[0]:g}, median": left,
+            "share of models shown to fall": float(fallen.mean()),
+            f"H at N_D = {grid.amounts[-1]:g} / at {grid.amounts[0]:g}, median": left,
         },
     )
 
 
 def _S3(grid: Grid) -> Finding:
-    if len(grid.physics) < FEWEST_MODELS:
-        return _finding("S3", "undecided", f"{len(grid.physics)} physics models, a trend needs {FEWEST_MODELS}")
-    A, amounts = np.array([grid.A[model] for model in grid.physics]), np.array(grid.amounts, dtype=float)
-
-    def trends(H: Mapping[str, Array]) -> tuple[Array, Array]:
-        columns = np.array([H[model] for model in grid.physics]).T
-        return np.array([rank_correlation(A, at) for at in columns]), np.array([median_slope(A, at) for at in columns])
-
-    def holds(H: Mapping[str, Array]) -> bool:
-        rises, slopes = trends(H)
-        flatter = slopes[-1] < slopes[0] and rank_correlation(amounts, slopes) <= -TREND
-        return bool((rises >= TREND).all() and slopes[0] > 0 and flatter)
-
-    def holds_weakly(H: Mapping[str, Array]) -> bool:
-        rises, slopes = trends(H)
-        return bool((rises > 0).all() and slopes[-1] < slopes[0])
-
-    rises, slopes = trends(grid.mean)
-    first, last = grid.amounts[0], grid.amounts[-1]
-    each = np.array([trends({m: H[:, k] for m, H in grid.H.items()})[1] for k in range(len(grid.seeds))])
-    ends = [f"{each[:, k].mean():.2f}{interval(*_ends(each[:, k]), len(each))}" for k in (0, -1)]
+    models, table = grid.physics, grid.table
+    if len(models) < FEWEST_MODELS:
+        return _finding("S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
+    A = np.array([table.mean(model, ALONE) for model in models])
+    weights = _slope(np.log(A))
+    each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
+    last = len(grid.amounts) - 1
+    flatter = [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]
+    found = table.compare([*each, flatter])
+    H = np.array([[table.mean(model, k) for model in models] for k in range(len(grid.amounts))])
+    order = np.vstack([H, H[0] - H[last]])
+    rises = [rank_correlation(A, values) for values in H]
     evidence = (
-        f"rank correlation of H and A {rises.min():.2f} to {rises.max():.2f} over N_D ({len(A)} models); median slope "
-        f"of H over A [m/m] {ends[0]} at N_D = {first}, {ends[1]} at {last}; steepest at "
-        f"{grid.amounts[int(slopes.argmax())]}"
+        f"for twice the A, H rises by {measured(found, 0)} at N_D = {grid.amounts[0]} and by {measured(found, last)} "
+        f"at {grid.amounts[last]}, {measured(found, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
+        f"{max(rises):.2f} over N_D ({len(A)} models)"
     )
     numbers = {
-        "least rank correlation of H and A": float(rises.min()),
-        f"slope at N_D = {first} [m/m]": float(each[:, 0].mean()),
-        f"slope at N_D = {last} [m/m]": float(each[:, -1].mean()),
+        "least rank correlation of H and A": min(rises),
+        f"rise for twice the A at N_D = {grid.amounts[0]} [m]": float(found.mean[0]),
+        f"rise for twice the A at N_D = {grid.amounts[last]} [m]": float(found.mean[last]),
     }
-    return _finding("S3", grid.judge(holds, holds_weakly), evidence, **numbers)
-
-
-def _ends(values: Array) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+    risen = np.maximum(found.above, by_chance(A, order))
+    fallen = np.maximum(found.below, by_chance(A, -order))
+    return _finding("S3", verdict(every(risen), some(fallen)), evidence, **numbers)
 
 
 def _S4(grid: Grid) -> Finding:
     if not grid.high:
         return _without("S4", "high")
-
-    def holds(H: Mapping[str, Array]) -> bool:
-        lead = _lead(H, grid.high)[:, -1]
-        return bool(lead.any() and not lead.all())
-
-    lead, last, orders = _lead(grid.mean, grid.high)[:, -1], grid.amounts[-1], len(grid.seeds)
-    worse = [model for model, ahead in zip(grid.high, lead, strict=True) if not ahead]
-    said = ", ".join(f"{model} {metres(grid.mean[model][-1])}" for model in worse[:3])
+    table, last = grid.table, grid.amounts[-1]
+    place = len(grid.amounts) - 1
+    lead = table.against(NO_MODEL, grid.high, place)
+    better, worse = shown(lead.above), shown(lead.below)
+    worst = [model for model, behind in zip(grid.high, worse, strict=True) if behind]
+    orders = table.H[NO_MODEL].shape[1]
+    said = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
     evidence = (
-        f"at N_D = {last}, {lead.sum()} of {len(lead)} high models beat pure data-driven ({grid.value(NO_MODEL, -1)}), "
-        f"{len(worse)} {'does' if len(worse) == 1 else 'do'} not{f' ({said})' if said else ''}"
+        f"at N_D = {last}, {better.sum()} of {len(better)} high models beat pure data-driven "
+        f"({grid.value(NO_MODEL, place)}), {len(worst)} {'is' if len(worst) == 1 else 'are'} worse"
+        f"{f' ({said})' if said else ''}"
     )
-    numbers = {f"share of high models in the lead at N_D = {last}": float(lead.mean())}
+    numbers = {
+        f"share of high models shown to lead at N_D = {last}": float(better.mean()),
+        f"share of high models shown to be worse at N_D = {last}": float(worse.mean()),
+    }
     if orders < FEWEST_ORDERS:
         plural = "s" * (orders > 1)
         evidence += (
             f"; fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} seed{plural}"
         )
         return _finding("S4", "undecided", evidence, **numbers)
-    found, moving = grid.judge(holds), False
     if not grid.moderate:
-        return _finding(
-            "S4", "undecided", f"{evidence}; no moderate model to compare their fluctuation with", **numbers
+        evidence += "; no moderate model to compare their fluctuation with"
+        return _finding("S4", "undecided", evidence, **numbers)
+    one_sided = every(lead.above) or every(lead.below)
+    moves: Verdict = "undecided"
+    if worst:
+        worst_moves, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
+        chance = _student(worst_moves - calm)
+        moves = verdict(chance <= LEVEL, 1 - chance <= LEVEL)
+        evidence += (
+            f"; over {orders} nested orders H of these varies by {worst_moves.mean():.0%}, of moderate models by "
+            f"{calm.mean():.0%}"
         )
-    if worse:
-        worst, calm = (float(np.median([_variation(grid.H[m]) for m in group])) for group in (worse, grid.moderate))
-        moving = worst > calm
-        evidence += f"; over {orders} nested orders H of these varies by {worst:.0%}, of moderate models by {calm:.0%}"
-        numbers |= {"variation of the worst": worst, "variation of moderate models": calm}
-    if worse and not moving:
-        evidence += ", so not more"
-    return _finding("S4", found if moving else "refuted", evidence, **numbers)
+        numbers |= {"variation of the worst": worst_moves.mean(), "variation of moderate models": calm.mean()}
+    split = verdict(bool(better.any() and worse.any()), one_sided)
+    return _finding("S4", weakest((split, moves)), evidence, **numbers)
 
 
-def _variation(H: Array) -> float:
-    """Standard deviation over seeds by mean of H (amounts, seeds), averaged over amounts."""
-    return float((H.std(axis=1, ddof=1) / H.mean(axis=1)).mean())
+def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
+    """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
+    H = np.array([table.H[model] @ table.weights for model in models])
+    moved: Array = np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1))
+    return moved
+
+
+def _student(values: Array) -> float:
+    """Chance of a mean as far above 0 if there were none (Student's t, one-sided)."""
+    spread = values.std(ddof=1) / len(values) ** 0.5
+    return float(stdtr(len(values) - 1, -values.mean() / spread)) if spread > 0 else float(values.mean() <= 0)
 
 
 def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Finding:
-    both = [np.concatenate([grid.H[model].ravel() for model in grid.H]) for grid in (H, H_90)]
+    both = [np.concatenate([grid.table.H[m] @ grid.table.weights for m in grid.table.H]).ravel() for grid in (H, H_90)]
     alike = rank_correlation(*both)
     changed = [
         (one["id"], one["verdict"], other["verdict"])
         for one, other in zip(by_H, by_H_90, strict=True)
         if one["verdict"] != other["verdict"]
     ]
-    opposite = any("undecided" not in change for change in changed)
-    same = alike >= ALIKE and not changed
+    opposite = any({"confirmed", "refuted"} <= set(change) for change in changed)
     evidence = f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
     evidence += ", ".join(f"{key} is {other} instead of {one}" for key, one, other in changed) or "S1-S4 are the same"
-    found = verdict(same, not opposite and alike >= UNLIKE)
+    found = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
-    return _finding("S5", found, evidence, **numbers)
+    return _finding("S5", found if H.table.runs > 1 else "undecided", evidence, **numbers)
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A moderate model that does better than something dearer; `sure` if in every seed. The best pair comes first."""
+    """A moderate model against something dearer: its difference, how much is saved, and the words."""
 
-    sure: bool
-    gain: float
+    terms: tuple[tuple[float, str, int], ...]
+    saved: float
     text: str
+    also: tuple[tuple[float, str, int], ...] = ()  # a second difference that must be shown, too
 
 
 def _S6(grid: Grid) -> Finding:
@@ -318,61 +328,71 @@ def _S6(grid: Grid) -> Finding:
         return _without("S6", "moderate")
     if len(grid.physics) < 2:
         return _finding("S6", "undecided", "one physics model: there is no other to compare it with")
-    if not _small(grid):
+    small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
+    if not small:
         return _finding("S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
-    if min(grid.A[model] for model in grid.physics) >= max(grid.A[model] for model in grid.moderate):
-        return _finding("S6", "undecided", "no physics model is more accurate than a moderate one")
-    data = {model: pair for model in grid.moderate if (pair := _against_data(grid, model))}
-    physics = {model: pair for model in grid.moderate if (pair := _against_physics(grid, model))}
-    kinds = (("pure data-driven with more runs", data), ("more accurate physics alone", physics))
-    evidence = "; ".join(
-        f"{len(pairs)} of {len(grid.moderate)} moderate models beat {what}"
-        + (f": {', '.join(pair.text for pair in _best(pairs.values()))}" if pairs else "")
-        for what, pairs in kinds
-    )
-    found = verdict(
-        *(all(any(test(pair) for pair in pairs.values()) for _, pairs in kinds) for test in (lambda p: p.sure, bool))
-    )
-    numbers = {f"share that beats {what}": len(pairs) / len(grid.moderate) for what, pairs in kinds}
-    return _finding("S6", found, evidence, **numbers)
+    kinds: list[tuple[str, Callable[[Grid, Sequence[int]], list[Pair]]]] = [
+        ("pure data-driven with more runs", _more_data),
+        ("more accurate physics alone", _better_physics),
+    ]
+    parts, said, numbers = [], [], {}
+    for what, pairs_of in kinds:
+        pairs = pairs_of(grid, small)
+        if not pairs:
+            return _finding("S6", "undecided", "no physics model is more accurate than a moderate one")
+        first = grid.table.compare([pair.terms for pair in pairs])
+        above, below = first.above, first.below
+        if pairs[0].also:
+            second = grid.table.compare([pair.also for pair in pairs])
+            above = np.maximum(above, second.above)
+        sure = [pair for pair, good in zip(pairs, shown(above), strict=True) if good]
+        best = sorted(sure, key=lambda pair: -pair.saved)[:MOST_PAIRS]
+        parts.append(verdict(bool(sure), every(below)))
+        said.append(f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}")
+        said[-1] += f": {', '.join(pair.text for pair in best)}" if best else ""
+        numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
+    return _finding("S6", weakest(parts), "; ".join(said), **numbers)
 
 
-def _best(pairs: Any) -> list[Pair]:
-    return sorted(pairs, key=lambda pair: (not pair.sure, -pair.gain))[:MOST_PAIRS]
+def _more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
+    """Every moderate model with a small amount against pure data-driven with the next larger one."""
+    return [
+        Pair(
+            ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
+            grid.amounts[k + 1] / grid.amounts[k] - grid.table.mean(model, k) / grid.table.mean(NO_MODEL, k + 1),
+            f"{model} with {grid.amounts[k]} runs {grid.value(model, k)} against {grid.amounts[k + 1]} runs without "
+            f"physics, {grid.value(NO_MODEL, k + 1)}",
+        )
+        for model in grid.moderate
+        for k in small
+    ]
 
 
-def _small(grid: Grid) -> list[int]:
-    """Places of the small amounts: at most half of the largest."""
-    return [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
+def _better_physics(grid: Grid, small: Sequence[int]) -> list[Pair]:
+    """Every moderate model with the largest small amount against every more accurate physics alone."""
+    table, k = grid.table, small[-1]
+    return [
+        Pair(
+            ((1.0, other, ALONE), (-1.0, model, k)),
+            table.mean(model, ALONE) / table.mean(other, ALONE),
+            f"{model} ({metres(table.mean(model, ALONE))} alone) with {grid.amounts[k]} runs {grid.value(model, k)} "
+            f"against {other} alone, {metres(table.mean(other, ALONE))}",
+            ((1.0, model, ALONE), (-1.0, other, ALONE)),
+        )
+        for model in grid.moderate
+        for other in grid.physics
+        if table.mean(other, ALONE) < table.mean(model, ALONE)
+    ]
 
 
-def _against_data(grid: Grid, model: str) -> Pair | None:
-    """The pair of amounts with which a model saves most runs against pure data-driven."""
-    errors, pure, found = grid.H[model], grid.H[NO_MODEL], []
-    for i in _small(grid):
-        for j in range(i + 1, len(grid.amounts)):
-            if errors[i].mean() < pure[j].mean():
-                text = f"{model} with {grid.amounts[i]} runs {metres(errors[i].mean())} beats "
-                text += f"{grid.amounts[j]} runs without physics, {metres(pure[j].mean())}"
-                saved = (
-                    grid.amounts[j] - grid.amounts[i] + 1 - errors[i].mean() / pure[j].mean()
-                )  # ties: the wider margin
-                found.append(Pair(bool((errors[i] < pure[j]).all()), saved, text))
-    return next(iter(_best(found)), None)
+RULES: Mapping[str, Callable[[Grid], Finding]] = {"S1": _S1, "S2": _S2, "S3": _S3, "S4": _S4, "S6": _S6}
+"""The rules that judge one table."""
 
 
-def _against_physics(grid: Grid, model: str) -> Pair | None:
-    """The most accurate physics alone, better than the model's physics alone, that a model beats with few runs."""
-    found = []
-    for i in _small(grid):
-        errors = grid.H[model][i]
-        for other in grid.physics:
-            if errors.mean() < grid.A[other] < grid.A[model]:
-                text = f"{model} ({metres(grid.A[model])} alone) with {grid.amounts[i]} runs {metres(errors.mean())} "
-                text += f"beats {other} alone, {metres(grid.A[other])}"
-                gain = grid.A[model] / grid.A[other] + 1e-6 / grid.amounts[i]  # ties: the fewest runs
-                found.append(Pair(bool((errors < grid.A[other]).all()), gain, text))
-    return next(iter(_best(found)), None)
+def smooth_by_construction(plan: Plan) -> bool:
+    """Whether the compensation of the judged method is a polynomial of time with fewer terms than steps."""
+    way = next(way for way in plan.methods if way.name == plan.judged)
+    return getattr(way.method, "terms", plan.study.prediction.horizon) < plan.study.prediction.horizon
 
 
 def _S7(results: Results, grid: Grid) -> Finding:
@@ -380,27 +400,41 @@ def _S7(results: Results, grid: Grid) -> Finding:
         return _without("S7", "physics")
     if results.test.horizon < 3:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
+    if smooth_by_construction(results.plan):
+        evidence = (
+            "the compensation is a polynomial of time, which is smooth whatever it learned; `path-trained` is not"
+        )
+        return _finding("S7", "not testable", evidence)
     first = grid.amounts[0]
-    true = roughness(results.test.future)
-    judged = judged_cells(results)
-    cells = judged[judged["N_D"] == first].set_index(["model", "seed"])["cell"]
-    rough = {m: np.array([roughness(results.paths[cells[m, seed]]) for seed in grid.seeds]) for m in grid.H}
-    alone = float(np.median([roughness(results.physics[model]) for model in grid.physics]))
+    cells = judged_cells(results)
+    cells = cells[cells["N_D"] == first]
+    runs, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
 
-    def holds(of: Mapping[str, float]) -> bool:
-        return of[NO_MODEL] > ROUGH * true >= float(np.median([of[model] for model in grid.physics]))
+    def by_run(path: Array) -> Array:
+        return np.array([roughness(path[:, place == k]) for k in range(len(runs))])
 
-    on_average = holds({model: values.mean() for model, values in rough.items()})
-    every = all(holds({model: values[k] for model, values in rough.items()}) for k in range(len(grid.seeds)))
-    pure, together = rough[NO_MODEL], np.median([rough[model] for model in grid.physics], axis=0)
-    evidence = (
-        f"at N_D = {first}: pure data-driven {metres(pure.mean())}{interval(*_ends(pure), len(pure))}, cooperative "
-        f"{metres(together.mean())}{interval(*_ends(together), len(together))} in the median, physics alone "
-        f"{metres(alone)}, true paths {metres(true)}"
-    )
-    numbers = {
-        "roughness of pure data-driven [m]": float(pure.mean()),
-        "roughness of cooperative models, median [m]": float(together.mean()),
-        "roughness of true paths [m]": true,
+    paths: Mapping[str, list[Array]] = {
+        model: [by_run(results.paths[cell]) for cell in cells["cell"][cells["model"] == model]]
+        for model in (NO_MODEL, *grid.physics)
     }
-    return _finding("S7", verdict(on_average and every, on_average), evidence, **numbers)
+    true, pure = by_run(results.test.future), np.mean(paths[NO_MODEL], axis=0)
+    together = np.mean([values for model in grid.physics for values in paths[model]], axis=0)
+    found, numbers = rough(true, pure, together, counts.astype(float))
+    evidence = (
+        f"at N_D = {first}: pure data-driven {metres(numbers['roughness of pure data-driven [m]'])}, cooperative "
+        f"{metres(numbers['roughness of cooperative models [m]'])} in the mean, true paths "
+        f"{metres(numbers['roughness of true paths [m]'])} ({manoeuvres(len(runs))})"
+    )
+    return _finding("S7", found, evidence, **numbers)
+
+
+def rough(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
+    """Verdict on S7 from the roughness (R,) [m] of true, pure data-driven and cooperative paths by test manoeuvre."""
+    found = contrasts(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
+    share = counts / counts.sum()
+    numbers = {
+        "roughness of pure data-driven [m]": float(pure @ share),
+        "roughness of cooperative models [m]": float(together @ share),
+        "roughness of true paths [m]": float(true @ share),
+    }
+    return verdict(every(found.above), some(found.below)), numbers

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,14 +23,16 @@ from shipid.logs.importing import sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
-from shipid.simulation.truth import Truth, check_truth
+from shipid.predictor import MOST_STEPS
+from shipid.simulation.truth import Truth, check_truth, old_keys
+from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
 WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
-MOST_STEPS = 100_000
+OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
@@ -116,6 +119,17 @@ class Grid(Strict):
     seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
 
 
+class BandsBlock(Strict):
+    """`[bands]`: how far off a prediction may be."""
+
+    level: Annotated[FiniteFloat, Field(gt=0, le=0.99, description="share of true paths that a band holds whole")] = 0.9
+    refits: Annotated[int, Field(ge=0)] = Field(
+        default=0,
+        description="further fits, each without a share of the runs, of methods and identified families that need them "
+        "for a band; 5 is enough, 0: no band for those",
+    )
+
+
 class Claims(Strict):
     """`[claims]`: the families, and the method, that findings speak of: R1-R4 at full scale, S1-S7 in simulation."""
 
@@ -163,6 +177,13 @@ class Published(Strict):
         return self
 
 
+class Condition(Strict):
+    """`[[condition]]`: what is different in one part of a study; its other parts stand beside it."""
+
+    name: Annotated[str, Field(pattern=NAME)]
+    set: dict[str, Any] = Field(default={}, description="dotted path -> value")
+
+
 class MethodBlock(BaseModel):
     """`[[method]]`: a way to improve physics by data; every further key is a setting of its kind."""
 
@@ -193,7 +214,13 @@ class Study(Strict):
     method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
     published: Published | None = None
+    bands: BandsBlock = BandsBlock()
+    unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     family: Annotated[list[Family], Field(min_length=1)]
+    repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
+        default={}, description="dotted path -> values: the study is done for each; the comparison pools them"
+    )
+    condition: list[Condition] = Field(default=[], description="the study is done in each; shown side by side")
 
     @model_validator(mode="after")
     def _one_world(self) -> Study:
@@ -243,12 +270,17 @@ class Foundation:
 
 @dataclass(frozen=True)
 class Way:
-    """A method of the study under its name, with the foundations that it meets."""
+    """A method of the study under its name.
+
+    foundations : those that it meets, by name. left_out : those with an observer that its families would include, but
+        that its kind cannot take.
+    """
 
     name: str
     kind: str
     method: Method
     foundations: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -269,6 +301,14 @@ class Batch:
 
 
 @dataclass(frozen=True)
+class Part:
+    """One repetition of a study in one condition. `condition` is empty where the study has none."""
+
+    condition: str
+    plan: Plan
+
+
+@dataclass(frozen=True)
 class Plan:
     """A study ready to run: checked document, foundations before any redraw, methods and batches.
 
@@ -277,6 +317,8 @@ class Plan:
     vessels : every vessel that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from.
     changes : what `--set` changed, already in the document.
+    parts : name -> a study of its own, for every repetition in every condition; empty where there is neither. Then they
+        are what is run.
     """
 
     name: str
@@ -290,12 +332,14 @@ class Plan:
     vessels: Mapping[str, Vessel] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
+    parts: Mapping[str, Part] = field(default_factory=dict)
 
     @property
     def used_vessels(self) -> list[Vessel]:
         """The vessel of the truth, if there is one, and the bases of the foundations."""
         every = (self.truth, *(foundation.base for foundation in self.foundations))
-        return [vessel for vessel in every if vessel is not None]
+        of_parts = (vessel for part in self.parts.values() for vessel in part.plan.used_vessels)
+        return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
     @property
     def digest(self) -> str:
@@ -309,7 +353,7 @@ class Plan:
 
     def _digest(self, document: Document) -> str:
         vessels = sorted({vessel.digest for vessel in self.used_vessels})
-        methods = [{"kind": way.kind, **way.method.model_dump(mode="json")} for way in self.methods]
+        methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
         depends = {"vessels": vessels, "sources": dict(self.sources), "methods": methods}
         return documents.digest({"study": document, **depends})
 
@@ -328,6 +372,17 @@ class Plan:
         """Name of the method that findings and the answer speak of."""
         named = self.study.claims.method if self.study.claims else None
         return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
+
+    @property
+    def plain(self) -> str | None:
+        """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
+        alone = [way for way in self.methods if way.foundations == (NO_MODEL,) and way.name != self.judged]
+        return next((way.name for way in alone if getattr(way.method, "mirror", None) == 0.0), None)
+
+    @property
+    def learning(self) -> list[str]:
+        """Names of the methods that learn from data, but for the plain rival without physics."""
+        return [way.name for way in self.methods if way.method.compensates and way.name != self.plain]
 
     @property
     def causal(self) -> tuple[str, ...]:
@@ -352,10 +407,15 @@ class Plan:
         """Number of cells."""
         return len(self.batches) * len(self.pairs)
 
+    def cut(self, columns: int) -> Cut:
+        """What decides how much memory the windows take, for a dataset of so many columns."""
+        prediction = self.study.prediction
+        rolled = len(self.foundations)
+        return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
+
     def label(self, foundation: str, method: str) -> str:
         """Name of a model for people: the foundation, with the method where that is not the only one that learns."""
-        learning = [way.name for way in self.methods if way.method.compensates]
-        return foundation if [method] == learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
+        return foundation if [method] == self.learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
 
     def text(self) -> str:
         """The resolved document as TOML."""
@@ -377,10 +437,27 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     for path, value in (changes or {}).items():
         try:
             document = documents.replace(document, {path: value})
-        except (ValueError, IndexError, TypeError, AttributeError):
+        except IndexError:
+            raise DocumentError(f"--set: {_beyond(document, path)}", file=file, path=path) from None
+        except (ValueError, TypeError, AttributeError):
             message = f"--set cannot reach this path: {choices(path, known)}"
             raise DocumentError(message, file=file, path=path) from None
     return build_plan(document, file, changes=changes)
+
+
+def _beyond(document: Document, path: str) -> str:
+    """Which list of a document a path leaves, and how long the list is."""
+    keys = documents.parts(path)
+    value: Any = document
+    for place, key in enumerate(keys):
+        if isinstance(value, list) and int(key) >= len(value):
+            name = ".".join(keys[:place])
+            last = f", {name}.0 to {name}.{len(value) - 1}" if len(value) > 1 else f", {name}.0" if value else ""
+            return (
+                f"there is no {name}.{key}: {name} has {len(value)} {'entry' if len(value) == 1 else 'entries'}{last}"
+            )
+        value = value[int(key)] if isinstance(value, list) else value[key]
+    raise KeyError(path)
 
 
 def build_plan(
@@ -391,8 +468,11 @@ def build_plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
+    documents.check_values(document, file)
     _check_version(document, file)
     study = documents.parse(Study, document, file).in_its_world()
+    check_ranges(document, file)
+    check_seeds(study, file)
     known = dict(vessels or {})
     foundations = _foundations(study, file, known)
     methods = _methods(study, foundations, file)
@@ -411,9 +491,79 @@ def build_plan(
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
     found = _sources(study.data, file) if sources is None and study.data is not None else sources
-    return Plan(
+    plan = Plan(
         file.stem, str(file), document, study, foundations, methods, batches, truth, known, found or {}, changes or {}
     )
+    _check_names(plan)
+    _check_memory(plan)
+    return replace(plan, parts=_parts(plan, file, known))
+
+
+def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
+    """Every repetition in every condition: `constant-1`, ...; DocumentError with the path of the cause."""
+    repeat, conditions = plan.study.repeat, plan.study.condition
+    if not repeat and not conditions:
+        return {}
+    names = [condition.name for condition in conditions]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise DocumentError(f"two conditions are called {name!r}", file=file, path=f"condition.{place}.name")
+    bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
+    turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
+    found: dict[str, Part] = {}
+    for place, condition in enumerate(conditions or [None]):
+        for number, turn in enumerate(turns, start=1):
+            words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
+            name = "-".join(words)
+            mine: dict[str, Any] = {} if condition is None else condition.set
+            part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
+            part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
+            whole: dict[str, Any] = {"repeat": {}, "condition": []}
+            found[name] = Part(
+                condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
+            )
+    return found
+
+
+def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
+    """A document with changes; DocumentError that names the key of the change where it reaches nothing."""
+    for path, value in changes.items():
+        if path.split(".", 1)[0] not in set(Study.model_fields) - set(OF_PARTS):
+            message = f"no such block: {choices(path, set(Study.model_fields) - set(OF_PARTS))}"
+            raise DocumentError(message, file=file, path=f"{where}.{path}")
+        try:
+            document = documents.replace(document, {path: value})
+        except (ValueError, IndexError, TypeError, AttributeError):
+            raise DocumentError("reaches no key of this study", file=file, path=f"{where}.{path}") from None
+    return document
+
+
+def _check_names(plan: Plan) -> None:
+    """Refuse names that are too long for the file of a cell."""
+    for name, way in plan.pairs:
+        longest = max(len(batch.cell(name, way.name)) for batch in plan.batches)
+        if longest > LONGEST_NAME:
+            message = (
+                f"{name[:40]}...: the name of a cell would have {longest} characters, at most {LONGEST_NAME} can be"
+            )
+            raise DocumentError(f"{message}: shorten the names of families and methods", file=plan.file, path="family")
+
+
+def _check_memory(plan: Plan) -> None:
+    """Refuse a truth whose records or windows exceed the memory of this machine, with the number that causes it."""
+    truth = plan.study.truth
+    if truth is None or plan.truth is None:
+        return
+    commands = 2 * len(plan.truth.document.get("thruster", {}))
+    columns = 8 + commands
+    each = {"truth.step": commands + columns * bool(truth.sensors) + 4 * bool(truth.gusts), "truth.interval": columns}
+    for path, between in (("truth.step", truth.step), ("truth.interval", truth.interval)):
+        numbers = truth.manoeuvres * truth.length / between * each[path]
+        words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
+        check_memory(numbers, words, path, plan.file)
+    words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
+    numbers = truth.manoeuvres * plan.cut(columns).numbers(truth.length)
+    check_memory(numbers, words, "prediction.interval", plan.file)
 
 
 def beside(folder: Path, name: str) -> Path:
@@ -478,21 +628,40 @@ def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vesse
 
 
 def _check_version(document: Document, file: Path) -> None:
-    """Refuse a document of version 0.1 with one line that says what to write instead."""
+    """Refuse a document of version 0.1: a line for each old key, with what to write instead."""
+    old = [DocumentError(message, file=file, path=path) for path, message in _old_keys(document)]
+    if old:
+        raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])
+
+
+def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
+    """Yield the dotted path of every key of version 0.1 in a document, and what to write instead."""
     if "recipe" in document:
         kind = document["recipe"].get("kind", "fast") if isinstance(document["recipe"], dict) else "fast"
         new = {"paper": "path-trained"}.get(kind, "path-drawn")
-        message = f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
-        raise DocumentError(message, file=file, path="recipe")
+        yield "recipe", f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
     prediction = document.get("prediction")
     if isinstance(prediction, dict) and "horizon" in prediction:
         value, step = prediction["horizon"], prediction.get("step", 1.0)
         numbers = isinstance(value, int | float) and isinstance(step, int | float)
         seconds = f"ahead = {value * step:g}" if numbers else "ahead"
-        message = f"was a number of steps: write {seconds}, in seconds"
-        raise DocumentError(message, file=file, path="prediction.horizon")
+        yield "prediction.horizon", f"was a number of steps: write {seconds}, in seconds"
     if isinstance(prediction, dict) and "method" in prediction:
-        raise DocumentError("is now called `integrator`", file=file, path="prediction.method")
+        yield "prediction.method", "is now called `integrator`"
+    truth = document.get("truth")
+    if isinstance(truth, dict) and (moved := old_keys(truth)):
+        yield "truth", moved
+    families = document.get("family")
+    for index, family in enumerate(families if isinstance(families, list) else []):
+        if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():
+            yield f"family.{index}.identify", _family_of_its_own(str(family.get("name", "")), "identify")
+
+
+def _family_of_its_own(name: str, block: str) -> str:
+    return (
+        "an identified or observed family is a family of its own: take the block out of this one and add "
+        f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
+    )
 
 
 def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
@@ -534,11 +703,7 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
-            message = (
-                "an identified or observed family is a family of its own: take the block out of this one and add "
-                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]'
-            )
-            raise DocumentError(message, file=file, path=f"family.{index}.{block}")
+            raise DocumentError(_family_of_its_own(one.name, block), file=file, path=f"family.{index}.{block}")
         index = by_name[one.extends]
     return index
 
@@ -584,7 +749,11 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
         met: set[str] = set()
+        refused = set() if method.meets_observer else {f.family for f in foundations if f.observer is not None}
         for pattern in block.families:
+            if pattern in refused:
+                message = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
+                raise DocumentError(message, file=file, path=f"{path}.families")
             matching = documents.match(pattern, families)
             if not matching:
                 message = f"{pattern!r} is no family: {choices(pattern, families)}"
@@ -592,11 +761,15 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
             met.update(matching)
         if not method.meets_none:
             met -= {NO_MODEL}
-        ways.append(Way(block.name, block.kind, method, tuple(f.name for f in foundations if f.family in met)))
+        left_out = tuple(f.name for f in foundations if f.family in met & refused)
+        taken = tuple(f.name for f in foundations if f.family in met - refused)
+        ways.append(Way(block.name, block.kind, method, taken, left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:
-        raise DocumentError(f"no method meets {idle!r}: name its family in `families`", file=file, path="method")
+        observed = any(idle in way.left_out for way in ways)
+        remedy = "add one that takes an observer, such as alone" if observed else "name its family in `families`"
+        raise DocumentError(f"no method meets {idle!r}: {remedy}", file=file, path="method")
     return tuple(ways)
 
 

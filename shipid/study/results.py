@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,14 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
+from shipid.errors import DataError, ResultError
 from shipid.files import read_json
+from shipid.hybrid.bands import Bands, Region
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
@@ -28,16 +31,17 @@ from shipid.study.survey import kinds_of
 from shipid.vessel.outline import ship_outline
 
 ALL_KINDS = "all"
-MOST_TEST_RUNS = 4  # shown over time and in the window browser
+MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
-INSTANTS = 7  # windows of a test run in the browser
+INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
 @dataclass(frozen=True, repr=False)
 class Results:
     """A run's folder, read: the plan, one row per cell, models, test windows, and errors (T, S) of every cell.
 
-    errors : cell -> position error (T, S) [m]; paths : cell -> predicted path (T, S, 2) [m] in the frame (11).
+    paths : cell -> predicted path (T, S, 2) [m] in the frame (11). bands : cell -> its bands, where it has any;
+    no_band : cell -> why it has none of the level of the study.
     """
 
     folder: Path
@@ -50,6 +54,8 @@ class Results:
     paths: Mapping[str, np.ndarray]
     dataset: Dataset
     provenance: Mapping[str, Any]
+    bands: Mapping[str, Bands] = field(default_factory=dict)
+    no_band: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         done = f"{len(self.cells)} of {self.plan.cells} cells"
@@ -70,11 +76,17 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
     folder = Path(folder)
     plan = store.stored_plan(folder)
+    if plan.parts:
+        named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
+        raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
+    seals.check(folder)
     cells = store.read_rows(folder)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
     paths = {}
+    bands: dict[str, Bands] = {}
+    no_band: dict[str, str] = {}
     known: dict[str, Estimates] = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
@@ -84,6 +96,12 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
                 plan, predictor.vessel, dataset, test, _observed(predictor, known_by_then(plan, dataset), known)
             )
             paths[row["cell"]] = predictor.predict(instants, alone)
+            if predictor.bands is not None:
+                bands[row["cell"]] = predictor.bands
+            try:
+                predictor.check_level(plan.study.bands.level)
+            except DataError as error:
+                no_band[row["cell"]] = error.message
     return Results(
         folder=folder,
         plan=plan,
@@ -95,6 +113,8 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         paths=paths,
         dataset=dataset,
         provenance=read_json(folder / store.PROVENANCE),
+        bands=bands,
+        no_band=no_band,
     )
 
 
@@ -250,9 +270,15 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
     found, naive, cells = [], constant_motion(test), _shown_cells(results)
+    level, edges = results.plan.study.bands.level, {}
+    for row in cells:
+        bands_of_cell = results.bands.get(row["cell"])
+        if bands_of_cell is not None and bands_of_cell.promises(level):
+            edges[row["cell"]] = bands_of_cell.region(results.paths[row["cell"]], test.columns, test.step, level)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
-        for index in indices[np.unique(np.linspace(0, len(indices) - 1, INSTANTS).round().astype(int))]:
+        most = min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
+        for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             paths = {
                 (model, "physics", 0): path[:, index]
                 for model, path in results.physics.items()
@@ -262,6 +288,11 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 if row["seed"] == seed:
                     paths[row["model"], "cooperative", row["N_D"]] = results.paths[row["cell"]][:, index]
             paths["", "naive", 0] = naive[:, index]
+            bands = {
+                (row["model"], "cooperative", row["N_D"]): border(edges[row["cell"]], results.paths[row["cell"]], index)
+                for row in cells
+                if row["seed"] == seed and row["cell"] in edges
+            }
             origin = np.zeros((1, 2))
             found.append(
                 {
@@ -272,9 +303,21 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                     "truth": np.concatenate([origin, test.future[:, index]]),
                     "paths": {key: np.concatenate([origin, path]) for key, path in paths.items()},
                     "wind": _wind(test, int(index)),
+                    "bands": bands,
                 }
             )
     return found
+
+
+def border(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
+    """Outline (n, 2) [m] of a band in the frame (11): port side, round the last region, and back along starboard."""
+    path, ahead = paths[:, index], region.ahead[:, index]
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    reach = region.across[:, index, None] * aside
+    round_ = np.linspace(-np.pi / 2, np.pi / 2, 13)[:, None]
+    end = path[-1] + region.along[-1, index] * np.cos(round_) * ahead[-1] + np.sin(round_) * reach[-1]
+    origin = np.zeros((1, 2))
+    return np.concatenate([origin, path - reach, end, (path + reach)[::-1], origin])
 
 
 def _final_heading(results: Results, run: str, t: float) -> float:
@@ -348,9 +391,14 @@ def naive_summary(results: Results) -> dict[str, float]:
 
 def reproducing_command(results: Results) -> str:
     """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
-    file = Path(results.provenance["file"])
-    name = results.plan.name if documents.bundled("studies").get(results.plan.name) == file else str(file)
-    changes = results.provenance.get("changes", {})
+    return command_of(replace(results.plan, changes=results.provenance.get("changes", {})))
+
+
+def command_of(plan: Plan) -> str:
+    """Return the command that runs a study, with its changes."""
+    file = Path(plan.file)
+    name = plan.name if documents.bundled("studies").get(plan.name) == file else str(file)
+    changes = plan.changes
     return " ".join(
         ["shipid study run", name, *(f"--set '{path}={json.dumps(value)}'" for path, value in changes.items())]
     )
@@ -399,6 +447,10 @@ def provenance_words(results: Results) -> dict[str, str]:
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)
+    sessions = record.get("sessions", [])
+    changed = [words for one, other in pairwise(sessions) for words in store.differences(one, other)]
+    if changed:
+        words["computed in parts"] = "; ".join(changed)
     notes = record.get("notes", [])
     if notes:
         words["notes"] = "; ".join(notes)

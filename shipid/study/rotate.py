@@ -8,17 +8,21 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
+from shipid.study.error_table import ErrorTable
+from shipid.study.findings import Rivals, judged
 from shipid.study.plan import NO_MODEL, Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_batch
+from shipid.study.verdict import Finding
 
-CONFIDENCE = 0.95
-KEYS = ["test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90", "naive", "status"]
+KEYS = [
+    *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
+    *("coverage", "width", "naive", "status"),
+]
 
 
 def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
@@ -40,7 +44,8 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
 def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu") -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
-    A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 and naive [m], status. No
+    A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
+    [1] and width [m] of the band, naive [m], status. No
     training window shares a moment with the test run.
     """
     for test in tests:
@@ -70,53 +75,41 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
             "H": part["H"].mean(),
         }
         row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
+        row |= {"coverage": part["coverage"].mean(), "width": part["width"].mean()}
         compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
         rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
     return pd.DataFrame(rows)
 
 
-def contrasts(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
-    """What R1-R4 compare, as paired differences over the turns: id, difference, mean, low, high [m], turns above 0.
+def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
+    """Verdicts on R1-R4 over the turns, each a test manoeuvre; R4 by the mean over the horizon.
 
-    Seeds are averaged first; low and high are Student's 95 % interval over the turns, which share training runs and so
-    are not independent: it is too narrow rather than too wide. No rows without `accurate` and `inaccurate`.
+    Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Nothing without
+    `accurate` and `inaccurate`, or where fewer than two turns have what they need.
     """
     claims = plan.study.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
-        return pd.DataFrame(columns=["id", "difference", "mean", "low", "high", "above", "turns"])
-    per_turn = _per_turn(frame[frame["method"] == plan.judged])
+        return []
+    mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(plan.aside)]
     good, bad = claims.accurate, claims.inaccurate
-    kinds = [good, bad, NO_MODEL, *dict.fromkeys(per_turn["family"])]
-    A, H = (
-        per_turn.pivot_table(index="test", columns="family", values=name, dropna=False).reindex(
-            columns=list(dict.fromkeys(kinds))
-        )
-        for name in ("A", "H")
-    )
-    others = [kind for kind in H.columns if kind != NO_MODEL and kind not in plan.aside]
-    found = {
-        ("R1", f"{good}: A less H"): A[good] - H[good],
-        ("R1", f"{bad}: A less H"): A[bad] - H[bad],
-        ("R2", f"A of {good} less H of {bad}"): A[good] - H[bad],
-        ("R3", "gap of A less gap of H"): (A[bad] - A[good]).abs() - (H[bad] - H[good]).abs(),
-        ("R4", "H of none less the worst other H"): H[NO_MODEL] - H[others].max(axis=1),
-    }
-    rows = []
-    for (name, difference), values in found.items():
-        given = values.dropna().to_numpy(dtype=float)
-        mean, wide = (float(given.mean()) if len(given) else np.nan), np.nan
-        if len(given) > 1:
-            wide = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(given) - 1) * given.std(ddof=1) / len(given) ** 0.5)
-        row = {"id": name, "difference": difference, "mean": mean, "low": mean - wide, "high": mean + wide}
-        rows.append(row | {"above": int((given > 0).sum()), "turns": len(given)})
-    return pd.DataFrame(rows)
+    H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["family", "seed"], values="H")
+    if any(name not in H.columns.get_level_values(0) for name in (good, bad, NO_MODEL)):
+        return []
+    H = H.dropna()
+    A = mine.pivot_table(index="test", columns="family", values="A").loc[H.index]
+    if len(H) < 2:
+        return []
+    families = list(dict.fromkeys(H.columns.get_level_values(0)))
+    errors = {name: H[name].to_numpy(dtype=float).T[None] for name in families}
+    alone = {name: A[name].to_numpy(dtype=float) for name in (good, bad)}
+    table = ErrorTable((1,), np.ones(len(H)), alone, errors)
+    steps = {name: values[0].mean(axis=0)[None] for name, values in errors.items()}
+    steps |= {f"{name} alone": values[None] for name, values in alone.items()}
+    return judged(Rivals(table, good, bad, steps))
 
 
 def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
     """Means over the seeds of every turn, foundation and method; cells that failed are left out."""
-    good = frame[frame["status"] == "ok"]
-    return (
-        good.groupby(["test", "foundation", "family", "method"], sort=False)[["A", "H", "H_90", "naive"]]
-        .mean()
-        .reset_index()
-    )
+    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
+    keys, numbers = ["test", "foundation", "family", "method"], ["A", "H", "H_90", "coverage", "width", "naive"]
+    return good.groupby(keys, sort=False)[numbers].mean().reset_index()

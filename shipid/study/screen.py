@@ -13,7 +13,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
-from shipid.engine.native import compiler
+from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
@@ -84,7 +84,7 @@ def _rows(
                 instants_of(plan, vessel, dataset, windows),
                 windows.future,
                 values[same],
-                engine="native" if device == "cpu" and compiler() is not None else "auto",
+                engine=REPEATED,
                 device=device,
             )
             total[same] += found.total.sum(axis=1)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from shipid.errors import ShipidError
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, read_results
@@ -40,6 +41,9 @@ def run(
 
     Raises ShipidError for whatever a user can mend.
     """
+    if read_plan(study, set).parts:
+        message = "is a study of several parts: run it by `shipid.events`, and read each folder in parts/ by itself"
+        raise ShipidError(message, path=str(study))
     for event in events(study, set, out, workers, scheduler=scheduler, device=device):
         if line := event_line(event):
             log.info("%s", line)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,34 +16,98 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
-from shipid.files import read_arrays, read_json, write_arrays, write_json, write_table, write_text
+from shipid.files import (
+    make_folder,
+    read_arrays,
+    read_json,
+    sweep,
+    sync,
+    temporary_folder,
+    write_arrays,
+    write_json,
+    write_table,
+    write_text,
+)
+from shipid.predictor import Predictor
+from shipid.study import seals
 from shipid.study.plan import Batch, Foundation, Plan, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
-DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
-METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
+DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
+PARTS = "parts"
+UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
+METRICS = tuple(UNITS)
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
-    """Make the folder of a run, or check that an existing one belongs to the same study."""
-    if (folder / STUDY).exists():
-        if _provenance(folder)["digest"] != plan.digest:
-            raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
-        return
+    """Make the folder of a run, or check that an existing one belongs to the same study.
+
+    It appears with all that says what it is, so that of two runs that begin at once only one makes it; the other joins
+    it, or is refused if it is of another plan.
+    """
     if folder.exists() and not folder.is_dir():
         raise ResultError("is a file: choose another --out", file=folder)
-    if folder.exists() and any(entry.name not in (PROVENANCE, VESSELS) for entry in folder.iterdir()):
-        raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder.parent)
+        sweep(folder.parent)
+        if not (folder / STUDY).exists():
+            _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
+    if _provenance(folder)["digest"] != plan.digest:
+        raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+    _mend(folder, plan)
+    for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER):
+        sweep(place)
+
+
+def _mend(folder: Path, plan: Plan) -> None:
+    """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
+    try:
+        changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
+    except DocumentError:
+        write_text(folder / STUDY, plan.text())
+        changed = False
+    try:
+        stored = read_json(folder / VESSELS)
+        digests = {name: documents.digest(entry["document"]) for name, entry in stored.items()}
+        changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
+    except (ResultError, TypeError, KeyError, AttributeError):
+        _write_vessels(folder, plan)
+    if changed:
+        raise ResultError("its study or vessels were changed by hand: choose another --out", file=folder)
+
+
+def _write_vessels(folder: Path, plan: Plan) -> None:
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
+
+
+def _make(folder: Path, plan: Plan) -> None:
+    """Make the folder at once; nothing happens where another run has just made it."""
+    with temporary_folder(folder.parent) as above:
+        _describe(above / folder.name, plan)
+        try:
+            os.rename(above / folder.name, folder)
+            sync(folder.parent)
+            return
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                raise
+    if (folder / STUDY).exists():
+        return
+    if any(entry.name not in (PROVENANCE, VESSELS) for entry in folder.iterdir()):
+        raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
+    _describe(folder, plan)
+
+
+def _describe(folder: Path, plan: Plan) -> None:
+    """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     origin["changes"] = dict(plan.changes)
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
-    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
-    write_json(folder / VESSELS, vessels)
+    _write_vessels(folder, plan)
     write_text(folder / STUDY, plan.text())
 
 
@@ -55,7 +121,10 @@ def stored_plan(folder: Path) -> Plan:
     except DocumentError as error:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
     stored = read_json(folder / VESSELS)
-    vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
+    try:
+        vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
+    except (TypeError, KeyError, AttributeError, ValueError):
+        raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
     if plan.digest != provenance["digest"]:
         raise ResultError(
@@ -95,9 +164,51 @@ def cell_file(folder: Path, cell: str) -> Path:
     return folder / "cells" / f"{cell}.npz"
 
 
+def part_folder(folder: Path, part: str) -> Path:
+    """Where the run of one part of a study is: a folder like that of any run."""
+    return folder / PARTS / part
+
+
 def finished(folder: Path, batches: Iterable[Batch]) -> list[Batch]:
-    """Batches whose results are stored whole."""
-    return [batch for batch in batches if batch_file(folder, batch).is_file()]
+    """Batches whose results are stored whole: those with a seal."""
+    return [batch for batch in batches if seals.is_sealed(folder, batch.key)]
+
+
+def write_batch(folder: Path, batch: Batch, results: Sequence[tuple[dict[str, Any], Predictor | None]]) -> None:
+    """Store the rows and predictors of a batch; the seal comes last, when all the rest is on the disk."""
+    files = []
+    for row, predictor in results:
+        if predictor is not None:
+            files.append(predictor.save(cell_file(folder, row["cell"])))
+    write_json(batch_file(folder, batch), [row for row, _ in results])
+    seals.write_seal(folder, batch.key, [batch_file(folder, batch), *files])
+
+
+def read_batch(folder: Path, batch: Batch) -> list[dict[str, Any]]:
+    """The rows of a finished batch."""
+    rows: list[dict[str, Any]] = read_json(batch_file(folder, batch))
+    return rows
+
+
+def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
+    """Note in the provenance what a run is computed with; returns a sentence per difference to the runs before.
+
+    session : entries such as `shipid`, `engine` and `packages`, as plain data.
+    """
+    record = _provenance(folder)
+    before = record.get("sessions", [])
+    if before and before[-1] == dict(session):
+        return []
+    words = [] if not before else differences(before[-1], session)
+    write_json(folder / PROVENANCE, {**record, "sessions": [*before, dict(session)]})
+    return words
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """A sentence per entry in which two sessions differ."""
+    one, other = dict(documents.leaves(before)), dict(documents.leaves(now))
+    changed = [name for name in {**one, **other} if one.get(name) != other.get(name)]
+    return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
 
 
 def read_rows(folder: Path) -> pd.DataFrame:
@@ -107,18 +218,20 @@ def read_rows(folder: Path) -> pd.DataFrame:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     frame = pd.DataFrame(rows)
     for name in METRICS:
-        frame[name] = frame[name].astype(float)
+        frame[name] = frame[name].astype(float) if name in frame else np.nan
     return frame.sort_values(["N_D", "seed"], kind="stable").reset_index(drop=True)
 
 
 def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial."""
+    seals.remove(folder, "results")
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
-    table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
+    table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
+    seals.write_seal(folder, "results", [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"
 
 

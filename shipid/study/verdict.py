@@ -1,13 +1,17 @@
-"""What a finding is, and how its numbers are said."""
+"""What a finding is, when it counts as shown, and how its numbers are said."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
 from shipid.study.plan import NO_MODEL
 
-Verdict = Literal["confirmed", "undecided", "refuted"]
+Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 MOST_NAMES = 5  # in one sentence
 
 
@@ -21,9 +25,30 @@ class Finding(TypedDict):
     numbers: Mapping[str, float]
 
 
-def verdict(always: bool, on_average: bool) -> Verdict:
-    """Confirmed if it holds for every seed (R4: at every step), undecided if only on average, else refuted."""
-    return "confirmed" if always else "undecided" if on_average else "refuted"
+def verdict(shown: bool, opposite: bool) -> Verdict:
+    """Confirmed if the claim is shown, refuted if its opposite is shown, else undecided."""
+    return "confirmed" if shown else "refuted" if opposite else "undecided"
+
+
+def every(chances: NDArray[np.float64]) -> bool:
+    """Whether each difference is shown: "all of them" needs no correction for their number (Berger 1982)."""
+    return bool(len(chances) and (chances <= LEVEL).all())
+
+
+def some(chances: NDArray[np.float64]) -> bool:
+    """Whether at least one difference is shown, corrected for their number (Holm)."""
+    return bool((shown(chances)).any())
+
+
+def shown(chances: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which differences are shown: all where each is, else those that are after Holm's correction."""
+    return np.full(len(chances), True) if every(chances) else holm(chances) <= LEVEL
+
+
+def weakest(verdicts: Iterable[Verdict]) -> Verdict:
+    """Verdict on a claim of several parts: refuted if one is, confirmed if all are, else undecided."""
+    parts = list(verdicts)
+    return "refuted" if "refuted" in parts else verdict(set(parts) == {"confirmed"}, False)
 
 
 def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
@@ -33,12 +58,30 @@ def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
 
 def metres(value: float) -> str:
     """Return a length with two decimals, from 10 m on with one."""
-    return f"{value:.2f} m" if value < 10 else f"{value:.1f} m"
+    return f"{value:.2f} m" if abs(value) < 9.995 else f"{value:.1f} m"
 
 
-def interval(low: float, high: float, seeds: int) -> str:
-    """Return ` [least, greatest] over n seeds`, or nothing for one seed."""
-    return f" [{low:.2f}, {high:.2f}] over {seeds} seeds" if seeds > 1 else ""
+def interval(low: float, high: float) -> str:
+    """Return ` [low, high]`, or nothing where there is no interval."""
+    decimals = 2 if max(abs(low), abs(high)) < 9.995 else 1
+    return f" [{low:.{decimals}f}, {high:.{decimals}f}]" if np.isfinite([low, high]).all() else ""
+
+
+def measured(found: Contrasts, index: int) -> str:
+    """Return a difference with its 95 % interval."""
+    return metres(float(found.mean[index])) + interval(float(found.low[index]), float(found.high[index]))
+
+
+def manoeuvres(count: int) -> str:
+    """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
+    return f"{count} test manoeuvre{'s' * (count != 1)}"
+
+
+def too_few(count: int) -> str:
+    """Say that so many test manoeuvres give no interval; empty if they do."""
+    if count >= FEWEST_RUNS:
+        return ""
+    return f"{manoeuvres(count)} {'gives' if count == 1 else 'give'} no interval, {FEWEST_RUNS} would"
 
 
 def runs(count: int) -> str:

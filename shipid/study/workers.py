@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import islice
 from multiprocessing import Pipe, get_context
@@ -44,7 +44,7 @@ def import_for_workers() -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def on_workers(work: Callable[[Task], Result], tasks: Sequence[Task], count: int) -> Iterator[tuple[Task, Result]]:
+def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int) -> Iterator[tuple[Task, Result]]:
     """Tasks and their results from so many processes, as they finish; each process receives `work` once.
 
     What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this

@@ -24,9 +24,9 @@ def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -
         name = parameter.name
         if parameter.kind == "open":
             closed = {other.name for other in declared}
-            numbers = [
-                key for key, value in block.items() if type(value) in (int, float)
-            ]  # not `kind`, `off`, actuators
+            numbers = [  # not `kind`, `off`, actuators
+                key for key, value in block.items() if isinstance(value, int | float) and not isinstance(value, bool)
+            ]
             result.update({key: f"{path}.{key}" for key in numbers if key not in closed})
         elif parameter.kind == "list":
             result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]

@@ -21,6 +21,7 @@ from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
+from shipid.vessel.ranges import UNUSUAL, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -34,6 +35,7 @@ from shipid.vessel.schema import (
 )
 
 MOST_RADIANS = 7.0  # more than a full circle: angles that stay below are no degrees of a wind table
+LONGEST_CHAIN = 20  # documents that extend or patch one another
 LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
 
@@ -83,6 +85,7 @@ class Vessel:
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
+        values = {path: documents.plain(value) for path, value in values.items()}
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
             try:
@@ -123,6 +126,38 @@ def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
     return documents.merge(_whole(documents.read(under), under, (*above, file.resolve())), document)
 
 
+def sources(vessel: Vessel) -> dict[str, str]:
+    """Dotted path of every term, acting or off -> source of its numbers; empty where its document names none.
+
+    It is the source of the block, else that of the document that wrote the block; of several documents that extend one
+    another, the first that says one.
+    """
+    lineage, file = [], Path(vessel.file)
+    while True:
+        document = documents.read(file)
+        if "base" in document:  # a patch changes numbers of blocks that others wrote
+            file = documents.find(document["base"], "models", file.parent)
+            continue
+        lineage.append(document)
+        if "extends" not in document:
+            break
+        file = documents.find(document["extends"], "models", file.parent)
+    return {
+        path: next(filter(None, (_source(document, path) for document in lineage)), "")
+        for off in (False, True)
+        for path, _, _ in term_blocks(vessel.document, off)
+    }
+
+
+def _source(document: Document, path: str) -> str:
+    """What a document says of where a block comes from: nothing where it does not hold the block."""
+    try:
+        block = documents.get(document, path)
+    except KeyError:
+        return ""
+    return str(block.get("source") or document.get("source", ""))
+
+
 def _with_tables(document: Document, file: Path) -> Document:
     """The document with the CSV files of tables replaced by their columns, so that its digest covers their content."""
     tables = {}
@@ -159,6 +194,9 @@ def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
         other = documents.find(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    if len(above) >= LONGEST_CHAIN:
+        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
+        raise DocumentError(message, file=file, path=path)
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -173,6 +211,7 @@ class Patch(BaseModel):
     name: str | None = None
     source: str | None = None
     set: dict[str, Annotated[FiniteFloat, "value"]] = {}
+    unusual: list[str] = []
     provenance: dict[str, Any] = {}
 
 
@@ -187,7 +226,10 @@ def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
             raise DocumentError(
                 f"{patch.base} has no such parameter: {choices(path, base.parameters)}", file=file, path=f"set.{path}"
             )
-    named = documents.replace(base.document, {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"})
+    changes = {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"}
+    if patch.unusual:
+        changes[UNUSUAL] = [*base.document.get(UNUSUAL, []), *patch.unusual]
+    named = documents.replace(base.document, changes)
     return check_vessel(named, str(file))
 
 
@@ -228,6 +270,9 @@ def _check_numbers(vessel: Vessel) -> None:
         _check_order(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
+    fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
+    if fault is not None:
+        raise DocumentError(fault[1], file=vessel.file, path=fault[0])
 
 
 def _check_behind(vessel: Vessel) -> None:
@@ -335,5 +380,5 @@ def _without_words(document: Document) -> Document:
     return {
         key: _without_words(value) if isinstance(value, dict) else value
         for key, value in document.items()
-        if key not in ("source", "name", "description")
+        if key not in ("source", "name", "description", UNUSUAL)
     }

@@ -154,7 +154,7 @@ def _block_model(rules: tuple[tuple[str, Rule], ...]) -> type[BaseModel]:
     return create_model("perturbation", __config__=ConfigDict(extra="forbid"), **shared, **fields)
 
 
-class Family(BaseModel):
+class Family(documents.Checked, BaseModel):
     """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
 
     model_config = ConfigDict(extra="forbid")

@@ -15,6 +15,7 @@ from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.signals import named
+from shipid.vessel.ranges import UNUSUAL
 
 FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
@@ -241,6 +242,7 @@ def vessel_model() -> type[BaseModel]:
         "name": (str, ...),
         "description": (str | None, None),
         "dof": (Literal[3, 4, 6], ...),
+        UNUSUAL: (Annotated[list[str], Field(description="paths of numbers that may be outside their range")], []),
         "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
         "inertia": (block_model("inertia", parameters(rigid_body)), ...),

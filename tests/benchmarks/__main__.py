@@ -35,6 +35,9 @@ ASKED = {
     "coverage": 1,
     "observer": 1,
     "strangers": 1,
+    "bands": 1,
+    "verdicts": 1,
+    "guess": 1,
 }  # the same, of what is no matter of time and takes minutes: only where named
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
@@ -48,13 +51,19 @@ def main() -> int:
         "groups", nargs="*", metavar="group", help=f"of {', '.join(GROUPS)}; default: all that are timed"
     )
     parser.add_argument("--record", action="store_true", help="accept the ratios measured now")
-    parser.add_argument("--replicates", type=int, default=200, help="of the group coverage")
+    parser.add_argument("--replicates", type=int, default=200, help="of the groups coverage, bands and verdicts")
+    parser.add_argument("--logs", type=int, default=400, help="of the group guess")
     asked = parser.parse_args()
     unknown = [name for name in asked.groups if name not in GROUPS]
     if unknown:
         parser.error(f"no such group: {', '.join(unknown)}")
     recorded = read_recorded()
-    options = {"coverage": {"replicates": asked.replicates}}
+    options = {
+        "coverage": {"replicates": asked.replicates},
+        "bands": {"replicates": asked.replicates},
+        "verdicts": {"tables": asked.replicates},
+        "guess": {"logs": asked.logs},
+    }
     figures = {name: measure(name, **options.get(name, {})) for name in asked.groups or THREADS}
     again = {ratio.group for ratio in compare(figures, recorded) if ratio.regressed and not asked.record}
     if again:

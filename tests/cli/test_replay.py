@@ -35,7 +35,7 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
     both = pd.read_csv(csv)
     assert set(both["run"]) == {"zz 10"}
     measured, replayed = (both[both["model"] == name] for name in ("measured", "replayed"))
-    for name, tolerance in (("north", 0.1), ("east", 0.1), ("psi", 0.02), ("u", 0.01)):
+    for name, tolerance in (("north", 0.3), ("east", 0.3), ("psi", 0.02), ("u", 0.01)):
         assert measured[name].to_numpy() == pytest.approx(replayed[name].to_numpy(), abs=tolerance), name
     assert "zz 10" in page.read_text()
     assert "Recorded and replayed" in page.read_text()

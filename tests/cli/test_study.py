@@ -81,7 +81,10 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     assert said("study", "report", folder).strip() == str(folder / "report.html")
     assert (folder / "report.html").is_file()
     next((folder / "batches").iterdir()).unlink()
-    assert "4 of 8 cells to do" in said("study", "resume", folder, "--workers", "1")
+    text = said("study", "resume", folder, "--workers", "1")
+    assert "missing: computed again" in text
+    assert "4 of 8 cells to do" in text
+    assert said("study", "check", folder).strip() == "2 of 2 batches finished, 0 faults"
 
     cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
     text = said("predict", folder, folder / DATASET, "--cell", cell)
@@ -96,6 +99,7 @@ def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run:
     folder = tmp_path / "run"
     shutil.copytree(tiny_run, folder)
     (folder / "batches" / "N0004-s0.json").unlink()
+    (folder / "seals" / "N0004-s0.sha256").unlink()
     said("study", "report", folder)
     assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
     assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
@@ -111,3 +115,14 @@ def test_interruption_says_how_to_go_on(study: Path, monkeypatch: pytest.MonkeyP
     result = CliRunner().invoke(app, ["study", "run", str(study), "--out", "mine"])
     assert result.exit_code == 130
     assert "Continue with: shipid study resume mine" in result.stderr
+
+
+def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    next((folder / "cells").iterdir()).unlink()
+    result = CliRunner().invoke(app, ["study", "check", str(folder)])
+    assert result.exit_code == 1
+    assert "missing: `shipid study resume` computes it again" in result.output

@@ -69,3 +69,49 @@ def test_stretches_between_breaks_are_judged_alone() -> None:
     assert "path" in failed(jumped.assign(flags=0))
     turned = jumped.assign(psi=turning(T)["psi"])
     assert failed(turned) == set()
+
+
+def noisy(seed: int) -> pd.DataFrame:
+    """A run in good order with the noise of drawn sensors: a ship that weaves or turns."""
+    random = np.random.default_rng(seed)
+    step = random.choice([0.1, 0.5, 1.0])
+    t = np.arange(0.0, 240.0, step)
+    rate = random.uniform(0.01, 0.05) * np.sin(2 * np.pi * t / random.uniform(40, 150) + random.uniform(0, 6))
+    psi = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * step))
+    way = 5.0 * np.exp(1j * psi)
+    place = np.append(0.0, np.cumsum((way[1:] + way[:-1]) / 2 * step))
+    noise = {"north": 0.5, "east": 0.5, "psi": np.radians(0.3), "u": 0.1, "v": 0.1, "r": np.radians(0.3)}
+    frame = pd.DataFrame({"t": t, "north": place.real, "east": place.imag, "psi": psi, "u": 5.0, "v": 0.0, "r": rate})
+    frame["port.n"] = 2.0
+    scale = random.uniform(0, 2)
+    return frame.assign(**{name: frame[name] + random.normal(0, scale * std, len(t)) for name, std in noise.items()})
+
+
+def test_noise_alone_is_no_finding() -> None:
+    """Of a hundred clean runs with noise fewer than 2 % have a finding."""
+    assert sum(bool(failed(noisy(seed))) for seed in range(100)) < 2
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    ("defect", "caught"),
+    [
+        (lambda f: f.assign(r=-f["r"]), "heading rate"),
+        (lambda f: f.assign(r=np.degrees(f["r"])), "heading scale"),
+        (lambda f: f.assign(u=f["u"] * 1.3), "path"),
+        (lambda f: f.assign(psi=np.interp(f["t"] - 2.0, f["t"], f["psi"])), "latency"),
+    ],
+)
+def test_a_defect_is_found_in_noise(seed: int, defect: Callable[[pd.DataFrame], pd.DataFrame], caught: str) -> None:
+    assert any(caught in check for check in failed(defect(noisy(seed))))
+
+
+def test_a_run_contained_in_another_is_found_on_a_clock_of_its_own() -> None:
+    whole = noisy(1)
+    part = whole.iloc[len(whole) // 3 : len(whole) // 2].assign(t=lambda f: f["t"] - f["t"].iloc[0])
+    part = part.reset_index(drop=True)
+    table = check_dataset(as_dataset(whole, part, clock="run"))
+    row = table[(table["check"] == "overlap") & (table["run"] == "b")].iloc[0]
+    assert not row["ok"]
+    assert "'a'" in row["sentence"]
+    assert table[(table["check"] == "overlap") & (table["run"] == "a")].iloc[0]["ok"]

@@ -1,11 +1,12 @@
 """Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
 
 from itertools import combinations, pairwise
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipid.data.windows import (
@@ -135,9 +136,10 @@ def test_commands_at_unix_time_are_those_in_force(rate: float) -> None:
     ticks = np.arange(601)
     frame = turning(1.7e9 + ticks / rate).assign(**{"port.n": ticks.astype(float)})
     windows = cut_windows(as_dataset(frame), horizon=15, step=0.6, interval=0.7)
-    per = rate * (0.7 * np.arange(len(windows)) + 0.6 * np.arange(15)[:, None])  # rows since the start
-    np.testing.assert_array_equal(windows.planned["port.n"], np.floor(per + 1e-6))
-    np.testing.assert_array_equal(windows.columns["port.n"], np.floor(per[0] + 1e-6))
+    instants = np.floor(rate * 0.7 * np.arange(len(windows)) + 1e-6)  # rows since the start
+    np.testing.assert_array_equal(windows.columns["port.n"], instants)
+    later = np.floor(instants + rate * 0.6 * np.arange(15)[:, None] + 1e-6)
+    np.testing.assert_array_equal(windows.planned["port.n"], later)
     assert len(windows) == int((600 / rate - 9.0) / 0.7 + 1e-6) + 1
 
 
@@ -311,6 +313,81 @@ def test_parts_of_one_run_share_no_moment(length: int, horizon: int) -> None:
         span = float(seen.t.min()), float(seen.end.max())
         assert len(training)
         assert not windows.select(training).touching([span]).any()
+
+
+# Nothing looks ahead.
+
+
+def wandering(seed: int, offset: float) -> pd.DataFrame:
+    """A run on an irregular clock: steps of 0.05 to 3 s, angles that wrap, an order at random rows."""
+    rng = np.random.default_rng(seed)
+    t = offset + np.cumsum(rng.choice([0.05, 0.1, 0.5, 1.0, 1.0, 1.0, 1.3, 3.0], 120) * rng.uniform(1.0, 1.0005, 120))
+    frame = turning(t - offset).assign(t=t, **{"port.n": np.round(rng.uniform(0, 2, 120), 1)})
+    return frame.assign(
+        psi=frame["psi"] % (2 * np.pi), u=rng.normal(5.0, 1.0, 120), V_w=3.0, beta_w=rng.uniform(0, 6, 120)
+    )
+
+
+@pytest.mark.parametrize("path", ["position", "velocity"])
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0.0, 1.7e9]),
+    st.sampled_from([0.3, 0.5, 1.0]),
+    st.sampled_from([0.4, 1.0, 2.5]),
+    st.integers(0, 4),
+    st.floats(0.1, 0.9),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_later_row_changes_no_input(
+    path: Literal["position", "velocity"],
+    seed: int,
+    offset: float,
+    step: float,
+    interval: float,
+    past: int,
+    share: float,
+) -> None:
+    """Every row after a moment changed: inputs of windows up to it stay, bit for bit, whatever the clock of the log."""
+    frame = wandering(seed, offset)
+    now = float(frame["t"].iloc[int(share * len(frame))])
+    later, changed = frame["t"].to_numpy() > now, frame.copy()
+    for name in ("north", "east", "psi", "u", "v", "r", "port.n", "V_w", "beta_w"):
+        changed.loc[later, name] += 7.0
+    one, other = (
+        cut_windows(as_dataset(f), horizon=5, step=step, interval=interval, path=path, past=past)
+        for f in (frame, changed)
+    )
+    np.testing.assert_array_equal(one.t, other.t)
+    assert set(one.t) <= set(frame["t"])
+    known = one.t <= now
+    assert known.any()
+    for name, values in one.columns.items():
+        np.testing.assert_array_equal(other.columns[name][known], values[known], err_msg=name)
+    for name, values in one.past.items():
+        np.testing.assert_array_equal(other.past[name][:, known], values[:, known], err_msg=name)
+    assert not np.array_equal(one.columns["u"], other.columns["u"])
+    # whole pasts and futures, and no instant twice
+    assert (one.begin >= frame["t"].iloc[0] - 1e-4).all()
+    assert (one.end <= frame["t"].iloc[-1] + 1e-4).all()
+    assert len(np.unique(one.t)) == len(one)
+
+
+def test_an_instant_between_rows_is_the_row_before() -> None:
+    """By hand: rows every 0.7 s, an instant wished every 1 s; the motion, the order and the past are those by then."""
+    t = 0.7 * np.arange(40)
+    frame = turning(t).assign(u=np.arange(40.0), **{"port.n": np.arange(40.0)})
+    windows = cut_windows(as_dataset(frame), horizon=4, step=1.4, past=1)
+    rows = np.array([2, 3, 4, 6, 7, 9])  # the last at or before 1.4, 2.4, 3.4 ... s
+    np.testing.assert_allclose(windows.t[:6], 0.7 * rows)
+    np.testing.assert_array_equal(windows.columns["u"][:6], rows)
+    np.testing.assert_array_equal(windows.columns["port.n"][:6], rows)
+    np.testing.assert_allclose(windows.past["u"][0, :6], rows - 2)
+    np.testing.assert_allclose(windows.states["u"][:, 0], 2 + 2 * np.arange(1, 5))
+
+
+def test_rows_farther_apart_than_the_interval_give_a_window_each() -> None:
+    windows = cut_windows(as_dataset(turning(5.0 * np.arange(20))), horizon=4, interval=1.0)
+    np.testing.assert_array_equal(windows.t, 5.0 * np.arange(19))
 
 
 # Windows with a past.

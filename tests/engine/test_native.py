@@ -31,6 +31,7 @@ SHIP = load_vessel("gunnerus-28.9")
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(native, "_refused", [])
     native._library.cache_clear()
     yield tmp_path / "cache" / "shipid"
     native._library.cache_clear()

@@ -8,8 +8,10 @@ import pytest
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Case, Method, Task, same_table, shared_tables
+from shipid.hybrid.method import Case, Fitted, Method, Task, same_table, shared_tables
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.settings import Searched
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
 
@@ -70,6 +72,27 @@ def test_inputs_without_physics_are_one_array_for_all() -> None:
             np.testing.assert_array_equal(table[key], values)
 
 
-def test_a_method_without_a_fit_says_so() -> None:
-    with pytest.raises(NotImplementedError):
-        Method().fit(task())
+@pytest.mark.parametrize("skeleton", [Method, Searched])
+def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
+    with pytest.raises(TypeError, match=r"abstract class \w+ with"):
+        skeleton()
+
+
+def test_a_method_is_a_fit_and_its_settings() -> None:
+    class Toy(Method):
+        weight: float = 2.0
+
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            return {name: Fitted(None, [{"value": self.weight}], 0.0) for name in given.cases}
+
+    assert {name: one.trials for name, one in Toy(weight=3.0).fit(task()).items()} == {
+        name: [{"value": 3.0}] for name in ("right", "wrong", "none")
+    }
+    with pytest.raises(ValueError, match="extra"):
+        Toy(wieght=3.0)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("kind", METHODS)
+def test_every_listed_method_is_whole(kind: str) -> None:
+    assert not METHODS[kind].__abstractmethods__
+    assert hasattr(METHODS[kind], "corrector")

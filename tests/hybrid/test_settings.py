@@ -42,8 +42,8 @@ def test_an_unknown_kind_is_told_the_names():
 
 
 def test_points_spread_evenly_and_keep_their_start():
-    points = np.array(spread(3, 64))
-    np.testing.assert_array_equal(spread(3, 5), points[:5])
+    points = np.array(list(spread(3, 64)))
+    np.testing.assert_array_equal(list(spread(3, 5)), points[:5])
     np.testing.assert_array_equal(points[0], 0.5)
     for quarter in range(4):  # each quarter of a range gets a quarter of the trials, give or take four
         share = (points >= quarter / 4) & (points < (quarter + 1) / 4)
@@ -51,12 +51,12 @@ def test_points_spread_evenly_and_keep_their_start():
 
 
 def test_one_dimension_is_the_golden_ratio():
-    assert np.ravel(spread(1, 3)) == pytest.approx([0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1])
+    assert np.ravel(list(spread(1, 3))) == pytest.approx([0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1])
 
 
 def test_trials_fill_their_ranges_by_the_logarithm():
     method = PathDrawn(trials=64, offset=1.5)
-    points = method.points()
+    points = list(method.points())
     assert len(points) == 64
     for name, (low, high) in method.ranges().items():
         if name == "ridge":
@@ -68,7 +68,7 @@ def test_trials_fill_their_ranges_by_the_logarithm():
         assert found.max() > low * (high / low) ** 0.9
     assert {point["offset"] for point in points} == {1.5}
     assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
-    assert points[:5] == PathDrawn(trials=5, offset=1.5).points()
+    assert points[:5] == list(PathDrawn(trials=5, offset=1.5).points())
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])

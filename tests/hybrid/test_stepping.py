@@ -9,6 +9,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import free, stepped_paths, true_steps
+from shipid.observer import Observer
 from tests.hybrid.worlds import HORIZON, folds_of, ship, world
 
 LAG = {"n": {"kind": "first_order", "T": 3.0, "rate": 0.5}, "alpha": {"kind": "first_order", "T": 2.0, "rate": 0.2}}
@@ -41,6 +42,16 @@ def test_every_moment_of_a_run_comes_once(here):
 def test_windows_without_states_are_refused(here):
     with pytest.raises(DataError, match="true velocities"):
         true_steps(replace(here.task(), windows=replace(here.train, states={})), "physics")
+
+
+def test_physics_with_an_observer_are_refused(here):
+    """Its filtered start and slow force would be left out without a word."""
+    observed = replace(here.physics, observer=Observer())
+    task = here.task()
+    with pytest.raises(DataError, match="observer"):
+        true_steps(replace(task, cases={"physics": replace(task.cases["physics"], physics=observed)}), "physics")
+    with pytest.raises(DataError, match="observer"):
+        stepped_paths(observed, here.test.instants(known=True), nothing)
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError, ResultError
-from shipid.hybrid.modules import Modules
-from shipid.hybrid.one_step import OneStep
-from shipid.hybrid.units import Seen, Units, points_of, ridges_of, solve, some_of
+from shipid.hybrid.units import Seen, Units, solve
 
 POINT = {"motion_scale": 2.0, "command_scale": 3.0, "wind_scale": 4.0, "offset": 1.0}
 MIRROR = {"u": 1, "v": -1, "r": -1, "port.n": 1, "port.alpha": -1}
@@ -60,23 +58,3 @@ def test_a_ridge_regression_is_the_normal_equations():
     for ridge, found in zip((1e-3, 2.0), solve(features, targets, (1e-3, 2.0), penalty), strict=True):
         gram = features.T @ features / 40 + ridge * np.diag(penalty**2)
         np.testing.assert_allclose(found, np.linalg.solve(gram, features.T @ targets / 40), atol=1e-10)
-
-
-def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
-    points = points_of(OneStep(trials=16, offset=1.5))
-    assert len(points) == 16
-    assert {point["offset"] for point in points} == {1.5}
-    assert all(1 <= point["motion_scale"] <= 16 for point in points)
-    assert len({point["motion_scale"] for point in points}) == 16
-    assert len(points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0))) == 1
-    np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
-    assert ridges_of(0.5, 4) == [0.5]
-
-
-def test_some_windows_are_drawn_by_a_seed_alone():
-    many = np.arange(100) * 2
-    np.testing.assert_array_equal(some_of(many, 100, 0), many)
-    few = some_of(many, 10, 3)
-    np.testing.assert_array_equal(few, some_of(many, 10, 3))
-    assert len(set(few)) == 10
-    assert set(few) <= set(many)

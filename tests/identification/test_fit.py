@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.identification.fit import Point, evaluate, loss, origin, search
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import Identify
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
 from shipid.vessel.load import load_vessel
 from tests.identification.trials import changed, trials
 
@@ -87,3 +90,26 @@ def test_it_ends_where_whoever_looks_on_asks() -> None:
     assert (found.status, found.iterations) == ("stopped", 4)
     none = search(own, begin, origin(own), progress=lambda *_: True)
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
+
+
+def test_a_search_does_not_end_where_a_gauss_newton_step_still_goes_down() -> None:
+    """Zigzags stepped ten times as finely, fitted from wild factors: kinks of |v| and |r| stop short steps."""
+    runs = [Zigzag(name=side, n_rpm=145, side=side, angle_deg=20, duration=60) for side in ("starboard", "port")]
+    log = perform(SHIP, runs, step=0.1, interval=1.0)
+    data = Dataset(log[[name for name in log if not name.startswith("actual.")]], {"clock": "run", "flags": []})
+    settings = Identify(parameters=["hull.derivatives.*"], weights={"u": 0.05, "v": 0.05, "r": 0.002}, horizon=0)
+    here = build(SHIP, data, data.runs, settings)
+    ended = 0
+    for seed in range(3):
+        factors = np.random.default_rng(seed).uniform(0, 2, here.num_factors)
+        result = search(here, factors, origin(here))
+        if result.status != "ok":
+            continue
+        ended += 1
+        point = Point(result.at.nuisances, result.at.away)
+        best = evaluate(here, result.factors, point)
+        scale = np.maximum(np.linalg.norm(best.J, axis=0), 1e-300)
+        step = np.linalg.lstsq(best.J / scale, best.f, rcond=1e-9)[0] / scale
+        trials = [evaluate(here, result.factors - 0.5**k * step, point).objective for k in range(8)]
+        assert min(trials) >= best.objective * (1 - 1e-5), seed
+    assert ended

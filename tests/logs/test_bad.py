@@ -21,7 +21,7 @@ LOGS = {  # file -> (place, remedy)
     "time_missing.csv": ("row 11", "no time here: remove the row"),
     "semicolons.csv": ("clock.from", "is the separator right?"),
     "decimal_comma.csv": ("format.separator", "check separator and skip_rows"),
-    "ragged.csv": ("format.separator", "check separator and skip_rows"),
+    "ragged.csv": ("line 7", "11 cells, where the header has 8"),
     "binary.csv": ("format.encoding", "export it as text"),
     "utf16.csv": ("format.encoding", "set the encoding"),
     "cp1252.csv": ("format.encoding", "often cp1252"),

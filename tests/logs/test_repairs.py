@@ -9,6 +9,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces
 from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.repairs import Latency, apply_repairs
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)
@@ -122,3 +123,31 @@ def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     ends = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)]
     assert ends == [(0.0, 99.0), (101.0, 239.5)]
     assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
+
+
+@pytest.mark.parametrize("signal", ["position", "velocity", "heading", "yaw rate"])
+def test_what_came_late_is_taken_earlier(signal: str) -> None:
+    """A signal that is 1 s late becomes what it was: a turn with changing rate, over ground."""
+    t = np.arange(0.0, 60.0, 0.25)
+
+    def motion(at: np.ndarray) -> dict[str, np.ndarray]:
+        psi = 0.8 * np.sin(at / 9)
+        return {"psi": psi, "r": 0.8 / 9 * np.cos(at / 9), "north": 4 * at, "east": 9 * np.sin(at / 7)} | {
+            "ground": (4 + 0.5j * np.sin(at / 5)) * np.exp(1j * psi)
+        }
+
+    true, late = motion(t), motion(t - 1.0)
+    names = {"position": ("north", "east"), "heading": ("psi",), "yaw rate": ("r",), "velocity": ("ground",)}[signal]
+    logged = true | {name: late[name] for name in names}
+    body = logged["ground"] * np.exp(-1j * logged["psi"])
+    rows = pd.DataFrame({"t": t, "u": body.real, "v": body.imag, "flags": 0})
+    rows = rows.assign(**{name: logged[name] for name in ("north", "east", "psi", "r")})
+    repair = Latency(kind="latency", reason="seen", signal=signal, seconds=1.0, turn=True)
+    mended, records = apply_repairs(rows, [repair])
+    wanted = motion(mended["t"].to_numpy())
+    ground = (mended["u"] + 1j * mended["v"]).to_numpy() * np.exp(1j * mended["psi"].to_numpy())
+    np.testing.assert_allclose(ground, wanted["ground"], atol=2e-2)
+    for name in ("north", "east", "psi", "r"):
+        np.testing.assert_allclose(mended[name], wanted[name], atol=2e-2, err_msg=name)
+    assert len(mended) == len(t) - 4
+    assert records[0]["kind"] == "latency"

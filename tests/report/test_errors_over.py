@@ -42,7 +42,10 @@ def test_seeds_become_their_mean(full_scale):
 
 def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     figure = horizon(simulation)
-    assert "Of 7 models, the middle one of each family by A: nominal, moderate-2, high-2 and no model." in figure.how
+    assert (
+        "Of 7 models, the middle one of each family by A, and the best in validation: "
+        "nominal, moderate-2, high-2 and no model." in figure.how
+    )
     assert "high-1, compensated" not in lines(figure, "0-0")
     assert "middle one" not in horizon(full_scale).how
 

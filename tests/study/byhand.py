@@ -33,8 +33,13 @@ def by_hand(
     curves: Mapping[tuple[str, int, int], list[float]] | None = None,
     losses: Mapping[str, float] | None = None,
     H_90: Mapping[tuple[str, int, int], float] | None = None,
+    runs: int = 1,
+    changes: Mapping[str, Any] | None = None,
 ) -> Results:
     """Results of cells (model, N_D, seed) -> H [m]; None has failed. Errors are equal at all steps unless said.
+
+    runs : test manoeuvres of one window each; all errors are up to 10 % lower in the first and higher in the last.
+    changes : further blocks of the study document.
 
     family : members by family, called `<family>-<number>`; without it every model is a family of its own.
     """
@@ -48,9 +53,11 @@ def by_hand(
     if claims is not None:
         document["claims"] = dict(claims)
     document["truth"]["manoeuvres"] = 200
+    document |= changes or {}
     plan = build_plan(document, folder / "tiny.toml")
     if planned is None:
         assert plan.cells == len(cells), "a complete study by hand"
+    hard = np.linspace(0.9, 1.1, runs) if runs > 1 else np.ones(1)
     rows, paths = [], {}
     for (model, N_D, seed), H in cells.items():
         A = alone.get(model, np.nan)
@@ -70,20 +77,21 @@ def by_hand(
         if H is not None:
             row |= {"H": H, "rms": 1.1 * H, "status": "ok", "sentence": ""}
             row["H_90"] = (H_90 or {}).get((model, N_D, seed), 1.5 * H)
-            curve = (curves or {}).get((model, N_D, seed), [H] * STEPS)
-            paths[row["cell"]] = np.stack([np.array(curve), np.zeros(STEPS)], axis=-1)[:, None, :]
+            curve = np.array((curves or {}).get((model, N_D, seed), [H] * STEPS))
+            paths[row["cell"]] = np.stack([np.outer(curve, hard), np.zeros((STEPS, runs))], axis=-1)
         rows.append(row)
-    straight = np.zeros((STEPS, 1, 2))
-    physics = {name: straight + np.array([A, 0.0]) for name, A in alone.items()} | {"none": straight}
-    columns = {name: np.zeros(1) for name in ("north", "east", "psi", "u", "v", "r")}
+    straight = np.zeros((STEPS, runs, 2))
+    physics = {name: straight + np.outer(A * hard, [1.0, 0.0]) for name, A in alone.items()} | {"none": straight}
+    names = np.array([chr(ord("a") + k) for k in range(runs)])
+    columns = {name: np.zeros(runs) for name in ("north", "east", "psi", "u", "v", "r")}
     return Results(
         folder=folder,
         plan=plan,
         cells=pd.DataFrame(rows),
         models=pd.DataFrame(),
-        test=Windows(np.array(["a"]), np.zeros(1), columns, straight, {}, STEPS, 2.0),
+        test=Windows(names, np.zeros(runs), columns, straight, {}, STEPS, 2.0),
         physics=physics,
-        naive=np.full((STEPS, 1), naive),
+        naive=np.tile(naive * hard, (STEPS, 1)),
         paths=paths,
         dataset=Dataset(logged({"a": {}}, np.arange(2.0)).frame, {"flags": []}),
         provenance={},

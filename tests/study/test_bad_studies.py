@@ -139,3 +139,52 @@ def test_broken(name: str) -> None:
 def test_no_such_study(name: str) -> None:
     with pytest.raises(DocumentError, match=r"no such file|did you mean 'quick'\?"):
         read_plan(name)
+
+
+def test_a_document_of_version_0_1_is_answered_as_a_whole(tmp_path: Path) -> None:
+    """Every old key in one message, a line each with its file and path, and what to write instead."""
+    text = (FOLDER / "recipe-of-old.toml").read_text()
+    text = text.replace("[[truth.manoeuvre]]\n", "").replace("ahead = 5.0", 'horizon = 10\nstep = 0.5\nmethod = "rk4"')
+    text += '\n[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
+    file = tmp_path / "old.toml"
+    file.write_text(text)
+    with pytest.raises(DocumentError) as caught:
+        read_plan(file)
+    lines = str(caught.value).split("\n")
+    assert [line.removeprefix(f"{file}: ").partition(": ")[0] for line in lines] == [
+        "recipe",
+        "prediction.horizon",
+        "prediction.method",
+        "truth",
+        "family.1.identify",
+    ]
+    assert all(line.startswith(f"{file}: ") for line in lines)
+    assert "write ahead = 5, in seconds" in lines[1]
+    for key in ("n_rpm = [50.0, 200.0]", "alpha_deg = [-50.0, 50.0]", "start_speed = [1.0, 3.0]"):
+        assert key in lines[3]
+
+
+def test_the_remedy_for_a_recipe_works(tmp_path: Path) -> None:
+    """What the message of an old recipe says, done: the document is one of today."""
+    text = (FOLDER / "recipe-of-old.toml").read_text()
+    file = tmp_path / "mended.toml"
+    file.write_text(text.replace('[recipe]\nkind = "fast"', '[[method]]\nname = "path-drawn"\nkind = "path-drawn"'))
+    assert read_plan(file).methods[0].kind == "path-drawn"
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("method.3.trials", "there is no method.3: method has 1 entry, method.0"),
+        ("family.2.members", "there is no family.2: family has 2 entries, family.0 to family.1"),
+        ("family.1.perturb.4.factor", "there is no family.1.perturb.4: family.1.perturb has 1 entry"),
+        ("grid.N_D.2", "there is no grid.N_D.2: grid.N_D has 2 entries, grid.N_D.0 to grid.N_D.1"),
+        ("family.right.members", "--set cannot reach this path"),
+    ],
+)
+def test_a_change_beyond_a_list_says_how_long_it_is(path: str, message: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        read_plan(FOLDER / "plain.toml", {path: 7})
+    assert message in str(caught.value)
+    assert caught.value.path == path
+    assert "\n" not in str(caught.value)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -64,7 +65,9 @@ def test_a_world_twice_or_half_is_refused(tmp_path: Path, tiny_run: Path) -> Non
     with pytest.raises(ResultError, match=r"has seed = 0, as .* has: nothing is repeated"):
         read_worlds([tiny_run, tmp_path / "same"])
     run_here(tiny_plan(tmp_path, {"seed": 5}), tmp_path / "half")
-    next((tmp_path / "half" / "batches").glob("*.json")).unlink()
+    batch = next((tmp_path / "half" / "batches").glob("*.json"))
+    batch.unlink()
+    (tmp_path / "half" / "seals" / f"{batch.stem}.sha256").unlink()
     with pytest.raises(ResultError, match="is not finished: continue with `shipid study resume"):
         read_worlds([tiny_run, tmp_path / "half"])
     assert store.stored_plan(tmp_path / "half").study.seed == 5
@@ -72,20 +75,23 @@ def test_a_world_twice_or_half_is_refused(tmp_path: Path, tiny_run: Path) -> Non
 
 def test_verdicts_are_counted_and_numbers_have_an_interval(made: Any) -> None:
     H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
-    worlds = [made(grid({**H, "bad": (bad,)}, (30,))) for bad in (2.0, 2.1, 3.1)]
+    worlds = [made(grid({**H, "bad": (bad,)}, (30,)), runs=8) for bad in (1.6, 1.7, 3.3)]
     frame = compare_findings(worlds).set_index(["id", "number"])
     row = frame.loc[("R2", "H inaccurate / A accurate")]
     assert row["verdicts"] == "2 confirmed, 1 refuted"
-    assert row[["mean", "low", "high"]].tolist() == pytest.approx([1.2, 1.0, 1.55])
-    assert frame.loc[("R3", "gap after [m]"), "mean"] == pytest.approx(1.4)
+    wide = 4.3027 * np.std([0.8, 0.85, 1.65], ddof=1) / 3**0.5  # Student's t of three worlds
+    assert row[["mean", "low", "high"]].tolist() == pytest.approx([1.1, 1.1 - wide, 1.1 + wide], abs=1e-4)
+    assert frame.loc[("R3", "gap after [m]"), "mean"] == pytest.approx(1.2)
 
 
 def test_a_world_that_cannot_tell_is_counted(made: Any) -> None:
     H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
-    frame = compare_findings([made(grid(H, (30,))), made(grid({**H, "bad": (None,)}, (30,)))])
+    H["bad"] = (1.8,)
+    frame = compare_findings([made(grid(H, (30,)), runs=8), made(grid({**H, "bad": (None,)}, (30,)), runs=8)])
     row = frame[frame["number"] == "H inaccurate / A accurate"].iloc[0]
     assert row["verdicts"] == "1 confirmed, 1 undecided"
-    assert row["low"] == row["high"] == pytest.approx(1.05)
+    assert row["mean"] == pytest.approx(0.9)
+    assert np.isnan([row["low"], row["high"]]).all(), "one world has no interval"
 
 
 def test_failed_cells_are_left_out(made: Any) -> None:
@@ -98,14 +104,14 @@ def test_failed_cells_are_left_out(made: Any) -> None:
 
 def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
-    worlds = [made(grid({**H, "good": (good,)}, (30,))) for good in (1.0, 1.5)]
+    worlds = [made(grid({**H, "good": (good,)}, (30,)), runs=8) for good in (1.0, 1.5)]
     monkeypatch.setattr(compare, "read_worlds", lambda _: worlds)
     result = CliRunner().invoke(app, ["study", "compare", "one", "other"])
     assert result.exit_code == 0, result.output
     lines = [" ".join(line.split()) for line in result.output.splitlines()]
-    assert "finding in 2 worlds number mean [least, greatest]" in lines
-    assert "R1 2 confirmed H / A, accurate 0.625 [0.5, 0.75]" in lines
-    assert "H [m] N_D = 0 N_D = 30" in lines
+    assert "finding in 2 worlds number mean [95 % over worlds]" in lines
+    assert "R1 2 confirmed H / A, accurate 0.625 [-0.963, 2.21]" in lines
+    assert "H [m], mean [least, greatest] N_D = 0 N_D = 30" in lines
     assert "good 2.00 [2.00, 2.00] 1.25 [1.00, 1.50]" in lines
     assert "none - 9.00 [9.00, 9.00]" in lines
 

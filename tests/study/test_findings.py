@@ -10,6 +10,8 @@ from shipid.study.findings import CLAIMS, findings
 from shipid.study.results import Results
 from tests.study.byhand import RIVALS, grid
 
+RUNS = 8  # test manoeuvres, all alike but for a tenth
+
 
 def verdicts(results: Results) -> dict[str, str]:
     found = findings(results)
@@ -23,55 +25,66 @@ def one(good: float, bad: float, none: float) -> dict[Any, float | None]:
 
 
 def test_all_confirmed(made: Any) -> None:
-    assert verdicts(made(one(1.0, 2.1, 9.0))) == dict.fromkeys(CLAIMS, "confirmed")
+    assert verdicts(made(one(1.0, 1.9, 9.0), runs=RUNS)) == dict.fromkeys(CLAIMS, "confirmed")
 
 
 @pytest.mark.parametrize(
     ("H", "refuted"),
     [
-        ((2.1, 2.0, 9.0), {"R1"}),  # compensation worsens `good`
-        ((1.0, 2.3, 9.0), {"R2"}),  # 15 % above what accurate physics does alone
-        ((1.0, 5.5, 9.0), {"R2", "R3"}),  # gap 4.0 m before, 4.5 m after
-        ((1.0, 2.0, 3.0), {"R4"}),  # `bad` alone is worse than pure data-driven
+        ((2.5, 1.8, 9.0), {"R1"}),  # compensation worsens `good`
+        ((1.0, 2.6, 9.0), {"R2"}),  # 30 % above what accurate physics does alone
+        ((0.5, 5.5, 9.0), {"R2", "R3"}),  # gap 4.0 m before, 5.0 m after
+        ((1.0, 1.8, 3.0), {"R4"}),  # `bad` alone is worse than pure data-driven
     ],
 )
 def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
-    found = verdicts(made(one(*H)))
+    found = verdicts(made(one(*H), runs=RUNS))
     assert {key for key, verdict in found.items() if verdict == "refuted"} == refuted
     assert {verdict for key, verdict in found.items() if key not in refuted} == {"confirmed"}
 
 
-def test_undecided_where_seeds_disagree(made: Any) -> None:
-    """Each holds on average over two seeds and not for one of them."""
+def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
+    """1 % below its own physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
+    assert verdicts(made(one(1.98, 1.9, 9.0), runs=RUNS))["R1"] == "undecided"
 
-    def seeds(good: tuple[float, float], bad: tuple[float, float]) -> dict[Any, float | None]:
-        cells = {("good", 30, k): good[k] for k in (0, 1)} | {("bad", 30, k): bad[k] for k in (0, 1)}
+
+def test_seeds_that_differ_widen_the_interval(made: Any) -> None:
+    def seeds(good: tuple[float, float]) -> dict[Any, float | None]:
+        cells = {("good", 30, k): good[k] for k in (0, 1)} | {("bad", 30, k): 1.9 for k in (0, 1)}
         return {**cells, **{("none", 30, k): 9.0 for k in (0, 1)}}
 
-    assert verdicts(made(seeds((1.0, 2.5), (2.0, 2.0))))["R1"] == "undecided"
-    assert verdicts(made(seeds((1.0, 1.0), (1.5, 2.5))))["R2"] == "undecided"
-    assert verdicts(made(seeds((0.5, 0.5), (0.6, 5.0))))["R3"] == "undecided"
+    assert verdicts(made(seeds((1.6, 1.6)), runs=RUNS))["R1"] == "confirmed"
+    assert verdicts(made(seeds((0.8, 2.4)), runs=RUNS))["R1"] == "undecided"
+
+
+def test_one_test_manoeuvre_decides_nothing(made: Any) -> None:
+    results = made(one(1.0, 1.9, 9.0))
+    assert set(verdicts(results).values()) == {"undecided"}
+    assert all("1 test manoeuvre gives no interval" in finding["evidence"] for finding in findings(results))
+    assert all("shipid study rotate" in finding["evidence"] for finding in findings(results))
 
 
 def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
     curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
-    results = made(one(1.0, 2.1, 7.0), curves=curves)
+    results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)
     assert verdicts(results)["R4"] == "undecided"
     assert "worst at 75% of the steps" in findings(results)[3]["evidence"]
-    results = made(one(1.0, 2.1, 3.0))
+    results = made(one(1.0, 1.9, 3.0), runs=RUNS)
     assert "worst at 0% of the steps" in findings(results)[3]["evidence"]
     assert "most often worst: bad alone" in findings(results)[3]["evidence"]
 
 
-def test_evidence_names_the_numbers(made: Any) -> None:
-    evidence = {finding["id"]: finding["evidence"] for finding in findings(made(one(1.0, 2.1, 9.0)))}
-    assert evidence["R1"] == "good 2.00 m -> 1.00 m; bad 6.00 m -> 2.10 m"
-    assert evidence["R2"] == "inaccurate and compensated 2.10 m, accurate alone 2.00 m"
-    assert evidence["R3"] == "gap 4.00 m before, 1.10 m after"
+def test_evidence_names_the_numbers_and_their_intervals(made: Any) -> None:
+    evidence = {finding["id"]: finding["evidence"] for finding in findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
+    assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 1.00 m [0.9")
+    assert "; bad 6.00 m -> 2.10 m, 3.90 m [3." in evidence["R1"]
+    assert evidence["R1"].endswith("; 8 test manoeuvres")
+    assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: -0.10 m [-")
+    assert evidence["R3"].startswith("gap 4.00 m before, 1.10 m after: 2.90 m [2.")
 
 
 def test_a_missing_cell_leaves_all_undecided(made: Any) -> None:
-    results = made(grid({"good": (1.0,), "bad": (None,), "none": (9.0,)}, (30,)))
+    results = made(grid({"good": (1.0,), "bad": (None,), "none": (9.0,)}, (30,)), runs=RUNS)
     assert set(verdicts(results).values()) == {"undecided"}
 
 
@@ -83,12 +96,12 @@ def test_no_claims_no_findings(made: Any) -> None:
 
 def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
     cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
-    found = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}))
+    found = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
     assert [finding["id"] for finding in found] == [*CLAIMS, *(f"S{k}" for k in range(1, 8))]
 
 
 def test_numbers_are_those_of_the_evidence(made: Any) -> None:
-    numbers = {finding["id"]: finding["numbers"] for finding in findings(made(one(1.0, 2.1, 9.0)))}
+    numbers = {finding["id"]: finding["numbers"] for finding in findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert numbers["R1"] == {"H / A, accurate": pytest.approx(0.5), "H / A, inaccurate": pytest.approx(0.35)}
     assert numbers["R2"] == {"H inaccurate / A accurate": pytest.approx(1.05)}
     assert numbers["R3"] == {"gap before [m]": pytest.approx(4.0), "gap after [m]": pytest.approx(1.1)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -278,6 +279,10 @@ def test_the_command_writes_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     assert "shipid study run log-study.toml" in result.output
+    lines = result.output.splitlines()
+    assert len(lines) < 40
+    assert any(re.match(r"prediction\.ahead = \S+  # \w", line) for line in lines), result.output  # piped: a line each
+    assert all(line == line.rstrip() for line in lines)
     before = Path("log-study.toml").read_text()
     again = CliRunner().invoke(app, command)
     assert isinstance(again.exception, ShipidError)

@@ -31,7 +31,9 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
     """`alone` counts the foundations that are also judged without a compensator: identified ones."""
     plan = read_plan(name)
     assert (len(plan.foundations), len(plan.batches)) == (foundations, batches)
-    assert plan.cells == (foundations + alone) * batches
+    assert plan.cells == (foundations + alone + 1) * batches, "and no physics once more, plain"
+    assert plan.plain == "plain"
+    assert plan.label(NO_MODEL, "plain") == "none + plain"
     bare = [name for name, way in plan.pairs if not way.method.compensates]
     assert len(bare) == alone
     assert {one.family for one in plan.foundations if one.name in bare} == (plan.identified if alone else set())
@@ -41,7 +43,8 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
 
 def test_every_bundled_study_is_tested() -> None:
     worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "zigzags"}
-    assert set(bundled("studies")) == {"quick", "full-scale", *worlds}
+    of_methods = {"methods", "methods-full-scale", "paper-recipe"}
+    assert set(bundled("studies")) == {"quick", "full-scale", *worlds, *of_methods}
 
 
 def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
@@ -102,7 +105,7 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     """19 models and the nominal one, N_D = 10, 20, ... 100, 50 trials per cell; the small one is a part of it."""
     full, small = read_plan("simulation"), read_plan("simulation-small")
     assert [batch.N_D for batch in full.batches] == list(range(100, 0, -10))
-    assert [way.method for way in full.methods] == [PathTrained()]
+    assert [way.method for way in full.methods] == [PathTrained(), PathDrawn(mirror=0.0)]
     assert full.methods[0].method.trials == small.methods[0].method.trials == 50  # type: ignore[attr-defined]
     assert (
         read_plan("simulation", {"method.0.kind": "path-drawn"}).methods[0].method

@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
-from shipid.study.rotate import contrasts, rotate, spread, turns
+from shipid.study.rotate import rotate, spread, turn_findings, turns
 from shipid.study.run import run_batch
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
@@ -80,36 +80,46 @@ def test_spread_by_hand() -> None:
     assert rows["better"].tolist() == pytest.approx([3, 3, 0, np.nan], nan_ok=True)
 
 
-def test_contrasts_by_hand(claimed: Plan, tmp_path: Path) -> None:
-    """Student's t for 3 turns is 4.303; the differences of R1, bad, are 2.5, 3.5, 4.5."""
-    rows = contrasts(by_hand(), claimed).set_index("difference")
-    one = rows.loc["bad: A less H"]
-    assert one["mean"] == pytest.approx(3.5)
-    assert (one["low"], one["high"]) == pytest.approx((3.5 - 4.303 / 3**0.5, 3.5 + 4.303 / 3**0.5), abs=1e-3)
-    assert rows.loc["A of good less H of bad", "mean"] == pytest.approx(0.5)
-    assert rows.loc["gap of A less gap of H", "mean"] == pytest.approx(3.0 - 1.5)
-    assert rows.loc["H of none less the worst other H", "mean"] == pytest.approx(0.5)  # tuned stands aside
-    assert rows.loc["H of none less the worst other H", "above"] == 2
-    assert contrasts(by_hand(), tiny_plan(tmp_path)).empty
+def many() -> pd.DataFrame:
+    """Six turns: those by hand, and the same a little harder."""
+    again = by_hand().assign(test=lambda rows: rows["test"] + " again", H=lambda rows: 1.02 * rows["H"])
+    return pd.concat([by_hand(), again], ignore_index=True)
+
+
+def test_findings_over_turns_by_hand(claimed: Plan, tmp_path: Path) -> None:
+    """A less H of `bad` is 2.5, 3.5, 4.5 in the turns by hand; in one turn of three `none` is not the worst."""
+    found = {one["id"]: one for one in turn_findings(many(), claimed)}
+    assert {key: one["verdict"] for key, one in found.items()} == {
+        "R1": "confirmed",
+        "R2": "confirmed",
+        "R3": "confirmed",
+        "R4": "refuted",
+    }
+    assert "bad 6.00 m -> 2.52 m, 3.4" in found["R1"]["evidence"]
+    assert found["R1"]["evidence"].endswith("6 test manoeuvres")
+    assert found["R4"]["evidence"].startswith("worst over the horizon, physics alone included: bad alone")
+    assert turn_findings(by_hand(), tiny_plan(tmp_path)) == []
+
+
+def test_few_turns_decide_nothing(claimed: Plan) -> None:
+    found = turn_findings(by_hand(), claimed)
+    assert {one["verdict"] for one in found} == {"undecided"}
+    assert "3 test manoeuvres give no interval, 5 would" in found[0]["evidence"]
 
 
 def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
-    frame = by_hand()
+    frame = many()
     frame.loc[(frame["foundation"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
-    rows = contrasts(frame, claimed).set_index("difference")
-    assert rows.loc["good: A less H", "turns"] == 2
-    assert spread(frame).set_index("foundation").loc["good", "turns"] == 2
+    assert turn_findings(frame, claimed)[0]["evidence"].endswith("5 test manoeuvres")
+    assert spread(frame).set_index("foundation").loc["good", "turns"] == 5
 
 
 def test_families_of_several_members_and_models_without_any_result(claimed: Plan) -> None:
-    """Members are averaged; where a side of a difference has no result at all there is no number."""
-    frame = by_hand()
+    """Members are averaged; where a side of a difference has no result at all there is no finding."""
+    frame = many()
     two = frame.assign(foundation=frame["foundation"] + "-2", H=frame["H"] + 1.0)
-    rows = contrasts(pd.concat([frame, two]), claimed).set_index("difference")
-    assert rows.loc["bad: A less H", "mean"] == pytest.approx(3.0)
-    rows = contrasts(frame[frame["foundation"] != "good"], claimed).set_index("difference")
-    assert np.isnan(rows.loc["good: A less H", "mean"])
-    assert rows.loc["bad: A less H", "turns"] == 3
+    assert "bad 6.00 m -> 3.02 m" in turn_findings(pd.concat([frame, two]), claimed)[0]["evidence"]
+    assert turn_findings(frame[frame["foundation"] != "good"], claimed) == []
 
 
 def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:

@@ -242,15 +242,15 @@ DAMAGES = {
     "no provenance": (lambda folder: (folder / "provenance.json").unlink(), "is this the folder of a run"),
     "half a provenance": (_damage(_half, "provenance.json"), "damaged"),
     "foreign provenance": (_damage(lambda _: b"[1, 2]", "provenance.json"), "damaged"),
-    "no batches": (lambda folder: [file.unlink() for file in (folder / "batches").iterdir()], "no cell is finished"),
+    "no batches": (lambda folder: [file.unlink() for file in (folder / "batches").iterdir()], "missing or damaged"),
     "half a batch": (_damage(_half, "batches/*.json"), "damaged"),
     "no test windows": (lambda folder: (folder / "test.npz").unlink(), "missing or damaged"),
     "half the test windows": (_damage(_half, "test.npz"), "missing or damaged"),
     "foreign test windows": (_damage(lambda _: b"hello", "test.npz"), "missing or damaged"),
-    "no cell": (lambda folder: next((folder / "cells").glob("*.npz")).unlink(), "cannot be read"),
-    "half a cell": (_damage(_half, "cells/*.npz"), "not a predictor"),
-    "no foundations": (lambda folder: (folder / "foundations.json").unlink(), "cannot be read"),
-    "no dataset": (lambda folder: (folder / "dataset.parquet").unlink(), "dataset.parquet: cannot be read"),
+    "no cell": (lambda folder: next((folder / "cells").glob("*.npz")).unlink(), "missing or damaged"),
+    "half a cell": (_damage(_half, "cells/*.npz"), "missing or damaged"),
+    "no foundations": (lambda folder: (folder / "foundations.json").unlink(), "missing or damaged"),
+    "no dataset": (lambda folder: (folder / "dataset.parquet").unlink(), "dataset.parquet: missing or damaged"),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -14,6 +15,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
+from shipid.errors import DocumentError
 from shipid.hybrid.features import Inputs, Memory, group_of
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
@@ -107,8 +109,13 @@ def later_changed(dataset: Dataset, spared: tuple[str, ...] = ()) -> Dataset:
 def test_all_cells_are_there(whole: Finished) -> None:
     """Foundations that are variants, observed, identified, and both, each with each method that meets it."""
     pairs = {(row.foundation, row.method) for row in whole.rows.itertuples()}
-    meets = {name for name, method in KINDS.items() if method.meets_none}
-    assert pairs == {(f["name"], kind) for f in FAMILIES for kind in KINDS} | {("none", kind) for kind in meets}
+    meets_none = {("none", name) for name, method in KINDS.items() if method.meets_none}
+    no_observer = {name for name, method in KINDS.items() if not method.meets_observer}
+    refused = {(f["name"], kind) for f in FAMILIES if "observer" in f for kind in no_observer}
+    assert pairs == {(f["name"], kind) for f in FAMILIES for kind in KINDS} - refused | meets_none
+    assert len(refused) >= 2
+    notes = read_results(whole.folder).provenance["notes"]
+    assert {f"{kind} takes no observer: not fitted to seen, both" for kind in no_observer} <= set(notes)
     assert (whole.rows["status"] == "ok").all(), whole.rows[["cell", "status", "sentence"]]
 
 
@@ -128,6 +135,34 @@ def test_an_identified_and_observed_family_has_both(whole: Finished) -> None:
     assert len(set(accuracy.values())) == 4
     assert "converged" in rows.loc[("both", "alone"), "sentence"]
     assert accuracy["fitted"] < accuracy["wrong"]
+
+
+def test_an_observer_changes_what_every_method_predicts_that_meets_it(whole: Finished) -> None:
+    results = read_results(whole.folder)
+    cells = whole.rows.set_index(["foundation", "method"])["cell"]
+    for kind, method in KINDS.items():
+        if method.meets_observer:
+            apart = results.paths[cells[("seen", kind)]] - results.paths[cells[("wrong", kind)]]
+            assert np.abs(apart).max() > 1e-3, kind
+
+
+def test_a_family_with_an_observer_is_refused_by_name(whole: Finished) -> None:
+    """A pattern leaves it out, a name is refused, and so is a family that no method is left for."""
+    document = whole.plan.document
+    for families, message in (
+        (["seen"], "'seen' has an observer, which one-step does not take: name the family it extends"),
+        (["seen*"], "no method meets 'wrong': name its family in `families`"),
+        (["*"], "no method meets 'seen': add one that takes an observer, such as alone"),
+    ):
+        method = [{"name": "steps", "kind": "one-step", "families": families}]
+        with pytest.raises(DocumentError, match=re.escape(message)):
+            build_plan({**document, "method": method}, Path(whole.plan.file))
+    plan = build_plan(
+        {**document, "method": [{"name": "steps", "kind": "one-step"}, {"name": "alone", "kind": "alone"}]},
+        Path(whole.plan.file),
+    )
+    assert [way.left_out for way in plan.methods] == [("seen", "both"), ()]
+    assert plan.methods[0].foundations == ("wrong", "fitted", "none")
 
 
 def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> None:

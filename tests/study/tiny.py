@@ -33,9 +33,9 @@ def run_here(plan: Plan, folder: Path) -> list[run.Event]:
 def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
     """The same, event by event."""
 
-    def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *_: Any) -> Iterator[Any]:
+    def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *rest: Any) -> Iterator[Any]:
         for batch in batches:
-            yield batch, run.run_batch(plan, prepared, batch, "cpu")
+            yield batch, run.run_batch(plan, prepared, batch, "cpu", rest[-1])
 
     with patch.object(run, "_compute", compute):
         yield from run.run_study(plan, folder)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+
+import numpy as np
 import pytest
 
 from shipid.document import get
@@ -30,3 +33,12 @@ def test_shared_numbers_come_from_the_particulars() -> None:
     assert bound["hull.mmg"]["L_pp"] == "particulars.L_pp"
     assert bound["hull.mmg"]["rho"] == "constants.rho"
     assert bound["thruster.propeller"]["D_p"] == "thruster.propeller.D_p"
+
+
+def test_an_open_table_binds_numbers_of_numpy() -> None:
+    """A derivative that is left out of the equations would be a silent zero."""
+    document = copy.deepcopy(load_vessel("gunnerus-28.9").document)
+    wanted = bindings(document)
+    table = document["hull"]["derivatives"]
+    table |= {name: np.float64(value) for name, value in table.items() if name != "source"}
+    assert bindings(document) == wanted

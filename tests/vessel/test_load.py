@@ -8,7 +8,8 @@ import pytest
 
 from shipid.document import bundled, leaves, replace
 from shipid.errors import DocumentError
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.bindings import bindings
+from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
 
 UNIT = re.compile(r"-|prime|deg|1/s of the command|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
 
@@ -115,14 +116,14 @@ def test_new_numbers_make_the_vessel_that_a_document_of_them_makes(vessel: Vesse
         {"thruster.port.D_p": 0.0},
     ],
 )
-def test_new_numbers_that_make_no_vessel_are_told_as_in_a_document(values: dict[str, float]) -> None:
+def test_new_numbers_that_make_no_vessel_are_changed_as_in_a_document(values: dict[str, float]) -> None:
     base = load_vessel("gunnerus-28.9")
-    told = []
+    changed = []
     for check in (base.with_values, lambda new: check_vessel(replace(base.document, new), base.file)):
         with pytest.raises(DocumentError) as caught:
             check(values)
-        told.append(str(caught.value))
-    assert told[0] == told[1]
+        changed.append(str(caught.value))
+    assert changed[0] == changed[1]
 
 
 def test_patches_may_be_stacked(tmp_path: Path) -> None:
@@ -143,3 +144,48 @@ def test_a_switched_off_block_is_still_checked() -> None:
     document = replace(load_vessel("gunnerus-28.9").document, {"thruster.bow.F_1": "much"})
     with pytest.raises(Exception, match=r"thruster\.bow\.F_1"):
         check_vessel(document, "x.toml")
+
+
+BOW = '[thruster.bow]\nkind = "tunnel"\nx = 3.0\nz = 0.1\nF_1 = 300.0\nF_2 = 5.0\nF_3 = 60.0\n'
+
+
+def test_a_source_is_that_of_the_document_that_wrote_the_block(tmp_path: Path) -> None:
+    """A block added above is not given the source of the vessel below, nor one below that of the document above."""
+    below = sources(load_vessel("kvlcc2-l7"))
+    named, bare, patch = tmp_path / "named.toml", tmp_path / "bare.toml", tmp_path / "patch.toml"
+    named.write_text(f'extends = "kvlcc2-l7"\nname = "N"\nsource = "the yard"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
+    bare.write_text(f'extends = "kvlcc2-l7"\nname = "B"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
+    patch.write_text('base = "./named.toml"\n[set]\n"hull.mmg.Y_u" = 0.0\n')
+    expected = {**below, "thruster.bow": "the yard", "hull.mmg": "the yard"}
+    assert sources(load_vessel(str(named))) == expected
+    assert sources(load_vessel(str(patch))) == expected
+    assert sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
+    own = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
+    named.write_text(own)
+    assert sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
+
+
+def test_every_term_of_a_bundled_vessel_names_its_source(bundled_vessel: Vessel) -> None:
+    assert all(len(source) > 10 for source in sources(bundled_vessel).values())
+
+
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner", "gunnerus-33.9"])
+def test_numbers_of_numpy_are_numbers(name: str) -> None:
+    """Equations assembled from them first hold every term, and the document is the one of plain numbers."""
+    ship = load_vessel(name)
+    scale = 1.0 + 2.0**-20  # a structure is compiled once: the equations of NumPy's numbers come first
+    numbers = {path: value * scale for path, value in ship.parameters.items() if path.startswith("hull.")}
+    changed = ship.with_values({path: np.float64(value) for path, value in numbers.items()})
+    assert dict(bindings(changed.document)) == dict(bindings(ship.document))
+    assert all(type(value) in (int, float, str, bool) for _, value in leaves(changed.document))
+    again = ship.with_values(numbers)
+    assert (changed.digest, changed.parameters) == (again.digest, again.parameters)
+
+
+def test_arrays_are_lists_of_numbers() -> None:
+    ship, lists = load_vessel("gunnerus-28.9"), ("w_u", "w_v", "w_r", "w_0", "c_X", "c_Y", "c_N")
+    scales = {"u_scale": 5.0, "v_scale": 1.0, "r_scale": 0.1, "X_max": 1e4, "Y_max": 1e4, "N_max": 1e5}
+    block = {name: np.float64(value) for name, value in scales.items()} | {name: np.ones(3) for name in lists}
+    learned = ship.with_values({"hull.learned": block})
+    assert learned.document["hull"]["learned"]["w_u"] == [1.0, 1.0, 1.0]
+    assert learned.with_values({"hull.learned.w_u.1": np.float64(2.0)}).parameters["hull.learned.w_u.1"] == 2.0

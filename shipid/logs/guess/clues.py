@@ -1,4 +1,4 @@
-"""Parts of a guess: the usual names of columns and units, suggestions, findings, and the state of the search."""
+"""Parts of a guess: the units in names, suggestions, findings, questions, and the state of the search."""
 
 from __future__ import annotations
 
@@ -6,37 +6,32 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows
-from shipid.logs.guess.sniff import plain
+from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS
-from shipid.physics.signals import SIGNALS
 
-INPUT_NAMES: dict[str, str] = {
-    "latitude": r"lat|latitude",
-    "longitude": r"lon|long|lng|longitude",
-    "speed": r"sog|speed|spd|speed_?over_?ground",
-    "course": r"cog|course|track|course_?over_?ground",
-}
-"""Key of a mapping that becomes other columns -> pattern of its names in logs, lower case, without a unit.
-
-The patterns of all other columns are in `shipid.physics.signals.SIGNALS`.
-"""
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?",
-    "m/s": r"mps|m/s|ms",
+    "m/s": r"mps|m/s|ms|m/sec|m s-1|ms-1",
     "km/h": r"kmh|km/h|kph",
-    "deg": r"degs?|°",
-    "rad": r"rads?",
-    "deg/s": r"deg/s|dps|degs?_?p?e?r?_?s(ec)?",
-    "deg/min": r"deg/min|dpm|deg_?p?e?r?_?min",
-    "rad/s": r"rad/s|rads|rad_?s",
-    "rpm": r"rpm|1/min|min-1",
-    "rev/s": r"rps|1/s|rev/s|hz",
-    "m": r"m|metres?|meters?",
-    "%": r"%|percent|pct",
+    "deg": r"degs?|°|degrees?|grad|deg t|deg true|grader|º",
+    "rad": r"rads?|radians?",
+    "deg/s": r"(deg|°|grad)/s(ec)?|dps|degs?_?p?e?r?_?s(ec)?",
+    "deg/min": r"(deg|°|grad)/min|dpm|deg_?p?e?r?_?min",
+    "rad/s": r"rad/s(ec)?|rads|rad_?s(ec)?",
+    "rpm": r"rpm|1/min|min-1|u/min|r/min|o/min|rev/min",
+    "rev/s": r"rps|1/s|rev/s|hz|s-1",
+    "m": r"m|metres?|meters?|meter",
+    "km": r"km",
+    "%": r"%|percent|pct|prozent",
 }
-SIDES = r"(port|starboard|stbd|stern|bow|fore|aft|main)"
+"""Unit -> regular expression of how logs write it, in lower case."""
+
+
+NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
 
 
 @dataclass(frozen=True)
@@ -72,27 +67,36 @@ class Finding:
     repair: dict[str, Any] | None = None
 
 
-def _pattern(meaning: str) -> str:
-    return INPUT_NAMES.get(meaning) or SIGNALS[meaning].names or "(?!)"  # a signal that no log has matches no name
+@dataclass(frozen=True)
+class Question:
+    """What the log cannot decide and a person must answer: the columns of the dataset concerned, and the question."""
 
-
-def stem(name: str) -> str:
-    """Return the name of a column in lower case, without brackets and without a unit at its end."""
-    base = plain(name)
-    head, underscore, tail = base.rpartition("_")
-    is_unit = underscore and any(re.fullmatch(words, tail) for words in UNIT_WORDS.values())
-    return head if is_unit and tail != "rpm" else base
+    about: tuple[str, ...]
+    sentence: str
 
 
 def unit_said(name: str, si: str) -> str | None:
-    """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`."""
-    inside = re.search(r"[\[(]([^\])]*)[\])]", name)
-    *before, last = re.split("[_ ]", name)
-    words = inside.group(1) if inside else last if before or si == "rev/s" else ""
-    said = words.strip().lower()
-    return next(
-        (unit for unit, expected in UNIT_WORDS.items() if unit in UNITS[si] and re.fullmatch(expected, said)), None
-    )
+    """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
+
+    A unit stands in brackets, or is the last part of a name or its last two.
+    """
+    inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
+    bare = re.sub(r"[\[(].*", "", name).strip()
+    parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
+    alone = len(parts) < 2 and si != "rev/s"
+    ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
+    if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
+        ends.append("rpm" if "rpm" in bare.lower() else "rps")
+    for said in [*reversed(inside), *ends]:
+        for unit, expected in UNIT_WORDS.items():
+            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(expected, said.strip().lower()):
+                return unit
+    return None
+
+
+def _may_be(scores: dict[str, float], meanings: tuple[str, ...]) -> bool:
+    best = max(scores.values(), default=0.0)
+    return best < STRONG or max(scores.get(meaning, 0.0) for meaning in meanings) >= best - NEARLY
 
 
 @dataclass
@@ -112,6 +116,7 @@ class State:
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
+    questions: list[Question] = field(default_factory=list)
     position: Complex | None = None
     psi: Array | None = None
     r: Array | None = None
@@ -123,8 +128,36 @@ class State:
         return [name for name in self.columns if name not in self.taken]
 
     def called(self, meaning: str) -> list[str]:
-        """Return the free columns whose name fits this meaning."""
-        return [name for name in self.free() if re.fullmatch(_pattern(meaning), stem(name))]
+        """Return the free columns whose name fits this meaning, the best first."""
+        return self._fitting(meaning, self.free())
+
+    def all_called(self, meaning: str) -> list[str]:
+        """Return all columns whose name fits this meaning, taken or free, the best first."""
+        return self._fitting(meaning, list(self.columns))
+
+    def _fitting(self, meaning: str, names: list[str]) -> list[str]:
+        scores = {name: fits(name).get(meaning, 0.0) for name in names}
+        chosen = [name for name in names if scores[name] > 0 and scores[name] >= max(fits(name).values()) - NEARLY]
+        return sorted(chosen, key=lambda name: -scores[name])
+
+    def eligible(self, *meanings: str) -> list[str]:
+        """Return the free columns that may have one of these meanings, or any: they vary, and no name says otherwise.
+
+        A name that fits nothing, or a number, says nothing.
+        """
+        free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
+        if not meanings:
+            return [name for name in free if fits(name).get("", 0.0) < STRONG]
+        return [name for name in free if _may_be(fits(name), meanings)]
+
+    @property
+    def numbered(self) -> bool:
+        """Whether the log has no names, so that its columns are called by numbers."""
+        return all(name.isdecimal() for name in self.columns)
+
+    def ask(self, about: tuple[str, ...], sentence: str) -> None:
+        """Add a question."""
+        self.questions.append(Question(about, sentence))
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
         """Suggest column `source` of the log for column `name` of the dataset; it is then taken."""
@@ -141,7 +174,3 @@ class State:
     ) -> None:
         """Add a finding."""
         self.findings.append(Finding(kind, columns, round(confidence, 2), sentence, repair))
-
-    def all_called(self, meaning: str) -> list[str]:
-        """Return all columns whose name fits this meaning, taken or free."""
-        return [name for name in self.columns if re.fullmatch(_pattern(meaning), stem(name))]

@@ -120,9 +120,12 @@ def _delay(state: State, seen: Array | Complex, integrated: Complex) -> tuple[fl
 
 
 def _find_late(state: State, what: str, against: str, delay: float, explained: float) -> None:
-    word = "later" if delay > 0 else "earlier"
-    sentence = f"{what} comes {abs(delay):.2g} s {word} than the {against} says ({100 * explained:.0f} % of the misfit)"
-    state.find(f"late {what}", (what,), float(np.clip(explained, 0.2, 0.95)), sentence)
+    """Report which of two signals is late, with the repair: instruments and filters delay, they do not foresee."""
+    late, other = (what, against) if delay > 0 else (against, what)
+    size = abs(delay)
+    sentence = f"{late} comes {size:.2g} s later than the {other} says ({100 * explained:.0f} % of the misfit)"
+    repair = {"kind": "latency", "signal": late, "seconds": round(size, 2)}
+    state.find(f"late {late}", (late,), float(np.clip(explained, 0.2, 0.95)), sentence, repair)
 
 
 def _jumps(state: State, path: Complex) -> None:

@@ -12,14 +12,15 @@ import numpy as np
 import tomlkit
 
 from shipid.errors import ShipidError
+from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import Finding, Suggestion
 from shipid.logs.guess.columns import LIKELY, Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
-from shipid.logs.segments import manoeuvres
+from shipid.logs.readers import LARGE
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
-ORDER = ("wrap_interpolation", "break", "despike", "scale", "heading_offset", "lever_arm")
+ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
 NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
 QUESTIONS = (
     "Which point of the ship do positions and velocities belong to? If not the vessel's origin: a lever_arm.",
@@ -28,9 +29,12 @@ QUESTIONS = (
 )
 
 
-def draft_mapping(guess: Guess) -> str:
-    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
-    parts = [*_head(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
+def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
+    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported.
+
+    Without `manoeuvres` the draft is neither tried nor cut into runs.
+    """
+    parts = [*_head(guess), *_origin(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
     text = (
         "\n".join(
             "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
@@ -38,17 +42,25 @@ def draft_mapping(guess: Guess) -> str:
         )
         + "\n"
     )
+    if not manoeuvres:
+        return text
+    if guess.source.pattern is None and guess.file.stat().st_size > LARGE:
+        return text + "\n# A large log: find its manoeuvres with `shipid data segment`.\n"
     try:
+        if guess.source.pattern is not None:
+            import_log(_read(text), guess.file)
+            return text
         segments = segment_log(_read(text), guess.file)
     except ShipidError as error:
-        return text + f"\n# Cannot be imported as it is: {error.path or ''}: {error.message}\n"
+        place = f"{error.file}: " if guess.source.pattern is not None and error.file else ""
+        return text + f"\n# Cannot be imported as it is: {place}{error.path or ''}: {error.message}\n"
     return text + segments_text(segments, guess.sniffed.clock.get("unit", "s"))
 
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
     """Return the manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
     whole = mapping.model_copy(update={"segment": (), "resample": None})
-    return manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
+    return cutting.manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
 
 
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
@@ -85,10 +97,25 @@ def _lines(values: dict[str, Any]) -> Iterator[str]:
 
 def _head(guess: Guess) -> Iterator[str]:
     yield f"# Drafted from {guess.file.name}. Check every line: a percentage says how sure it is, the rest why."
+    yield from (f"# ? {question.sentence}" for question in guess.questions)
     yield from (f"# ? {question}" for question in QUESTIONS)
-    yield from _lines({"name": guess.file.stem})
+    source = guess.source
+    yield from _lines({"name": guess.file.stem or "log"})
     yield "\n[source]"
-    yield from _lines({"sha256": sha256_of(guess.file)})
+    if source.pattern is None:
+        yield from _lines({"sha256": sha256_of(guess.file)})
+    else:
+        yield f"# {len(source.files)} files, one run each"
+        yield from _lines({"runs": source.pattern})
+        if source.skipped:
+            yield from (f"# ! {name} is left out: {reason}" for name, reason in source.skipped.items())
+            yield from _lines({"skip": list(source.skipped)})
+        if source.manoeuvres:
+            yield "[source.manoeuvres]    # as the names of the files say"
+            yield from (
+                f"{tomlkit.item(run).as_string()} = {tomlkit.item(kind).as_string()}"
+                for run, kind in source.manoeuvres.items()
+            )
     yield "\n[format]"
     yield from _lines(guess.sniffed.form)
     yield "\n[clock]"
@@ -101,6 +128,17 @@ def _head(guess: Guess) -> Iterator[str]:
         yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"
     if scattered or guess.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {max(3.0, 5 * usual):g}    # s: shorter gaps are interpolated, longer ones break the run"
+
+
+def _origin(guess: Guess) -> Iterator[str]:
+    """Yield the [origin] that the files of all runs share."""
+    if guess.source.pattern is not None and guess.column("latitude") is not None:
+        yield "\n[origin]    # the first position, of all runs"
+        for key in ("latitude", "longitude"):
+            column = guess.column(key)
+            assert column is not None
+            values = guess.sniffed.columns[column.source]
+            yield from _lines({key: round(float(values[np.isfinite(values)][0]), 7)})
 
 
 def _columns(guess: Guess) -> Iterator[str]:

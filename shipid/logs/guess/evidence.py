@@ -169,15 +169,20 @@ def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, f
     return complex(whole), error, float(explained)
 
 
-def effect(t: Array, r: Array, order: Array) -> float:
-    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard."""
-    chosen = windows(t, 4.0)
+def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
+    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
+
+    t, r, order : (N,), r [rad/s]. duration : of the windows over which changes are compared [s].
+    """
+    chosen = windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     if len(chosen.first) < 12 or np.ptp(order) == 0.0:
         return 0.0
-    columns = [chosen.change(x).real for x in (cumulative_integral(t, order), cumulative_integral(t, r), t)]
-    design, change = np.stack(columns, axis=1), chosen.change(r).real
+    width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
+    smooth = [_boxcar(x, width) for x in (cumulative_integral(t, order), cumulative_integral(t, r), t, r)]
+    *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
+    design = np.stack(columns, axis=1)
     sizes = np.linalg.norm(design, axis=0)
     if not np.all(sizes > 0):
         return 0.0
@@ -187,6 +192,28 @@ def effect(t: Array, r: Array, order: Array) -> float:
     rest = change - design / sizes @ solution
     spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * float(rest @ rest) / max(1, len(rest) - 3)
     return float(solution[0] / np.sqrt(spread[0, 0])) if spread[0, 0] > 0 else 0.0
+
+
+def follows(t: Array, r: Array, order: Array, duration: float) -> float:
+    """Return the correlation of the yaw rate with an order some time before, at the delay where it is largest.
+
+    The delay is at most `duration` [s]; the correlation is not centred, for helm amidships gives no yaw rate.
+    """
+    usual = float(np.median(np.diff(t)))
+    width = max(1, round(duration / 4 / usual))
+    smooth_r, smooth_order = (_boxcar(values - np.median(values), width) for values in (r, order))
+    best = 0.0
+    for rows in np.unique(np.linspace(0, max(1, round(duration / usual)), 9).astype(int)):
+        a, b = smooth_r[rows:], smooth_order[: len(order) - rows]
+        size = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+        now = float(np.sum(a * b)) / size if size > 0 else 0.0
+        best = now if abs(now) > abs(best) else best
+    return best
+
+
+def _boxcar(values: Array, width: int) -> Array:
+    """Return the centred mean over `width` rows, of fewer at the ends, (N,)."""
+    return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).mean())
 
 
 def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
@@ -280,3 +307,32 @@ def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
         known = np.isfinite(values)
         result[name] = np.interp(t, t[known], values[known]) if known.any() else values
     return result
+
+
+def lively(t: Array, psi: Array, chosen: Windows) -> float:
+    """Return the length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
+
+    t (N,) [s], psi (N,) [rad].
+    """
+    span = t[chosen.last] - t[chosen.first]
+    rates = np.abs(chosen.change(psi).real) / span
+    turning = float(np.percentile(rates, 90)) if len(rates) else 0.0
+    return float(np.clip(1.0 / turning, 0.2, WINDOW)) if turning > 0 else WINDOW
+
+
+def fit_with_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[Fit, complex]:
+    """Fit seen = scale * integrated + arm * turned by least squares: the fit, and the arm x + i y [m].
+
+    turned : change of exp(i psi) over each window. An arm between the points of position and velocity is a free
+    unknown, so that it does not pass for a velocity.
+    """
+    total = float(np.sum(np.abs(seen) ** 2))
+    columns = np.stack([integrated, turned, 1j * turned], axis=1)
+    design = np.concatenate([columns.real, columns.imag])
+    size = np.linalg.norm(design, axis=0)
+    if total <= 0.0 or not np.all(size > 0):
+        return fit(seen, integrated), 0j
+    both = np.concatenate([seen.real, seen.imag])
+    solution = np.linalg.lstsq(design / size, both, rcond=None)[0] / size
+    left = float(np.sum((both - design @ solution) ** 2)) / total
+    return Fit(float(solution[0]), np.inf, left), complex(solution[1], solution[2])

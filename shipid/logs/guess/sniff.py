@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -13,13 +14,36 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.readers import LOOKED_AT, READERS, read_table, seconds
+from shipid.logs.guess.words import parts_of
+from shipid.logs.importing import even_clock, rounding_of
+from shipid.logs.readers import (
+    LONGEST_LINE,
+    LOOKED_AT,
+    READERS,
+    TIME_OF_DAY,
+    TextFormat,
+    parse_text,
+    read_table,
+    require_file,
+    seconds,
+    widest,
+)
 
+SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
-CLOCK_WORDS = re.compile(r"^(t|tvec|time.*|timestamp|stamp|clock|sec|seconds|date.*|utc.*|.*_time|ms|zeit)$")
+CLOCK_WORDS = frozenset(
+    (
+        "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
+        "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
+        "gmt"
+    ).split()
+)
+NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
-    r"[\[(]?(s|ms|m|km|deg|°|rad|m/s|kn|kts|knots|km/h|deg/s|deg/min|rad/s|rpm|1/s|hz|nm?|kw|%|-|)[\])]?$"
+    r"[\[(]?(s|secs?|seconds|ms|min|h|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|"
+    r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
+    r"l/h|kg/h|t|t/h|m/s2|m/s\^2|m/s²|-|utc|iso|\[-\]|)[\])]?$"
 )
 _WORDS_FOR_NOTHING = ("", "nan", "null", "none", "n/a", "na", "-", "--")
 
@@ -51,22 +75,59 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     ------
     DataError : the file cannot be read as a log, or no column can be its clock.
     """
+    size = require_file(file)
     try:
-        head = file.read_bytes()[:200_000]
+        with file.open("rb") as stream:
+            head = stream.read(LONGEST_LINE)
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
-    if not head.strip():
+    if not head[:200_000].strip():
         raise DataError("the file is empty", file=file)
-    form = _format(head, file, names)
+    form = _format(head[:200_000], file, names)
     model = READERS[form.get("kind", "text")].options.model_validate(form)
-    table = read_table(file, model, "time")
+    notes: tuple[str, ...] = ()
+    if isinstance(model, TextFormat):
+        widest(head, model.separator, file)
+        sampled = size > SAMPLE
+        table = parse_text(io.StringIO(_sample(file, model.encoding, size)), model, file)
+        if sampled:
+            notes = (f"{len(table)} rows from {BLOCKS + 1} places of {size / 1e6:.0f} MB were looked at",)
+        ragged = table.attrs["ragged"]
+        if ragged and not sampled:
+            form["ragged"] = "drop"
+            first = f"{len(ragged)} lines have another number of cells than the header, the first is line {ragged[0]}"
+            notes = (*notes, f"{first}: they are left out")
+        if len(table) < 2:
+            raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
+    else:
+        table = read_table(file, model, "time")
     columns, words = _numbers(table, form.get("decimal", "."))
     clock, t = _clock(table, columns, file)
     named = clock["from"]
-    notes = tuple(f"column {name!r} holds words, not numbers" for name in words if name != named)
+    notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name not in (named, ""))
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
     kept = {name: values for name, values in columns.items() if name != named and name not in constant}
-    return Sniffed(form, clock, t, kept, notes + tuple(f"column {name!r} is empty" for name in constant))
+    empty = tuple(f"column {name!r} is empty" for name in constant if name)
+    form.pop("ragged", None) if form.get("ragged") == "refuse" else None
+    return Sniffed(form, clock, t, kept, notes + empty)
+
+
+def _sample(file: Path, encoding: str, size: int) -> str:
+    """Return the text of a log; of a large one its head, and whole lines from places spread over it."""
+    with file.open("rb") as stream:
+        if size <= SAMPLE:
+            return stream.read().decode(encoding, "replace")
+        text = stream.read(4 * BLOCK).decode(encoding, "ignore").rpartition("\n")[0]
+        wide = encoding.startswith("utf-16")
+        mark = text[:0]
+        stream.seek(0)
+        order = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}.get(stream.read(2), encoding) if wide else encoding
+        for index in range(1, BLOCKS + 1):
+            start = 4 * BLOCK + (size - 5 * BLOCK) * index // BLOCKS
+            stream.seek(start - start % 4)
+            block = stream.read(BLOCK).decode(order, "ignore")
+            text += "\n" + block.partition("\n")[2].rpartition("\n")[0]
+        return mark + text
 
 
 def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
@@ -102,25 +163,58 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
         for decimal in (".", ",") if separator != "," else (".",):
             share = float(np.mean([_number_share(row, decimal) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
+            score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
             if score > best[0]:  # the first of equals: tabs are blanks, too
                 best = (score, separator, decimal)
     score, separator, decimal = best
     if score < NUMERIC / 2:
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
-    width = Counter(len(row) for row in rows if row != [""]).most_common(1)[0][0]
-    data = next(i for i, row in enumerate(rows) if len(row) == width and _number_share(row, decimal) >= NUMERIC / 2)
-    above = rows[data - 1] if data else []
+    width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
+    shares = [_number_share(row, decimal) for row in rows]
+    usual = float(np.median([share for row, share in zip(rows, shares, strict=True) if len(row) == width]))
+    least = max(NUMERIC / 2, usual - 0.9 / width)  # a header may hold numbers, too, but fewer
+    data = next(
+        (i for i, row in enumerate(rows) if len(row) == width and shares[i] >= least),
+        next(i for i, row in enumerate(rows) if len(row) == width and shares[i] >= NUMERIC / 2),
+    )
     form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
-    named = rows[data - 2] if data > 1 else []
-    if len(above) == len(named) == width and not names and all(_UNIT.match(cell.lower()) for cell in above):
-        form |= {"skip_rows": data, "names": [f"{name} [{unit}]" for name, unit in zip(named, above, strict=True)]}
-    elif len(above) == width and not names:
-        form["skip_rows"] = data - 1
-    else:
-        form["skip_rows"] = data
-        form |= {"names": list(names)} if names else {"header": False}
-    return form
+    if names:
+        return form | {"skip_rows": data, "names": list(names)}
+    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:2]
+    if above and separator == "whitespace" and len(rows[above[0]]) > width:
+        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)
+        if len(joined) == width:  # blanks before units
+            return form | {"skip_rows": data, "names": _distinct(joined)}
+    heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
+    if len(heads) == 2 and _is_units(rows[heads[0]]):
+        called = [*rows[heads[1]], ""][:width]
+        units = [*rows[heads[0]], ""][:width]
+        joined = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(called, units, strict=True)]
+        while joined and not joined[-1]:
+            joined.pop()
+        return form | {"skip_rows": data, "names": _distinct(joined)}
+    if heads and heads[0] == above[0]:
+        return form | {"skip_rows": heads[0]}
+    return form | {"skip_rows": data, "header": False}
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """Return the names with a number added to those that are there already or empty."""
+    result: list[str] = []
+    for index, name in enumerate(names):
+        known = name or f"column {index + 1}"
+        while known in result:
+            known += " (2)"
+        result.append(known)
+    return result
+
+
+def _is_units(row: list[str]) -> bool:
+    """Whether the cells of a line are units."""
+    said = [cell.lower() for cell in row if cell]
+    fitting = sum(bool(_UNIT.match(cell)) for cell in said)
+    return len(said) >= 2 and fitting >= 0.7 * len(said)
 
 
 def cells(line: str, separator: str) -> list[str]:
@@ -158,33 +252,109 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
         said = table.iloc[:, index].dropna().astype(str).str.strip()
         if np.isnan(values).all() and said.ne("").any():
             words.append(name)
-        elif name not in columns:
+        elif name and name not in columns:
             columns[name] = values
     return columns, words
 
 
 def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
-    """Return the clock, a column that rises: by its name if several do; a column of dates if no number rises."""
-    rising = [name for name, values in columns.items() if np.isfinite(values).all() and np.all(np.diff(values) > 0)]
-    called = [name for name in columns if CLOCK_WORDS.match(plain(name))]
-    for name in [name for name in map(str, table.columns) if CLOCK_WORDS.match(plain(name)) and name not in columns]:
-        since = seconds(table[name])
-        if np.isfinite(since).all() and np.all(np.diff(since) > 0):
+    """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
+    finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
+    rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
+    called = [name for name in columns if _is_clock(name)]
+    texts = [name for name in map(str, table.columns) if name not in columns and name]
+    for name in sorted(texts, key=lambda name: not _is_clock(name)):
+        column = table.iloc[:, list(map(str, table.columns)).index(name)]
+        since = seconds(column) if _is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
+        if not np.isfinite(since).all():
+            called += [name] if _is_clock(name) else []
+            continue
+        if np.all(np.diff(since) > 0):
             return {"from": name, "unit": "date"}, since
+        rate = _rate(since)
+        if rate is not None:
+            return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
     candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
-    candidates = candidates or rising
-    if not candidates:
-        said = (
-            f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
-        )
-        raise DataError(f"no column can be the clock: {said}", file=file)
-    t: Array = columns[candidates[0]]
-    name = plain(candidates[0])
-    milliseconds = name.endswith("ms") or (np.median(np.diff(t)) >= 20 and not np.any(t % 1))
-    return {"from": candidates[0], "unit": "ms" if milliseconds else "s"}, np.asarray(
-        t * (1e-3 if milliseconds else 1.0), dtype=np.float64
-    )
+    unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
+    rounded = [name for name in called or unnamed if name in finite and name not in rising]
+    for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
+        factor, unit = _unit_of_clock(name, finite[name])
+        t = np.asarray(factor * finite[name], dtype=np.float64)
+        rate = _rate(t) if name in rounded or _is_coarse(t) else None
+        if rate is not None:
+            return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
+        if name in rising:
+            return {"from": name, "unit": unit}, t
+    if rising:
+        factor, unit = _unit_of_clock(rising[0], finite[rising[0]])
+        return {"from": rising[0], "unit": unit}, np.asarray(factor * finite[rising[0]], dtype=np.float64)
+    said = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
+    raise DataError(f"no column can be the clock: {said}", file=file)
+
+
+def _is_clock(name: str) -> bool:
+    parts = set(parts_of(name)) | {plain(name)}
+    return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
+
+
+def _looks_dated(column: pd.Series[Any]) -> bool:
+    said = column.dropna().astype(str).head(20)
+    dated = said.str.fullmatch(TIME_OF_DAY + r"|\d{4}-\d\d-\d\d[T ].*|\d\d\.\d\d\.\d{4} .*|\d{4}/\d\d/\d\d .*")
+    return bool(len(said) and dated.all())
+
+
+def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
+    """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
+    inside = re.search(r"[\[(]\s*(ms|msec|s|sec|min|h)\s*[\])]", name.lower())
+    said = inside.group(1) if inside else ""
+    if said in ("min", "h"):
+        return {"min": 60.0, "h": 3600.0}[said], said
+    steps = np.diff(values)
+    counting = not said and np.median(steps) >= 20 and not np.any(values % 1)
+    last = parts_of(name)[-1:] or ("",)
+    if said.startswith("ms") or (not said and (last[0] in ("ms", "millis", "msec") or counting)):
+        return 1e-3, "ms"
+    return 1.0, "s"
+
+
+def _is_coarse(t: Array) -> bool:
+    """Whether the steps of a rising clock differ as if it were rounded: they take few values, a quantum apart."""
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    spread = float(np.percentile(np.abs(steps - usual), 90))
+    if spread < 0.05 * usual or len(t) < 20:
+        return False
+    return len(np.unique(np.round(steps / usual, 6))) <= max(4, len(steps) // 50)
+
+
+def _rate(t: Array) -> tuple[float, Array] | None:
+    """Return the step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
+    if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
+        return None
+    _values, first = np.unique(t, return_index=True)
+    early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
+    mean = float(t[-1] - t[0]) / (len(t) - 1)
+    slack = float(rounding_of(t)[-1]) / (len(t) - 1)
+    for step in (_roundest(mean, slack), early, mean):
+        if not step > 0:
+            continue
+        even, _ = even_clock(t, step)
+        if np.all(np.abs(even - t) <= 0.6 * rounding_of(t) + 0.5 * step):
+            return float(f"{step:.9g}"), even
+    return None
+
+
+def _roundest(value: float, slack: float) -> float:
+    """Return the number with the fewest digits within `slack` of a value, or one over such a number."""
+    for digits in range(1, 7):
+        near = float(f"{value:.{digits}g}")
+        if abs(near - value) <= slack:
+            return near
+        inverse = float(f"{1 / value:.{digits}g}") if value > 0 else 0.0
+        if inverse and abs(1 / inverse - value) <= slack:
+            return 1.0 / inverse
+    return value
 
 
 def _counts(values: Array) -> bool:

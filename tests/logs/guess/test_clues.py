@@ -1,4 +1,4 @@
-"""Names of columns: their stems, their units, and what they may be."""
+"""Names of columns: their units, and what they may be."""
 
 from __future__ import annotations
 
@@ -6,22 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, stem, unit_said
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("Heading [deg]", "heading"),
-        ("SOG_kn", "sog"),
-        ("Yaw Rate(deg/s)", "yaw_rate"),
-        ("shaft_rpm", "shaft_rpm"),
-        ("rpm", "rpm"),
-        ("wind-speed_m/s", "wind_speed"),
-    ],
-)
-def test_a_stem_has_no_unit(name: str, expected: str) -> None:
-    assert stem(name) == expected
+from shipid.logs.guess.clues import State, unit_said
 
 
 @pytest.mark.parametrize(
@@ -35,6 +20,12 @@ def test_a_stem_has_no_unit(name: str, expected: str) -> None:
         ("shaft rpm", "rev/s", "rpm"),
         ("rpm", "rev/s", "rpm"),
         ("heading", "rad", None),
+        ("Heading(deg T)", "rad", "deg"),
+        ("v_long_ms", "m/s", "m/s"),
+        ("Drehrate [°/s]", "rad/s", "deg/s"),
+        ("r_deg_min", "rad/s", "deg/min"),
+        ("Drehzahl [U/min]", "rev/s", "rpm"),
+        ("Engine (%)", "rev/s", "%"),
         ("sog [kn]", "rad", None),
         ("deg", "rad", None),
     ],
@@ -55,6 +46,19 @@ def test_a_name_fits_a_meaning(state: State) -> None:
     assert state.called("speed") == ["sog", "SOG [kn]"]
     assert state.called("latitude") == ["lat"]
     assert state.called("longitude") == []
+
+
+def test_what_a_name_excludes_is_not_eligible(state: State) -> None:
+    columns = {name: np.sin(state.t) for name in ("rudder", "Kanal7", "depth", "psi_ref")}
+    named = State(state.t, "s", columns, state.chosen)
+    assert named.eligible("u", "v") == ["Kanal7"]
+    assert named.eligible("delta") == ["rudder", "Kanal7"]
+    assert named.eligible() == ["rudder", "Kanal7"]
+
+
+def test_questions_are_kept(state: State) -> None:
+    state.ask(("psi",), "which way?")
+    assert [(question.about, question.sentence) for question in state.questions] == [(("psi",), "which way?")]
 
 
 def test_a_suggestion_takes_its_column(state: State) -> None:

@@ -1,0 +1,28 @@
+"""Memory that this machine can give: what cannot be had is refused before it is asked for."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+GIB = 2**30
+_GROUP = Path("/sys/fs/cgroup")  # limits of a container
+
+
+def memory() -> int:
+    """Bytes of memory that this process may have in all, by the machine and by its container."""
+    limits = []
+    if hasattr(os, "sysconf"):
+        limits.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    for name in ("memory.max", "memory/memory.limit_in_bytes"):
+        try:
+            limits.append(int((_GROUP / name).read_text()))
+        except (OSError, ValueError):  # no such limit, or the word "max"
+            continue
+    return min(limits, default=2**62)
+
+
+def too_much(numbers: float) -> str | None:
+    """Words for an amount of numbers of 8 bytes that cannot be had, such as `take 224 GiB ...`; None if it fits."""
+    needed, most = 8.0 * numbers, memory()
+    return f"take {needed / GIB:.3g} GiB of memory, and there are {most / GIB:.3g}" if needed > most else None

@@ -1,0 +1,184 @@
+"""Shared libraries that a C compiler made, kept in a folder: only whole ones that this user wrote are ever loaded.
+
+A library ends in a seal, a digest of its bytes and its name: a truncated, exchanged or foreign file does not match it.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import hashlib
+import logging
+import os
+import signal
+import stat
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from shipid.errors import ShipidError
+
+PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
+
+log = logging.getLogger(__name__)
+
+
+class NoLibrary(ShipidError):
+    """A library could not be compiled or loaded on this machine; other engines can do its work."""
+
+
+def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: float = LIMIT) -> tuple[str | None, str]:
+    """Run a compiler: (its complaint in one text, None if it succeeded; what it printed).
+
+    folder : for its temporary files. A compiler that takes longer than `limit` [s] is ended with all its processes.
+    """
+    environment = os.environ | ({"TMPDIR": str(folder)} if folder else {})
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
+    try:
+        process = subprocess.Popen(
+            arguments, **pipes, text=True, errors="replace", env=environment, start_new_session=True
+        )
+    except OSError as error:
+        return f"cannot be started: {error.strerror}", ""
+    try:
+        printed, complaint = process.communicate(timeout=limit)
+    except subprocess.TimeoutExpired:
+        return f"hangs: not done after {limit:g} s", ""
+    finally:
+        _end(process)
+    return (complaint.strip() or "it gave no reason") if process.returncode else None, printed
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process that still runs, and those that it started."""
+    if process.poll() is None:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+        process.wait()
+    for pipe in (process.stdout, process.stderr):
+        if pipe is not None:
+            pipe.close()
+
+
+def build(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:
+    """Compile C source into a sealed library, which appears whole or not at all; the complaint if that fails.
+
+    command : compiler and options, with `{source}` and `{library}` where the names of the files belong.
+    """
+    try:
+        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+            text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
+            text.write_text(source, encoding="utf-8")
+            places = {"{source}": str(text), "{library}": str(fresh)}
+            complaint, _ = run_compiler([places.get(word, word) for word in command], Path(folder), limit)
+            if complaint is not None:
+                return complaint
+            with fresh.open("ab") as stream:
+                stream.write(_seal(fresh.read_bytes(), library.name))
+            fresh.chmod(0o700)
+            os.replace(fresh, library)
+    except OSError as error:
+        return f"{error.strerror or error}"
+    return None
+
+
+def load(library: Path) -> Any:
+    """The function `run` of a library that `build` made; FileNotFoundError if there is none, NoLibrary if not loadable.
+
+    The file is read and compared with its seal before the system maps it: one that is truncated would end the process.
+    """
+    reason = stranger(library)
+    if reason is None:
+        content = library.read_bytes()
+        whole = content[-32:] == _seal(content[:-32], library.name)
+        reason = None if whole else f"{library} is damaged"
+    if reason is not None:
+        raise NoLibrary(reason)
+    try:
+        run = ctypes.CDLL(str(library)).run
+    except (OSError, AttributeError) as error:
+        raise NoLibrary(f"{library} cannot be loaded ({str(error).rpartition(': ')[2]})") from None
+    run.restype = None
+    return run
+
+
+def _seal(content: bytes, name: str) -> bytes:
+    return hashlib.sha256(content + name.encode()).digest()
+
+
+def stranger(place: Path) -> str | None:
+    """Why a file may be the work of another user, in words; None if only this user or the system can have written it.
+
+    The file and its folder must belong to this user and be writable by no other. The folders above must belong to this
+    user or the system, and may be open to all only where nobody can rename what is another's (as in /tmp).
+    FileNotFoundError if there is no such file.
+    """
+    found = os.lstat(place)
+    if not hasattr(os, "geteuid"):
+        return None
+    if not stat.S_ISREG(found.st_mode):
+        return f"{place} is no file"
+    user, trusted = os.geteuid(), {0, os.geteuid(), os.stat("/").st_uid}
+    for part in (place, place.parent):
+        status = os.stat(part)
+        if status.st_uid != user:
+            return f"{part} belongs to another user"
+        if status.st_mode & 0o022:
+            return f"{part} can be written by other users"
+    for part in place.parent.resolve().parents:
+        status = os.stat(part)
+        if status.st_uid not in trusted:
+            return f"{part} belongs to another user"
+        if status.st_mode & stat.S_IWOTH and not status.st_mode & stat.S_ISVTX:
+            return f"{part} can be written by other users"
+    return None
+
+
+@cache
+def folder(wanted: str, probe: bytes) -> Path | None:
+    """Folder of libraries: `shipid` in the wanted one, else a temporary one of this process; None if neither serves.
+
+    A folder serves if only this user can write there, and if a library written there can be loaded.
+
+    probe : content of a compiled library, to try it.
+    """
+    reasons: list[str] = []
+    for kept in (Path(wanted) / "shipid", None):
+        try:
+            place = _passing() if kept is None else _kept(kept)
+            with tempfile.TemporaryDirectory(dir=place) as inside:
+                trial = Path(inside) / "probe.so"
+                trial.write_bytes(probe)
+                trial.chmod(0o700)
+                reason = stranger(trial)
+                if reason is None:
+                    ctypes.CDLL(str(trial))
+        except OSError as error:
+            reason = f"{wanted}: {error.strerror or str(error).rpartition(': ')[2]}"
+        if reason is None:
+            if reasons:
+                log.warning("compiled equations are not kept for the next run: %s", reasons[0])
+            return place
+        reasons.append(reason)
+    log.warning("engine 'native' is not used, others are slower: %s", reasons[-1])
+    return None
+
+
+def _kept(place: Path) -> Path:
+    """The folder at a place, made if it is absent, closed to others if it is this user's."""
+    place.mkdir(parents=True, exist_ok=True)
+    if hasattr(os, "geteuid") and place.stat().st_uid == os.geteuid():
+        place.chmod(0o700)
+    return place
+
+
+def _passing() -> Path:
+    """A temporary folder that is removed when this process ends."""
+    temporary = tempfile.TemporaryDirectory(prefix="shipid-")
+    atexit.register(temporary.cleanup)
+    return Path(temporary.name)

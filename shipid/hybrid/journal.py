@@ -1,0 +1,189 @@
+"""The journal of a run: the trials of all its cells in one file, which Optuna and its dashboard open.
+
+There is one Optuna study for each cell. A trial is written when it has ended, in one line: a search has no trial that
+is half done, and the order of the lines is the order of the trials. A line that a killed process left behind half
+written is cut off by the next one that writes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from math import nan
+from pathlib import Path
+from typing import IO, Any
+
+import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+from optuna.trial import FrozenTrial, TrialState, create_trial
+
+from shipid.errors import ResultError
+from shipid.hybrid.method import Row, Space
+
+COUNT = "trials"  # attribute of a study: how many it will have
+FIXED = "fixed"  # attribute of a trial: settings that are not searched
+
+
+class Journal:
+    """Searches on disk, a study for each cell; several processes may write at once.
+
+    Parameters
+    ----------
+    file : the journal; made where there is none. ResultError where it is not one.
+    """
+
+    def __init__(self, file: Path) -> None:
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        self._file = _Lines(str(file))
+        try:
+            self._storage = JournalStorage(self._file)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            message = "damaged: no journal of trials; take it away, and searches that were interrupted begin again"
+            raise ResultError(message, file=file) from None
+        self._known = {study.study_name for study in self._storage.get_all_studies()}
+
+    def rows(self, cell: str) -> list[Row]:
+        """Return the trials of a search that ended, in order."""
+        trials = self._study(cell).trials if cell in self._known else []
+        mine = [trial for trial in trials if FIXED in trial.user_attrs]  # none that someone else has put in
+        return [_row(number, trial) for number, trial in enumerate(mine)]
+
+    def count(self, cell: str) -> int | None:
+        """Return how many trials a search by budget was found to have."""
+        return self._study(cell).user_attrs.get(COUNT) if cell in self._known else None
+
+    def decide(self, cells: Sequence[str], count: int) -> None:
+        """Write how many trials some searches have."""
+        for cell in cells:
+            self._study(cell).set_user_attr(COUNT, count)
+
+    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
+        """Append trials to searches: cell -> rows, each with the next number."""
+        where = distributions(space)
+        trials = {self._study(cell): [frozen(row, where) for row in mine] for cell, mine in rows.items()}
+        with self._file.together():
+            for study, mine in trials.items():
+                study.add_trials(mine)
+
+    def _study(self, cell: str) -> optuna.Study:
+        if cell in self._known:
+            return optuna.load_study(study_name=cell, storage=self._storage)
+        self._known.add(cell)
+        return optuna.create_study(study_name=cell, storage=self._storage, direction="minimize")
+
+
+def distributions(space: Space) -> dict[str, BaseDistribution]:
+    """What Optuna calls the spans and the choices of a method."""
+    found: dict[str, BaseDistribution] = {}
+    for name, where in space.items():
+        if isinstance(where, tuple):
+            found[name] = CategoricalDistribution(where)
+        elif where.whole:
+            found[name] = IntDistribution(int(where.low), int(where.high))
+        else:
+            found[name] = FloatDistribution(where.low, where.high, log=where.log)
+    return found
+
+
+def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
+    """A trial that ended, as Optuna keeps it; what is not searched is an attribute."""
+    searched = {name: value for name, value in row["params"].items() if name in where}
+    complete = row["state"] == "complete"
+    fixed = {name: value for name, value in row["params"].items() if name not in where}
+    return create_trial(
+        state=TrialState.COMPLETE if complete else TrialState.FAIL,
+        value=row["value"] if complete else None,
+        params=searched,
+        distributions={name: _holding(where[name], value) for name, value in searched.items()},
+        user_attrs={"seconds": row["seconds"], "epochs": row["epochs"], FIXED: fixed},
+    )
+
+
+def _holding(where: BaseDistribution, value: float) -> BaseDistribution:
+    """The span, with a value that rounding put just outside of it."""
+    if isinstance(where, FloatDistribution) and not where.low <= value <= where.high:
+        return FloatDistribution(min(where.low, value), max(where.high, value), log=where.log)
+    return where
+
+
+def _row(number: int, trial: FrozenTrial) -> Row:
+    complete, known = trial.state == TrialState.COMPLETE, trial.user_attrs
+    return {
+        "number": number,
+        "params": {**known[FIXED], **trial.params},
+        "value": trial.value if complete else nan,
+        "seconds": known["seconds"],
+        "epochs": known["epochs"],
+        "state": "complete" if complete else "diverged",
+    }
+
+
+class _Lines(JournalFileBackend):
+    """The file of a journal: what a killed process left half written is cut off by the next one that writes."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__(file)
+        self._path = file
+        self._stream: IO[bytes] | None = None
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Write the entries of this block with the file locked once; the disk is waited for at the end."""
+        with open(self._path, "r+b") as stream, _alone(stream, self._path):
+            end = _last_whole(stream)
+            stream.truncate(end)
+            stream.seek(end)
+            self._stream = stream
+            try:
+                yield
+            finally:
+                self._stream = None
+                stream.flush()
+                os.fsync(stream.fileno())
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Append entries at the end of the file, after the last whole line."""
+        if self._stream is None:
+            with self.together():
+                self.append_logs(logs)
+            return
+        lines = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
+        self._stream.write(lines.encode())
+        self._stream.flush()
+
+
+def _last_whole(stream: IO[bytes]) -> int:
+    """Where the last whole line of a file ends."""
+    end = stream.seek(0, os.SEEK_END)
+    while end:
+        begin = max(end - 4096, 0)
+        stream.seek(begin)
+        place = stream.read(end - begin).rfind(b"\n")
+        if place >= 0:
+            return begin + place + 1
+        end = begin
+    return 0
+
+
+@contextmanager
+def _alone(stream: IO[bytes], path: str) -> Iterator[None]:
+    """Keep other processes from writing; where the system locks files, a lock ends with its process."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        lock = JournalFileOpenLock(path)
+        lock.acquire()
+        try:
+            yield
+        finally:
+            lock.release()
+        return
+    fcntl.flock(stream, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        fcntl.flock(stream, fcntl.LOCK_UN)

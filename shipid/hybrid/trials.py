@@ -1,0 +1,112 @@
+"""Trials of a method: the values that are tried, how a trial is judged, and its row in the record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from math import exp, log
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.hybrid.method import Corrector, Fitted, Index, Task
+from shipid.hybrid.settings import Searched, seed_of, spread
+
+Array = NDArray[np.float64]
+
+
+def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm.
+
+    They never end where a budget says how many are made; there is one where nothing is searched.
+    """
+    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
+    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
+    most = None if method.budget else method.trials
+    for shares in spread(max(len(ranges), 1), most if ranges else 1):
+        logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
+        found = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
+        yield {**fixed, **found}
+
+
+def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:
+    """Ridges that every trial is solved with, evenly spread by their logarithm."""
+    return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
+
+
+def diverged(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
+    """The result where the physics is not finite: no corrector, every trial diverged."""
+    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
+    some = islice(points, 1 if method.budget else None)
+    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+
+
+def fit_each(
+    task: Task, method: Searched, points: Callable[[], Iterable[Mapping[str, float]]], fit: Callable[[str], Fitted]
+) -> dict[str, Fitted]:
+    """Result of `fit` for every foundation of a task by name; where its physics is not finite all trials diverged."""
+    fitted = {}
+    for count, name in enumerate(task.cases):
+        fitted[name] = fit(name) if sound(task, name) else diverged(method, points())
+        if task.on_trial is not None:
+            task.on_trial(count + 1, len(task.cases))
+    return fitted
+
+
+def ridge_trial(
+    task: Task, name: str, ridges: Sequence[float], samples: int, solved: Callable[[Index], Corrector]
+) -> tuple[float, float]:
+    """The ridge with the least mean squared error [m^2] of the path per coordinate, over all folds, and that error.
+
+    solved : indices of training windows -> R correctors in one, which takes R S instants in R blocks.
+    samples : validation windows of a fold that are judged, at most.
+    """
+    errors, physics = np.zeros(len(ridges)), task.cases[name].physics
+    for fold, (training, validation) in enumerate(task.folds):
+        corrector = solved(training)
+        judged = some_of(validation, samples, seed_of(task.seed, fold))
+        instants = task.instants(name).select(np.tile(judged, len(ridges)))
+        paths = np.split(corrector.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
+        errors += [mean_square(path, task.windows.future[:, judged]) for path in paths]
+    best = int(errors.argmin())
+    return ridges[best], float(errors[best]) / len(task.folds)
+
+
+def row_of(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
+    """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
+    complete = bool(np.isfinite(value))
+    return {
+        **{"number": number, "params": dict(params), "value": value if complete else np.nan},
+        **{"seconds": time.process_time() - start, "epochs": epochs},
+        "state": "complete" if complete else "diverged",
+    }
+
+
+def best_of(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Trials that ended with a value, the best first; of equal ones the earlier."""
+    return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
+
+
+def used(task: Task) -> Index:
+    """Indices of the windows that train or validate in any fold."""
+    return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+
+
+def sound(task: Task, name: str) -> bool:
+    """Whether the physics of a foundation is finite on all windows of the folds."""
+    return bool(np.isfinite(task.cases[name].paths[:, used(task)]).all())
+
+
+def some_of(windows: Index, most: int, seed: int) -> Index:
+    """At most so many of the windows, drawn without replacement, in order."""
+    if len(windows) <= most:
+        return windows
+    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
+
+
+def mean_square(paths: Array, future: Array) -> float:
+    """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
+    value = float(np.square(paths - future).mean())
+    return value if np.isfinite(value) else float("inf")

@@ -1,0 +1,190 @@
+"""Choose the commands: rudder, azimuth and shaft columns by name, their sign and unit by what they do to the ship."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from shipid.data.dataset import Array
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.words import fits, is_order, parts_of, side_of
+from shipid.logs.mapping import to_si
+from shipid.physics.signals import SIGNALS, named, steers
+
+AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
+SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
+FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
+ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+NEAR = 15.0  # times from that: a unit further off is doubted
+
+
+def choose_commands(state: State) -> None:
+    """Choose angles that steer, then shafts and pitches."""
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
+    used: dict[str, int] = {}
+    azimuth = _steering(state, r, used)
+    _thrust(state, azimuth, used)
+
+
+def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
+    """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
+    angles = _named(state, [signal for signal in named("command") if steers(signal)])
+    power = {name: 0.0 if r is None else _power(state, r, name) for name in state.eligible()}
+    by_name = bool(angles)
+    if not angles and r is not None:
+        # an order is held at its largest value; a response such as roll is not
+        strength = {name: power[name] * _held(state.columns[name]) for name in power if _small(state.columns[name])}
+        likely = max(strength, key=lambda name: abs(strength[name]), default="")
+        angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
+    azimuth = any(SIGNALS[signal].component == AZIMUTH for _, signal in angles)
+    for name, signal in angles:
+        unit = likely_unit(state, name, signal)
+        effect = power.get(name, 0.0)
+        extra: dict[str, Any] = {}
+        followed = 0.0
+        why = "by its name; it is not seen to turn the ship, so that its sign is not known"
+        confidence = 0.5 if by_name else 0.4
+        if by_name and abs(effect) <= SEEN and r is not None:
+            span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
+            followed = evidence.follows(state.t, r, state.columns[name], span)
+            if abs(followed) > FOLLOWED:
+                effect = float(1.01 * SEEN * np.sign(followed))
+            else:
+                followed = 0.0
+        if abs(effect) > SEEN:
+            confidence = 0.95 if by_name else 0.55
+            # sides to which it turns the ship, and to which it does not
+            sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
+            seen = f"t value {abs(effect):.0f}" if followed == 0.0 else f"correlation {abs(followed):.2f}"
+            why = f"positive turns the ship to {sides[0]} ({seen})"
+            if (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
+                extra["sign"] = -1
+                sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
+                state.find("wrong sign of rudder", (name,), confidence, sentence)
+        component = side_of(name) or SIGNALS[signal].component
+        if not azimuth and signal == "delta" and side_of(name):
+            component = f"rudder_{side_of(name)}" if state.called("n") == [] else str(side_of(name))
+        state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+    return azimuth
+
+
+def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
+    """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
+    found: dict[str, tuple[float, str]] = {}
+    for signal in signals:
+        for name in state.called(signal):
+            score = fits(name)[signal]
+            others = max((value for meaning, value in fits(name).items() if meaning not in signals), default=0.0)
+            if score >= others and score > found.get(name, (0.0, ""))[0] and np.ptp(state.columns[name]) >= 0:
+                found[name] = (score, signal)
+    groups: dict[tuple[str | None, str], list[str]] = {}
+    for name in sorted(found, key=lambda one: (is_order(one), -found[one][0])):
+        number = next((part for part in reversed(parts_of(name)) if part.isdigit()), None)
+        groups.setdefault((side_of(name) or number, found[name][1]), []).append(name)
+    chosen = []
+    sided = any(side is not None for side, _ in groups)
+    for (side, signal), names in groups.items():
+        if side is None and sided and is_order(names[0]):
+            continue
+        kept = names[:1]
+        if len(names) > 1:
+            rest = ", ".join(map(repr, names[1:]))
+            state.find(
+                "several columns for one command", tuple(names), 0.6, f"{names[0]!r} is taken, of the same: {rest}"
+            )
+        chosen += [(name, signal) for name in kept]
+    order = list(state.columns)
+    return sorted(chosen, key=lambda entry: order.index(entry[0]))
+
+
+def _power(state: State, r: Array, name: str) -> float:
+    """Return the t value of the effect of a column on the yaw rate; over windows of a quarter of a usual turn."""
+    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
+    return evidence.effect(state.t, r, state.columns[name], 0.4 * span)
+
+
+def _small(values: Array) -> bool:
+    return bool(0 < np.abs(values).max() < 95 and np.ptp(values) > 0)
+
+
+def _held(values: Array) -> float:
+    """Return the share of rows that repeat the value before (to 1/100 of the range), floored: orders are held."""
+    return 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
+
+
+def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
+    for signal in (signal for signal in named("command") if not steers(signal)):
+        for name, _ in _named(state, [signal]):
+            fallback = AZIMUTH if azimuth else SIGNALS[signal].component
+            component = side_of(name) or fallback
+            if SIGNALS[signal].shaft:
+                unit, confidence, why, extra = _shaft_unit(state, name)
+            else:
+                said = unit_said(name, SIGNALS[signal].unit)
+                unit, confidence, extra = likely_unit(state, name, signal), 0.9 if said else 0.7, {}
+                why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
+            state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+
+
+def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
+    """Return unit, confidence, reason and further keys of a shaft speed.
+
+    The way of the ship in one turn of the shaft, against the radius of her turns, tells revolutions per second from
+    those per minute; nothing tells per cent from either.
+    """
+    values = state.columns[name]
+    top = float(np.abs(values).max())
+    said = unit_said(name, "rev/s")
+    why = f"by its name; up to {top:.4g}"
+    if said == "%":
+        state.ask(("n",), f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100")
+        return "rpm", 0.3, f"{why} per cent of a shaft speed that the log does not say", {"factor": 1.0}
+    off = {unit: _off_advance(state, values, unit) for unit in ("rpm", "rev/s")}
+    by_motion = min(off, key=lambda unit: off[unit])
+    if said is not None:
+        far = off.get(said, 1.0)
+        if said in off and far > NEAR and off[by_motion] < NEAR / 3 and by_motion != said:
+            sentence = f"{name!r} says {said}, but the ship would run {far:.0f} times too far or too little in a turn"
+            state.find("unit of the shaft", (name,), 0.6, f"{sentence} of the shaft: it is read in {by_motion}")
+            return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
+        return said, 0.9, why, {}
+    if top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
+        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")
+    if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
+        unit = likely_unit(state, name, "n")
+        state.ask(("n",), f"in which unit is {name!r}, up to {top:.4g}? {unit} is a guess")
+        return unit, 0.4, why, {}
+    return by_motion, 0.7, f"{why}; the way in a turn of the shaft says {by_motion}", {}
+
+
+def _off_advance(state: State, values: Array, unit: str) -> float:
+    """Return how many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
+    if state.psi is None or state.position is None:
+        return np.inf
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    speed = float(np.median(np.abs(state.chosen.change(state.position)) / span))
+    rate = float(np.percentile(np.abs(state.chosen.change(state.psi).real) / span, 90))
+    shaft = float(np.median(np.abs(values))) * to_si(unit, "propeller.n")
+    if not (speed > 0 and rate > 0 and shaft > 0):
+        return np.inf
+    ratio = speed / shaft / (speed / rate) / ADVANCE
+    return max(ratio, 1.0 / ratio)
+
+
+def likely_unit(state: State, name: str, signal: str) -> str:
+    """Return the unit of a column taken as this signal: the unit in its name, else the likely one by its magnitude."""
+    row = SIGNALS[signal]
+    large = row.read_as_SI is not None and float(np.abs(state.columns[name]).max()) > row.read_as_SI
+    said = unit_said(name, row.unit)
+    if said is not None and said != "%":
+        return said
+    return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
+
+
+def _unique(name: str, used: dict[str, int]) -> str:
+    used[name] = used.get(name, 0) + 1
+    component, _, signal = name.partition(".")
+    return name if used[name] == 1 else f"{component}_{used[name]}.{signal}"

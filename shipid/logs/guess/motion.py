@@ -1,0 +1,335 @@
+"""Choose velocities and yaw rate: the columns whose integrals are the track and the heading, with unit, frame, sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shipid.data.dataset import Array
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.evidence import Complex, Fit
+from shipid.logs.guess.words import fits, is_order
+from shipid.logs.mapping import UNITS, to_si
+
+CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
+LEFT, NAMED_LEFT = 0.1, 0.5  # unexplained share of the track, at most: of columns without fitting names, and with
+SAME = 0.8  # ratio of two unexplained shares, above which neither is better
+OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
+
+
+@dataclass(frozen=True)
+class Velocities:
+    """A hypothesis: two columns as `earth`-fixed, `body`-fixed, or `mirrored` (the second is positive to port).
+
+    fit : track = scale * integral. named : how well the names fit, 0 to 1. path : the integral, (N,).
+    """
+
+    fit: Fit
+    first: str
+    second: str
+    frame: str
+    named: float
+    path: Complex
+
+    @property
+    def cost(self) -> float:
+        """Unexplained share of the track, less for fitting names."""
+        return (self.fit.left + 0.003) / (0.25 + self.named)
+
+
+def choose_velocities(state: State) -> None:
+    """Choose the two velocity columns, or speed and course over ground, whose integral fits the track best."""
+    assert state.position is not None
+    assert state.psi is not None
+    seen = state.chosen.change(state.position)
+    ranked = sorted(_hypotheses(state, seen), key=lambda entry: entry.cost)
+    named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
+    bound = min(LEFT, 0.7 * min((entry.fit.left for entry in ranked), default=1.0)) if state.numbered else 0.2
+    if not named and _speed_and_course(state, seen, bound):
+        return
+    least = min((entry.fit.left for entry in ranked), default=1.0)
+    best = next(iter(ranked), None)
+    if best is None or best.fit.left > (NAMED_LEFT if best.named >= 0.45 else LEFT):
+        return
+    plain = [entry for entry in named if entry.frame == "body"]
+    for better in (named[:1], plain[:1]):
+        if better and better[0].fit.left < CLEAR * least + 1e-6:
+            best = better[0]
+    swapped = best.first in state.called("v") and best.second in state.called("u")
+    if best.named < 0.45 and not state.numbered and not swapped:
+        names = f"{best.first!r} and {best.second!r}"
+        sentence = f"{names} are not named as velocities, but their integral is the track"
+        state.find("velocities under other names", (best.first, best.second), 0.6, sentence)
+    _take_velocities(state, _side_of_sway(state, best, ranked, seen), ranked)
+
+
+def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
+    """Yield every ordered pair of columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
+    assert state.psi is not None
+    words = ("u", "v", "velocity_north", "velocity_east")
+    named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
+    free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
+    turn = np.exp(1j * state.psi)
+    earth = {name: evidence.integral(state.t, state.columns[name]) for name in free}
+    body = {name: evidence.integral(state.t, state.columns[name] * turn) for name in free}
+    for first in free:
+        for second in free:
+            if first == second:
+                continue
+            ahead, north = ((fits(first).get(word, 0.0)) for word in ("u", "velocity_north"))
+            abeam, east = ((fits(second).get(word, 0.0)) for word in ("v", "velocity_east"))
+            for frame, path, score in (
+                ("earth", earth[first] + 1j * earth[second], max(min(north, east), 0.5 * min(ahead, abeam))),
+                ("body", body[first] + 1j * body[second], min(ahead, abeam)),
+                ("mirrored", body[first] - 1j * body[second], 0.9 * min(ahead, abeam)),
+            ):
+                change = state.chosen.change(path)
+                keep = evidence.robust(seen, change)
+                result = evidence.fit(seen[keep], change[keep])
+                known = min(abs(result.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                if result.scale > 0 and (score >= 0.45 or known):
+                    yield Velocities(result, first, second, frame, score, path)
+
+
+def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
+    """Return the hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn.
+
+    The position may be of another point than the velocities, which looks like a sway speed. Where the track cannot
+    tell, v r < 0 decides: a ship drifts out of her turn. If they contradict, it is asked.
+    """
+    assert state.psi is not None
+    if best.frame == "earth":
+        return best
+    other = next(
+        (
+            e
+            for e in ranked
+            if (e.first, e.second) == (best.first, best.second) and e.frame not in (best.frame, "earth")
+        ),
+        None,
+    )
+    if other is None:
+        return best
+    turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
+    left = {}
+    for entry in (best, other):
+        change = state.chosen.change(entry.path)
+        keep = evidence.robust(seen, change)
+        left[entry.frame] = evidence.fit_with_arm(seen[keep], change[keep], turned[keep])[0].left
+    by_track = min((best, other), key=lambda entry: left[entry.frame])
+    ratio = min(left.values()) / max(max(left.values()), 1e-12)
+    r = np.gradient(state.psi, state.t)
+    drift = float(np.mean(_calmed(state, state.columns[best.second]) * _calmed(state, r)))
+    by_drift = {"body": drift < 0, "mirrored": drift > 0}
+    if ratio < SAME and by_drift[by_track.frame]:
+        return by_track
+    if ratio < 0.5 * SAME:
+        return by_track
+    simple = min((best, other), key=lambda entry: entry.fit.left)
+    likely = best if by_drift[best.frame] else other
+    if likely is not simple or ratio < SAME:
+        state.ask(
+            ("v",),
+            f"is {best.second!r} positive to starboard? It is drafted so that she drifts out of her turns, as ships "
+            "do near midships; the track does not settle it",
+        )
+    return likely
+
+
+def _calmed(state: State, values: Array) -> Array:
+    """Return a signal as means over the windows, less its mean, (W,)."""
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    means = state.chosen.change(evidence.integral(state.t, values)).real / span
+    return np.asarray(means - np.mean(means))
+
+
+def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -> None:
+    fit, first, second, frame = best.fit, best.first, best.second, best.frame
+    assert state.psi is not None
+    pair = {first, second}
+    runner = min(
+        (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair),
+        key=lambda one: one.left,
+        default=None,
+    )
+    unit, rest = _speed_unit(fit, (first, second), state)
+    factor = to_si(unit, "u")
+    contrast = 1.0 - fit.left / runner.left if runner is not None and runner.left > 0 else 1.0
+    confidence = float(np.clip(0.6 + 0.4 * contrast, 0.0, 0.99)) * (1 - min(0.5, fit.left))
+    swapped = first in state.all_called("v") and second in state.all_called("u")
+    confidence = confidence if best.named >= 0.45 or state.numbered or swapped else min(confidence, 0.59)
+    if frame == "earth" and contrast < 0.2:
+        state.ask(
+            ("u", "v"), f"are {first!r} and {second!r} north and east velocities, or along and across the heading?"
+        )
+    fixed = "earth" if frame == "earth" else "body"
+    why = f"integrated as {fixed}-fixed [{unit}] they leave {100 * fit.left:.2g} % of the track unexplained"
+    if runner is not None:
+        why += f", otherwise {100 * runner.left:.2g} %"
+    in_unit = state.columns[first] * factor, state.columns[second] * factor
+    extra_v: dict[str, Any] = {}
+    if frame == "earth":
+        extra = {"frame": "earth"}
+        if fits(first).get("u", 0.0) > fits(first).get("velocity_north", 0.0) and first in state.all_called("u"):
+            sentence = (
+                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
+            )
+            state.find("earth-fixed velocities", (first, second), confidence, sentence)
+    else:
+        extra = {}
+        if frame == "mirrored":
+            sentence = f"{second!r} is positive to port: the track is met with its sign changed"
+            state.find("wrong sign of v", (second,), confidence, sentence)
+            extra_v = {"sign": -1}
+        if swapped:
+            state.find(
+                "u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it"
+            )
+    state.suggest("u", first, unit, confidence, why, **extra)
+    state.suggest("v", second, unit, confidence, why, **extra, **extra_v)
+    velocity = in_unit[0] + 1j * in_unit[1] * (-1 if frame == "mirrored" else 1)
+    turn = np.exp(1j * state.psi)
+    state.velocity = np.asarray(velocity if frame == "earth" else velocity * turn)
+    state.body = np.asarray(velocity / turn if frame == "earth" else velocity)
+    _factor(state, rest, Fit(fit.scale / factor, fit.error / factor, fit.left), (first, second), unit)
+
+
+def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
+    """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
+    units = UNITS["m/s"]
+    unit = min(units, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
+    said = unit_said(sources[0], "m/s")
+    if said is not None and abs(fit.scale / units[said] - 1) < OFF_UNIT and abs(fit.scale / units[unit] - 1) > 0.05:
+        unit = said
+    if unit != (said or ("m/s" if not quiet else unit)) and abs(fit.scale / units[unit] - 1) < 0.08:
+        word = "knots" if "kn" in (unit, said) else "speed unit"
+        wanted = f"the name says {said}" if said else "nothing says so"
+        sentence = f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})"
+        state.find(word, sources, 0.95, sentence)
+    elif said is not None and abs(fit.scale / units[unit] - 1) >= 0.08:
+        unit = said
+    return unit, abs(fit.scale / units[unit] - 1) > 0.004
+
+
+def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], unit: str) -> None:
+    """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
+    per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
+    rounds = [evidence.lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
+    near = [entry for entry in rounds if entry[1] > 0.9]
+    if near and unit != "kn":
+        multiplier, _, count = max(near, key=lambda entry: entry[2])
+        factor = multiplier / per_knot
+        if abs(factor - fit.scale) < max(0.03, 3 * fit.error) and abs(factor - 1.0) > 1e-3:
+            sentence = (
+                f"{count} values are round in knots if these were divided by {multiplier:.4f}, not {per_knot:.4f}"
+            )
+            sentence += f" (the track says {fit.scale:.3f} +- {fit.error:.3f})"
+            repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(factor, 4)}
+            state.find("factor", sources, 0.95, sentence, repair)
+        return
+    off = abs(fit.scale - 1.0)
+    if not remains or not np.isfinite(fit.error) or off < max(3 * fit.error, 0.004):
+        return
+    sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
+    pair = f"{sources[0]!r} and {sources[1]!r} in {unit}"
+    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {pair}"
+    repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(fit.scale, 4)}
+    state.find("factor", sources, sure, sentence, repair)
+
+
+def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
+    """Take speed and course over ground, if the log has them, instead of velocities.
+
+    bound : unexplained share of the track, at most.
+    """
+    assert state.psi is not None
+    speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
+    if state.numbered:
+        speeds = courses = state.eligible()
+    best: tuple[float, str, str, str, Fit, Complex] | None = None
+    for course in courses:
+        for turn in ("deg", "rad"):
+            angle, _ = evidence.heal(state.columns[course], 2 * np.pi / to_si(turn, "psi"), state.t)
+            way = np.exp(1j * to_si(turn, "psi") * angle)
+            for speed in speeds:
+                if speed == course:
+                    continue
+                path = evidence.integral(state.t, state.columns[speed] * way)
+                change = state.chosen.change(path)
+                keep = evidence.robust(seen, change)
+                fit = evidence.fit(seen[keep], change[keep])
+                score = 0.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
+                cost = (
+                    (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
+                )
+                known = min(abs(fit.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                if (
+                    (known or (score >= 1.5 and fit.scale > 0))
+                    and fit.left < bound
+                    and (best is None or cost < best[0])
+                ):
+                    best = (cost, speed, course, turn, fit, way)
+    if best is None:
+        return False
+    _, speed, course, turn, fit, way = best
+    unit, _ = _speed_unit(fit, (speed, course), state, quiet=True)
+    why = f"along the course [{turn}] it leaves {100 * fit.left:.2g} % of the track unexplained"
+    state.suggest("speed", speed, unit, 0.9, why)
+    state.suggest("course", course, turn, 0.9, why, wrap=True)
+    state.velocity = np.asarray(to_si(unit, "u") * state.columns[speed] * way)
+    state.body = np.asarray(state.velocity * np.exp(-1j * state.psi))
+    return True
+
+
+def choose_yaw_rate(state: State, most: float = 0.3) -> None:
+    """Choose the yaw rate: the column whose integral fits the heading best; a fitting name wins if nearly as good.
+
+    most : share of the heading's change that a column without a fitting name may leave unexplained.
+    """
+    assert state.psi is not None
+    change = state.chosen.change(state.psi)
+    if float(np.std(change)) < np.radians(0.5):
+        _rate_by_name(state)
+        return
+    candidates = []
+    for name in state.eligible("r"):
+        integrated = state.chosen.change(evidence.integral(state.t, state.columns[name]))
+        fit = evidence.fit(change, integrated)
+        unit = min(UNITS["rad/s"], key=lambda entry: abs(np.log(max(abs(fit.scale), 1e-12) / UNITS["rad/s"][entry])))
+        if fit.left < 0.5 and abs(abs(fit.scale) / UNITS["rad/s"][unit] - 1) < 0.35:
+            candidates.append((fit, name, unit))
+    candidates.sort(key=lambda entry: entry[0].left)
+    called = state.all_called("r")
+    named = [
+        entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
+    ]
+    if not candidates or (not named and candidates[0][0].left > most):
+        if called and not state.numbered and called[0] in state.free():
+            sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
+            state.find("yaw rate does not fit", (called[0],), 0.6, sentence)
+        return
+    fit, name, unit = named[0] if named else candidates[0]
+    extra: dict[str, Any] = {}
+    why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
+    confidence = 0.99 * (1 - min(0.5, fit.left))
+    if fit.scale < 0:
+        extra["sign"] = -1
+        state.find("wrong sign of r", (name,), confidence, f"{name!r} is positive where the heading falls")
+    if name not in called and not name.isdecimal():
+        other = f", which {called[0]!r} is not" if called else ""
+        state.find("yaw rate under another name", (name,), confidence, f"{name!r} is the rate of the heading{other}")
+    said = unit_said(name, "rad/s")
+    if said is not None and said != unit:
+        state.find("unit of r", (name,), confidence, f"{name!r} says {said}, but is in {unit}")
+    state.suggest("r", name, unit, confidence, why, **extra)
+    state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
+
+
+def _rate_by_name(state: State) -> None:
+    for name in state.called("r")[:1]:
+        unit = unit_said(name, "rad/s") or "deg/s"
+        state.suggest("r", name, unit, 0.4, "by its name; the ship turns too little to see unit and sign")

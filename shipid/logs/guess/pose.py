@@ -1,0 +1,299 @@
+"""Choose position and heading: the columns whose track keeps to the heading, with unit, frame and sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pymap3d import geodetic2ned
+
+from shipid.data.dataset import Array
+from shipid.errors import DataError
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.evidence import Complex
+from shipid.logs.guess.words import fits, is_order, parts_of
+from shipid.logs.mapping import to_si
+
+GOOD, POOR = 0.05, 0.2  # misfit of a course and a heading: 1 - agreement
+MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
+STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
+COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
+YAW = frozenset(["yaw", "gier", "gir", "theta"])
+TURNED = np.radians(8.0)  # range of a heading that no name says, at least
+SEARCHED = 24  # columns at most, where no name helps
+EARTH = 111_000.0  # m in a degree of latitude
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A hypothesis: columns of position and heading, and how course and heading agree.
+
+    same, mirrored : mean of exp(i (course - psi)) and of exp(i (course + psi)). cost : misfit, less for fitting names.
+    """
+
+    north: str
+    east: str
+    heading: str
+    unit: str
+    on_globe: bool
+    same: complex
+    mirrored: complex
+    cost: float
+
+    @property
+    def misfit(self) -> float:
+        """1 - agreement, of the better of the heading and its mirror."""
+        return 1.0 - max(abs(self.same), abs(self.mirrored))
+
+
+def choose_pose(state: State, file: Path) -> None:
+    """Choose position and heading.
+
+    Names that fit are tried first; where they fit badly or are not there, all columns are. Raises DataError if no
+    column can be a position or a heading.
+    """
+    pairs = list(_named_pairs(state))
+    headings = [name for name in state.all_called("psi") if not is_order(name)]
+    sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
+    best = _best(state, pairs, sure or headings)
+    if best is None or best.misfit > POOR:
+        wide = _search(state, pairs, headings)
+        if wide is not None and np.ptp(state.columns[wide.heading]) * to_si(wide.unit, "psi") < TURNED:
+            wide = None  # anything that hardly changes keeps to a straight course
+        if wide is not None and (best is None or wide.misfit < 0.5 * best.misfit) and wide.misfit < POOR:
+            if best is not None and not state.numbered:
+                named = ", ".join(map(repr, (best.north, best.east, best.heading)))
+                sentence = f"{named} do not fit together as position and heading (misfit {best.misfit:.2f}); "
+                sentence += f"{wide.north!r}, {wide.east!r}, {wide.heading!r} do ({wide.misfit:.3f})"
+                state.find("misleading names", (wide.north, wide.east, wide.heading), 0.6, sentence)
+            best = wide
+    if best is None or (best.misfit > POOR and (not pairs or not headings)):
+        missing = "position (north and east, or latitude and longitude)" if not pairs else "heading"
+        raise DataError(f"no column can be the {missing}: name the columns with --names, or map by hand", file=file)
+    if best.misfit > POOR and not state.numbered:
+        state.ask(
+            ("psi", "north", "east"),
+            f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the "
+            f"position and {best.heading!r} the heading?",
+        )
+    _take(state, best, sure)
+
+
+def _named_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
+    """Yield north, east, whether they are angles on the globe, and how well the names fit (0 to 1)."""
+    for first, second, on_globe in (("latitude", "longitude", True), ("north", "east", False), ("x", "y", False)):
+        for north in state.called(first):
+            for east in state.called(second):
+                score = (fits(north)[first] + fits(east)[second]) / 2
+                if north != east and (not on_globe or _on_globe(state, north, east)):
+                    yield north, east, on_globe, score
+
+
+def _on_globe(state: State, north: str, east: str) -> bool:
+    return bool(np.abs(state.columns[north]).max() <= 90 and np.abs(state.columns[east]).max() <= 360)
+
+
+def _best(
+    state: State,
+    pairs: list[tuple[str, str, bool, float]],
+    headings: list[str],
+    limit: int = 400,
+    rated: dict[str, float] | None = None,
+) -> Pose | None:
+    """Return the hypothesis of least cost among pairs of position and columns of heading, in degrees or radians.
+
+    A misfit counts against the spread of the heading: a track that hardly turns agrees with any constant. `rated` is
+    what another column, integrated, leaves unexplained of a heading.
+    """
+    middle = (state.chosen.first + state.chosen.last) // 2
+    thin = max(1, len(middle) // limit)
+    angles = {}
+    for heading in headings:
+        for unit in ("deg", "rad"):
+            turn = 2 * np.pi / to_si(unit, "psi")
+            psi, _ = evidence.heal(state.columns[heading], turn, state.t)
+            turned = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
+            angles[heading, unit] = turned, 1.0 - abs(complex(np.mean(turned)))
+    best: Pose | None = None
+    for north, east, on_globe, score in pairs:
+        track = state.chosen.change(plane(state, north, east, on_globe))[::thin]
+        size = float(np.sum(np.abs(track)))
+        if size <= 0:
+            continue
+        for (heading, unit), (turned, spread) in angles.items():
+            if heading in (north, east):
+                continue
+            same = complex(np.sum(track * turned)) / size
+            mirrored = complex(np.sum(track * np.conj(turned))) / size
+            said = unit_said(heading, "rad")
+            named = fits(heading).get("psi", 0.0)
+            misfit = 1 - max(abs(same), abs(mirrored))
+            quarter = abs(same) >= abs(mirrored) and abs(np.angle(same)) > np.pi / 4  # an acceleration looks like that
+            cost = (misfit + 0.003 + 0.1 * quarter) / (spread + 0.01) / (0.3 + score) / (0.3 + named)
+            cost *= 0.6 if unit == (said or "deg") else 1.0
+            cost *= 1.0 if rated is None else 0.02 + rated.get(heading, 1.0)
+            if best is None or cost < best.cost:
+                best = Pose(north, east, heading, unit, on_globe, same, mirrored, cost)
+    return best
+
+
+def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
+    """Return the best hypothesis among all columns, names apart; a heading is rather one whose rate is a column."""
+    meanings = ("north", "east", "x", "y", "latitude", "longitude", "psi")
+    free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
+    rated = _differentiated(state, free)
+    named = [name for name in headings if name in state.free()]
+    places = list(rated) if len(rated) > 2 and state.numbered else free
+    angles = list(rated) if rated and state.numbered else free
+    wide = [(a, b, False, 0.3) for i, a in enumerate(places) for b in places[i + 1 :]]
+    wide += [(a, b, True, 0.3) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
+    found = _best(
+        state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None
+    )
+    if found is None or (found.misfit > POOR and places is not free):
+        wide = [(a, b, False, 0.3) for i, a in enumerate(free) for b in free[i + 1 :]]
+        found = _best(state, wide, free, 150)
+    if found is not None and state.numbered:
+        rivals = [name for name in angles if name not in (found.north, found.east, found.heading)]
+        other = _best(state, [(found.north, found.east, found.on_globe, 0.3)], rivals, 150)
+        close = other is not None and other.misfit < 2 * found.misfit + 0.02
+        if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(found.heading, 1.0) + 1e-3:
+            state.ask(
+                ("psi", "u", "v", "speed", "course"),
+                f"is {found.heading!r} the heading and {other.heading!r} the course, or the other way?",
+            )
+    return found
+
+
+def _may_be_globe(state: State, north: str, east: str) -> bool:
+    """Whether two columns without names may be latitude and longitude: small changes about a place on the Earth."""
+    a, b = state.columns[north], state.columns[east]
+    if not _on_globe(state, north, east) or max(np.ptp(a), np.ptp(b)) > 1.0 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return False
+    return bool(abs(a.mean()) > 20 * np.ptp(a) and abs(b.mean()) > 20 * np.ptp(b))
+
+
+def _differentiated(state: State, names: list[str]) -> dict[str, float]:
+    """Return the columns whose rate is another column, with the share of their change that it leaves unexplained."""
+    integrated = {}
+    others = state.eligible()
+    integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in others}
+    for name in names:
+        change = state.chosen.change(_unwrapped(state.columns[name], state.t))
+        left = min((evidence.fit(change, integrals[other]).left for other in others if other != name), default=1.0)
+        if left < 0.05:
+            integrated[name] = left
+    return integrated
+
+
+def _unwrapped(values: Array, t: Array) -> Array:
+    """Return a column that jumps at a whole turn, in degrees or radians, without its jumps; others as they are."""
+    steps = np.abs(np.diff(values))
+    for turn in (360.0, 2 * np.pi):
+        if np.ptp(values) <= 1.01 * turn and np.any(steps > 0.8 * turn) and np.median(steps) < 0.1 * turn:
+            return evidence.heal(values, turn, t)[0]
+    return values
+
+
+def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
+    """Return a position as north + i east [m], in the plane that touches the Earth at the first one."""
+    a, b = state.columns[north], state.columns[east]
+    if on_globe:
+        a, b, _ = geodetic2ned(a, b, 0.0, float(a[0]), float(b[0]), 0.0)
+    return np.asarray(a + 1j * b)
+
+
+def _take(state: State, best: Pose, sure: list[str]) -> None:
+    """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
+    north, east, heading, unit = best.north, best.east, best.heading, best.unit
+    turn = 2 * np.pi / to_si(unit, "psi")
+    psi, false = evidence.heal(state.columns[heading], turn, state.t)
+    angle = psi * to_si(unit, "psi")
+    spread = 1.0 - abs(complex(np.mean(np.exp(1j * angle))))
+    misfits = 1.0 - abs(best.same), 1.0 - abs(best.mirrored)
+    mirrored = misfits[1] * MIRROR < misfits[0]
+    undecided = spread < STRAIGHT or max(misfits) < MIRROR * max(min(misfits), 1e-9)
+    if undecided and not mirrored and misfits[1] < misfits[0] and spread >= STRAIGHT:
+        mirrored = True
+    clear = best.on_globe or all(
+        fits(name).get(meaning, 0.0) > 0.9 for name, meaning in ((north, "north"), (east, "east"))
+    )
+    compass = _is_compass(heading)
+    phase = float(np.angle(best.mirrored if mirrored else best.same))
+    quarter = round(phase / (np.pi / 2))
+    sign, offset = 1, 0.0
+    agreement = max(abs(best.same), abs(best.mirrored))
+    confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99)) * min(
+        1.0, agreement + 0.1
+    )
+    swap = False
+    if mirrored and quarter in (1, -1):
+        swap = not best.on_globe and (compass or not clear) and quarter == 1
+        if swap and clear:
+            sentence = f"course and heading agree only with {north!r} as east and {east!r} as north"
+            state.find("north and east swapped", (north, east), abs(best.mirrored), sentence)
+        elif swap and not state.numbered and compass:
+            sentence = f"course and heading agree with {north!r} as east and {east!r} as north, as in many local frames"
+            state.find("x is east", (north, east), abs(best.mirrored), sentence)
+        elif not swap:
+            sign, offset = -1, 90.0 * quarter
+            sentence = f"{heading!r} counts to port from {'east' if quarter == 1 else 'west'}, as in mathematics"
+            state.find("heading counted from east", (heading,), abs(best.mirrored), sentence)
+        confidence = min(0.9, abs(best.mirrored))
+    elif mirrored:
+        sign, offset = -1, 90.0 * quarter
+        sentence = f"{heading!r} rises where the course falls: it counts to port, or east is west"
+        state.find("heading counted to port", (heading,), abs(best.mirrored), sentence)
+        confidence = min(0.9, abs(best.mirrored))
+    elif quarter:
+        offset = 90.0 * quarter
+        sentence = f"course and heading differ by {np.degrees(phase):.0f} deg: another zero of {heading!r} is taken"
+        state.find("zero of the heading", (heading,), abs(best.same), sentence)
+    if swap:
+        north, east = east, north
+    _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
+    names = ("latitude", "longitude") if best.on_globe else ("north", "east")
+    why = f"course over ground keeps to the heading (agreement {agreement:.3f} of 1)"
+    for name, source in zip(names, (north, east), strict=True):
+        state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why)
+    if false.any():
+        across = "360" if unit == "deg" else "2 pi"
+        sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
+        repair = {"kind": "wrap_interpolation", "columns": ["psi"], "threshold": 20.0, "unit": "deg"}
+        state.find("interpolation across 360", (heading,), 0.98, sentence, repair)
+    extra: dict[str, Any] = {"wrap": True} | ({"sign": sign} if sign < 0 else {})
+    if offset:
+        extra["offset"] = offset if unit == "deg" else round(float(np.radians(offset)), 9)
+    if heading not in sure and not state.numbered:
+        confidence = min(confidence, 0.5)
+    state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
+    state.position = plane(state, north, east, best.on_globe)
+    state.psi = sign * angle + np.radians(offset)
+    state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+
+
+def _is_compass(name: str) -> bool:
+    parts = set(parts_of(name))
+    return bool(parts & COMPASS) and not parts & YAW
+
+
+def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: bool, course: bool) -> None:
+    """Ask for what neither names nor motion decide: the frame, its mirror image, whether a heading is a course."""
+    if course:
+        state.ask(("psi",), f"is {best.heading!r} the heading, or the course over ground? By its name it may be either")
+    if not best.on_globe and not clear and (state.numbered or not compass):
+        state.ask(
+            ("psi", "north", "east"),
+            f"is {best.north!r} north and does {best.heading!r} count to starboard, or is {best.north!r} east and does "
+            "it count to port? Motion is the same in both; port and starboard change places",
+        )
+    mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
+    unnamed = not compass and not set(parts_of(best.heading)) & YAW
+    if not best.on_globe and clear and mirrored and unnamed:
+        state.ask(("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?")
+    if undecided and not (compass and (clear or best.on_globe)):
+        state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

@@ -1,0 +1,151 @@
+"""What a guess reads: one file, a folder with its sub-folders, or a glob; several files are one source of several runs.
+
+Their rows are put one after another with a pause between, so that what one run cannot show another may.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from shipid.errors import DataError, ShipidError
+from shipid.logs.guess.sniff import Sniffed, sniff
+from shipid.logs.guess.words import parts_of
+from shipid.logs.importing import run_of
+from shipid.logs.mapping import Manoeuvre
+
+ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".parquet", ".mat", ".nmea")
+PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
+KIND_WORDS = {
+    "zigzag": ["zigzag", "zz", "zig", "zag", "z", "zickzack", "sikksakk", "siksak"],
+    "turning": ["turning", "tc", "turn", "circle", "circles", "drehkreis", "svingsirkel", "tcs", "tcp", "williamson"],
+    "speed run": ["speedrun", "speed", "acceleration", "deceleration"],
+    "transit": ["transit", "straight", "course"],
+}
+"""Kind of manoeuvre -> parts of the names of files that say so."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """The files of a guess.
+
+    path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
+    skipped : files that are left out, with the reason. manoeuvres : run -> kind, as its name says.
+    sniffed : all rows, as of one log.
+    """
+
+    path: Path
+    pattern: str | None
+    files: dict[str, Path]
+    skipped: dict[str, str]
+    manoeuvres: dict[str, str]
+    sniffed: Sniffed
+
+
+def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
+    """Read a file, a folder or a glob (`trials/*/ZZ*.csv`); `names` are the columns of files without a header.
+
+    Raises
+    ------
+    DataError : the file, or every file of a folder, cannot be read as a log; each is named with its reason.
+    """
+    folder, pattern = _pattern(path)
+    if pattern is None:
+        return Source(path, None, {path.stem: path}, {}, {}, sniff(path, names))
+    files = sorted(file for file in folder.glob(pattern) if file.is_file())
+    if not files:
+        raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
+    sniffed: dict[Path, Sniffed] = {}
+    skipped: dict[str, str] = {}
+    for file in files:
+        try:
+            sniffed[file] = sniff(file, names)
+        except ShipidError as error:
+            skipped[file.relative_to(folder).as_posix()] = error.message
+    if not sniffed:
+        first = next(iter(skipped))
+        more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
+        raise DataError(f"no file can be read: {first}: {skipped[first]}{more}", file=folder)
+    kept = _alike(sniffed, folder, skipped)
+    runs = {run_of(file, folder, pattern): file for file in kept}
+    kinds = {run: kind for run, file in runs.items() if (kind := kind_said(file.stem))}
+    return Source(folder, pattern, runs, skipped, kinds, _joined(list(kept.values())))
+
+
+def _pattern(path: Path) -> tuple[Path, str | None]:
+    """Return folder and pattern of a folder or glob; the path itself and None for a file."""
+    text = path.as_posix()
+    if "*" in text and not path.exists():
+        before = text[: text.index("*")]
+        folder, slash, _ = before.rpartition("/")
+        return Path(folder or ("/" if slash else ".")), text[len(folder) + len(slash) :]
+    if not path.is_dir():
+        return path, None
+    found = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
+    if not found:
+        raise DataError(f"cannot be read: a folder without a log ({', '.join(ENDINGS)})", file=path)
+    ending = Counter(file.suffix for file in found).most_common(1)[0][0]
+    flat = all(file.parent == path for file in found if file.suffix == ending)
+    return path, f"*{ending}" if flat else f"**/*{ending}"
+
+
+def kind_said(stem: str) -> str | None:
+    """Return the kind of manoeuvre that the name of a file says; None if it says none."""
+    words = set(parts_of(stem)) | set(re.split(r"[^a-z]+", stem.lower()))
+    for kind, said in KIND_WORDS.items():
+        if kind in get_args(Manoeuvre) and words & set(said):
+            return kind
+    return None
+
+
+def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:
+    """Return the files of the commonest columns and format; the others are skipped with a reason."""
+
+    def written(log: Sniffed) -> tuple[object, ...]:
+        form = {key: value for key, value in log.form.items() if key != "ragged"}
+        unit = (log.clock["from"], log.clock["unit"])
+        return (*sorted((key, str(value)) for key, value in form.items()), unit)
+
+    commonest = Counter(written(log) for log in sniffed.values()).most_common(1)[0][0]
+    kept = {file: log for file, log in sniffed.items() if written(log) == commonest}
+    wanted = Counter(name for log in kept.values() for name in log.columns)
+    names = {name for name, count in wanted.items() if count > len(kept) / 2}
+    for file, log in sniffed.items():
+        lacking = sorted(names - set(log.columns))
+        if file not in kept:
+            reason = "written otherwise than the others (separator, decimal sign, encoding, header or clock)"
+        elif lacking:
+            reason = f"lacks {', '.join(map(repr, lacking[:3]))}, which the others have"
+            kept.pop(file)
+        else:
+            continue
+        skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone"
+    if not kept:
+        raise DataError("no two files have the same columns: guess them one by one", file=folder)
+    return kept
+
+
+def _joined(logs: list[Sniffed]) -> Sniffed:
+    """Return the rows of several files one after another, `PAUSE` s apart."""
+    first = logs[0]
+    chosen = logs if len(logs) <= MOST else [logs[i] for i in np.linspace(0, len(logs) - 1, MOST).astype(int)]
+    names = [name for name in first.columns if all(name in log.columns for log in chosen)]
+    t, start = [], 0.0
+    for log in chosen:
+        t.append(log.t - log.t[0] + start)
+        start = float(t[-1][-1]) + PAUSE
+    columns = {name: np.concatenate([log.columns[name] for log in chosen]) for name in names}
+    form, clock = dict(first.form), dict(first.clock)
+    if any(log.form.get("ragged") for log in logs):
+        form["ragged"] = "drop"
+    rates = {log.clock.get("every") for log in logs}
+    if rates != {None}:
+        usual = [float(np.median(np.diff(log.t))) for log in logs if "every" in log.clock]
+        clock["every"] = float(np.median(usual))
+    notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
+    return replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes)

@@ -1,0 +1,241 @@
+"""Methods side by side: their error by family and amount of data, and what each gains on one of them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import DATA_DRIVEN, Finding, ReportContent, Sentence
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
+from shipid.report.palette import INK, category
+from shipid.report.section import Section
+from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.wording import counted, listed, number
+
+EVERY = "with physics"
+ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
+
+
+@dataclass(frozen=True, eq=False)
+class MethodsContent:
+    """A page of its own for a study of several parts.
+
+    Parameters
+    ----------
+    title, name : the question, and the short name of the study.
+    frames : `methods`, as in the page of a study.
+    provenance, study_document, command : as in `ReportContent`.
+    """
+
+    title: str
+    name: str
+    frames: Mapping[str, pd.DataFrame]
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    study_document: str = ""
+    command: str = ""
+    findings: Sequence[Finding] = ()
+
+    @property
+    def answer(self) -> list[Sentence]:
+        """A sentence for each condition: the method with the lowest H at the least and the largest amount of data."""
+        return [Sentence(words, "methods") for words in verdicts(self.frames["methods"])]
+
+
+def verdicts(frame: pd.DataFrame) -> list[str]:
+    """Which method errs least with physics, by condition, at the smallest and the largest N_D."""
+    found = []
+    for condition in _conditions(frame):
+        mine = frame[frame.condition.eq(condition) & frame.family.eq(EVERY)]
+        ends = sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []
+        found += [_verdict(mine[mine.N_D.eq(N_D)], condition, N_D) for N_D in ends]
+    return found
+
+
+def _verdict(mine: pd.DataFrame, condition: str, N_D: int) -> str:
+    where = f"{condition[0].upper()}{condition[1:]}, " if condition else ""
+    where += f"N_D = {N_D}"
+    whole = mine[mine.failed.eq(0)].sort_values("H", kind="stable")
+    if whole.empty:
+        return f"{where}: no method has a result in every cell with physics."
+    best = whole.iloc[0]
+    said = f"{where}: {best.method} errs least over all cells with physics, {number(best.H)} m"
+    if best.method != best.reference and math.isfinite(best.low):
+        said += f", {_bracket(best.difference, best.low, best.high)} from {best.reference}"
+    failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
+    return said + (f"; without a result: {listed(failed)}." if failed else ".")
+
+
+def _bracket(value: float, low: float, high: float) -> str:
+    return f"{number(value)} m [{number(low)}, {number(high)}]"
+
+
+def _frame(content: ReportContent | MethodsContent) -> pd.DataFrame:
+    return content.frames.get("methods", pd.DataFrame())
+
+
+def _conditions(frame: pd.DataFrame) -> list[str]:
+    return [str(name) for name in pd.unique(frame.condition)]
+
+
+def _families(frame: pd.DataFrame) -> list[str]:
+    """Families in their order, without physics last; not the sum of them."""
+    names = [str(name) for name in pd.unique(frame.family) if name not in (EVERY, DATA_DRIVEN)]
+    return [*names, *([DATA_DRIVEN] if frame.family.eq(DATA_DRIVEN).any() else [])]
+
+
+def methods(content: ReportContent | MethodsContent) -> Figure | None:
+    """H of every method by family, and its difference to the reference; None where nothing is compared."""
+    frame = _frame(content)
+    if frame.empty:
+        return None
+    conditions, families = _conditions(frame), _families(frame)
+    amounts = sorted(int(value) for value in pd.unique(frame.N_D))
+    order = _order(frame)
+    reference = str(frame.reference.iloc[0])
+    controls = [Control("Condition", conditions)] if len(conditions) > 1 else []
+    controls += [Control("Manoeuvres, N_D", [str(amount) for amount in amounts])]
+    views = {}
+    for (i, condition), (j, N_D) in itertools.product(enumerate(conditions), enumerate(amounts)):
+        mine = frame[frame.condition.eq(condition) & frame.N_D.eq(N_D)]
+        key = f"{i}-{j}" if len(conditions) > 1 else str(j)
+        views[key] = [
+            Panel(_errors(mine, order, families), "H, mean over the cells that have a result"),
+            Panel(_differences(mine, order, families), f"difference of H to {reference}, 95 % interval over test runs"),
+        ]
+    worlds = int(frame.worlds.max())
+    return Figure(
+        id="methods",
+        title="Methods on the same cells",
+        takeaway=" ".join(verdicts(frame)[:2]) or "No method has physics to improve.",
+        how="All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
+        f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
+        f"{counted(max(worlds, 1), 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
+        "all its windows and cells. An interval is for one comparison alone: of many, one in twenty excludes 0 by "
+        "chance. A cell without a result is counted in the table, not averaged.",
+        alternative="Dots of the position error of each method by family, and of the difference to one of them with "
+        "intervals. The numbers are in the table below.",
+        height=MARGIN + ROW * len(order),
+        views=views,
+        controls=controls,
+        chips=[Chip(f"family:{name}", name, category(k), "none", symbol="circle") for k, name in enumerate(families)],
+    )
+
+
+def _order(frame: pd.DataFrame) -> list[str]:
+    """Methods by falling mean H, so that the best is at the top; those without any result first."""
+    means = frame[frame.family.eq(EVERY)].groupby("method", sort=False).H.mean()
+    names = [str(name) for name in pd.unique(frame.method)]
+    return sorted(names, key=lambda name: -float(means.get(name, math.nan)) if name in means else -math.inf)
+
+
+def _place(row: Mapping[str, Any], order: Sequence[str], families: Sequence[str]) -> float:
+    """Height of a point: the method, and a little for the family."""
+    return order.index(row["method"]) + 0.14 * ((len(families) - 1) / 2 - families.index(row["family"]))
+
+
+def _methods_axis(order: Sequence[str]) -> dict[str, Any]:
+    ticks = {"tickvals": list(range(len(order))), "ticktext": [label(name) for name in order]}
+    return axis("", **ticks, range=[-0.6, len(order) - 0.4])
+
+
+def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> go.Figure:
+    traces = []
+    for k, family in enumerate(families):
+        rows = mine[mine.family.eq(family) & mine.H.notna()].to_dict("records")
+        y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
+        trace = line(family, [row["H"] for row in rows], y, [f"family:{family}"], mode="markers",
+                     marker={"color": category(k), "size": 8})  # fmt: skip
+        trace.update(
+            customdata=[f"{label(row['method'])}: {number(row['H'])} m, {row['seconds']:.1f} s" for row in rows]
+        )
+        trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
+        traces.append(trace)
+    x = logarithmic("position error, H [m]", (1, 2, 3, 5))
+    return go.Figure(traces, layout(x, _methods_axis(order), hovermode="closest"))
+
+
+def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> go.Figure:
+    traces = []
+    for k, family in enumerate(families):
+        rows = mine[mine.family.eq(family) & mine.difference.notna() & mine.method.ne(mine.reference)].to_dict(
+            "records"
+        )
+        y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
+        middle = [float(row["difference"]) for row in rows]
+        reach = {"type": "data", "symmetric": False, "color": category(k), "thickness": 1.5, "width": 3}
+        ends = [(row["difference"], row["low"], row["high"]) for row in rows]
+        reach |= {"array": [_finite(high - value) for value, _, high in ends]}
+        reach |= {"arrayminus": [_finite(value - low) for value, low, _ in ends]}
+        trace = line(family, middle, y, [f"family:{family}"], mode="markers", marker={"color": category(k), "size": 6})
+        trace.update(error_x=reach, customdata=[f"{label(row['method'])}: {_interval(row)}" for row in rows])
+        trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
+        traces.append(trace)
+    zero = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 0, "x1": 0, "line": {"color": INK, "width": 1}}
+    shown = layout(axis("difference of H [m]"), _methods_axis(order), hovermode="closest", shapes=[zero])
+    return go.Figure(traces, shown)
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+def _interval(row: Mapping[Any, Any]) -> str:
+    if math.isfinite(float(row["low"])):
+        return _bracket(float(row["difference"]), float(row["low"]), float(row["high"]))
+    return f"{number(float(row['difference']))} m, no interval from one run"
+
+
+def table(content: ReportContent | MethodsContent) -> Table | None:
+    """Every method by condition, family and N_D, with its price, its failures and its difference to the reference."""
+    frame = _frame(content)
+    if frame.empty:
+        return None
+    several = len(_conditions(frame)) > 1
+    rows: list[list[Cell]] = []
+    for row in frame.to_dict("records"):
+        names = [text(row[name]) for name in (*(["condition"] if several else []), "family", "method")]
+        failed = Cell(f"{row['failed']} of {row['cells']}", float(row["failed"]), bad=bool(row["failed"]))
+        numbers = [figure(row["N_D"], 0), *(figure(row[name], 2) for name in ("H", "H_90", "end"))]
+        price = [figure(row["seconds"], 1), figure(row["trials"], 0), failed]
+        rows.append([*names, *numbers, *price, figure(row["difference"], 2), *_intervals(row)])
+    headings = [*(["condition"] if several else []), "family", "method", "N_D [1]", "H [m]", "H_90 [m]", "end [m]"]
+    headings += ["core-seconds [s]", "trials [1]", "no result", "difference of H [m]", "95 % interval, runs [m]"]
+    headings += ["better runs", "by world [m]"]
+    reference, bad = str(frame.reference.iloc[0]), frame[frame.family.ne(EVERY)]
+    takeaway = (
+        f"Core-seconds and errors are means over the cells of a row; differences are to {reference}. "
+        f"{counted(int(bad.failed.sum()), 'cell')} of {int(bad.cells.sum())} gave no result."
+    )
+    words = 3 if several else 2
+    return Table("methods-table", "Every method", takeaway, headings, [False] * words + [True] * 11, rows)
+
+
+def _intervals(row: Mapping[Any, Any]) -> list[Cell]:
+    none = text(None)
+    if row["method"] == row["reference"] or not math.isfinite(float(row["difference"])):
+        return [none, none, none]
+    over_runs = none
+    if math.isfinite(float(row["low"])):
+        over_runs = Cell(f"{number(row['low'])} to {number(row['high'])}", float(row["low"]))
+    better = Cell(f"{row['better']} of {row['runs']}", float(row["better"]))
+    by_world = none
+    if row["worlds"] > 1:
+        ends = f"{number(row['least'])} to {number(row['greatest'])} in {row['worlds']}"
+        if math.isfinite(float(row["world_low"])):
+            ends += f"; 95 % {number(row['world_low'])} to {number(row['world_high'])}"
+        by_world = Cell(ends, float(row["least"]))
+    return [over_runs, better, by_world]
+
+
+SECTION = Section(
+    "Methods",
+    draw=lambda content: (methods(content), table(content)),
+    needs=("methods",),
+    anchors=("methods", "methods-table"),
+)

@@ -1,0 +1,105 @@
+"""Errors of a study by test manoeuvre: what findings and the answer judge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.metrics import position_error
+from shipid.study.evidence import Contrasts, contrasts, training_noise
+from shipid.study.plan import NO_MODEL
+from shipid.study.results import Results, judged_cells
+
+Array = NDArray[np.float64]
+Metric = Literal["H", "H_90"]
+PLAIN = "none, plain"
+"""Pure data-driven prediction without the mirror symmetry of the hull, where the study has it."""
+ALONE = -1  # place of the physics alone in a term
+Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """Errors [m] by test manoeuvre.
+
+    amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
+    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction.
+    """
+
+    amounts: tuple[int, ...]
+    counts: Array
+    A: Mapping[str, Array]
+    H: Mapping[str, Array]
+
+    @property
+    def runs(self) -> int:
+        """Number of test manoeuvres R."""
+        return len(self.counts)
+
+    @property
+    def weights(self) -> Array:
+        """(R,) share of the windows in each manoeuvre."""
+        return self.counts / self.counts.sum()
+
+    @cached_property
+    def noise(self) -> Array:
+        """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
+        by_seed = {model: values @ self.weights for model, values in self.H.items()}
+        seeds = max((values.shape[1] for values in by_seed.values()), default=1)
+        every = range(len(self.amounts))
+        return np.array([training_noise([values[k] for values in by_seed.values()]) for k in every]) / seeds**0.5
+
+    def by_run(self, model: str, place: int) -> Array:
+        """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
+        return self.A[model] if place == ALONE else self.H[model][place].mean(axis=0)
+
+    def mean(self, model: str, place: int) -> float:
+        """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
+        return float(self.by_run(model, place) @ self.weights)
+
+    def compare(self, differences: Sequence[Sequence[Term]]) -> Contrasts:
+        """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
+        values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
+        for row, terms in enumerate(differences):
+            for factor, model, place in terms:
+                values[row] += factor * self.by_run(model, place)
+                if place != ALONE:
+                    training[row] += (factor * self.mean(model, place) * self.noise[place]) ** 2
+        return contrasts(values, self.counts, np.sqrt(training))
+
+    def against(self, rival: str, models: Sequence[str], place: int) -> Contrasts:
+        """How much lower [m] than a rival's the errors of models are at an amount of data."""
+        return self.compare([[(1.0, rival, place), (-1.0, model, place)] for model in models])
+
+
+def error_table(results: Results, models: Sequence[str], metric: Metric = "H") -> ErrorTable:
+    """Errors of models, `none` and plain `none` that have a result in every cell; H_90 is taken in each manoeuvre."""
+    runs, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
+
+    def by_run(path: Array) -> Array:
+        error = position_error(path, results.test.future)
+        parts = [error[:, place == k] for k in range(len(runs))]
+        return np.array([part.mean() if metric == "H" else np.quantile(part, 0.9) for part in parts])
+
+    cells = judged_cells(results)
+    amounts, seeds = sorted(set(cells["N_D"])), sorted(set(cells["seed"]))
+    wanted = {name: cells[cells["foundation"] == name] for name in (*models, NO_MODEL)}
+    if plain := results.plan.plain:
+        every = results.cells
+        wanted[PLAIN] = every[(every["foundation"] == NO_MODEL) & (every["method"] == plain)]
+    H = {}
+    for name, mine in wanted.items():
+        known = {(row.N_D, row.seed): str(row.cell) for row in mine.itertuples()}
+        if all(known.get((N, seed)) in results.paths for N in amounts for seed in seeds):
+            H[name] = np.array([[by_run(results.paths[known[N, seed]]) for seed in seeds] for N in amounts])
+    alone = {
+        name: by_run(path)
+        for name, path in results.physics.items()
+        if name in models and name != NO_MODEL and np.isfinite(path).all()
+    }
+    return ErrorTable(tuple(int(N) for N in amounts), counts.astype(float), alone, H)

@@ -1,0 +1,158 @@
+"""Evidence of test manoeuvres: intervals of paired differences, and how easily chance makes them.
+
+Windows of one test manoeuvre are alike, test manoeuvres are not: so manoeuvres are resampled, whole and paired (cluster
+bootstrap; Davison and Hinkley 1997, section 3.8), and the difference is measured in its standard error (bootstrap-t;
+Efron and Tibshirani 1993, section 12.5), which suits few manoeuvres and skewed errors. Where Student's interval is
+wider, it counts. What another training would give adds to the standard error. Repeated training is no evidence: it only
+averages this part out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
+
+Array = NDArray[np.float64]
+LEVEL = 0.025  # of one side: an interval of 95 % is free of 0
+RESAMPLES, SEED = 1999, 0
+FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
+TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
+
+
+@dataclass(frozen=True)
+class Contrasts:
+    """Differences (J,) of mean errors over test manoeuvres.
+
+    mean, low, high : [m], with the 95 % interval of each.
+    above, below : chance of a difference as far above 0, or as far below, if there were none (one-sided p-values).
+    """
+
+    mean: Array
+    low: Array
+    high: Array
+    above: Array
+    below: Array
+
+    def __len__(self) -> int:
+        """Return how many differences there are."""
+        return len(self.mean)
+
+
+def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) -> Contrasts:
+    """Judge differences of mean errors; not a number for all but the mean with fewer than `FEWEST_RUNS` manoeuvres.
+
+    Parameters
+    ----------
+    differences : (J, R) mean of each difference in each test manoeuvre [m].
+    counts : (R,) windows of each manoeuvre, its weight.
+    training : standard error of each difference from training alone [m], (J,) or one for all.
+    """
+    weights = counts / counts.sum()
+    mean = differences @ weights
+    if len(counts) < FEWEST_RUNS:
+        blank = np.full_like(mean, np.nan)
+        return Contrasts(mean, blank, blank, blank, blank)
+    drawn, spread = _resampled(differences, weights)
+    error = np.hypot(spread, training)
+    ahead = mean / np.maximum(error, 1e-12 * np.abs(mean) + 1e-300)
+    student = float(stdtrit(len(counts) - 1, 1 - LEVEL))
+    lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower"), -student)
+    upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher"), student)
+    chances = (_beyond(drawn, ahead, counts), _beyond(-drawn, -ahead, counts))
+    return Contrasts(mean, mean - upper * error, mean - lower * error, *chances)
+
+
+def _resampled(differences: Array, weights: Array) -> tuple[Array, Array]:
+    """Bootstrap-t of weighted means: (B, J) distances from the mean in standard errors; (J,) standard errors [m]."""
+    draws = _draws(len(weights))
+    mean = differences @ weights
+    sums = weights * differences  # (J, R)
+    total = draws @ weights
+    means = (draws @ sums.T) / total[:, None]
+    squares = draws @ (sums**2).T - 2 * means * (draws @ (sums * weights).T)
+    squares += means**2 * (draws @ weights**2)[:, None]
+    correction = len(weights) / (len(weights) - 1)
+    spread = np.sqrt(correction * np.maximum(squares, 0.0)) / total[:, None]
+    here = np.sqrt(correction * np.square(sums - mean[:, None] * weights).sum(axis=1))
+    far = np.sign(means - mean) * 1e6
+    tiny = spread <= 1e-6 * np.maximum(here, 1e-300)  # one manoeuvre drawn again and again
+    return np.where(tiny, far, (means - mean) / np.where(tiny, 1.0, spread)), here
+
+
+def _beyond(drawn: Array, ahead: Array, counts: Array) -> Array:
+    """Share of resampled distances that reach the observed one, or Student's where that is larger or none reaches."""
+    share, student = (drawn >= ahead).mean(axis=0), stdtr(len(counts) - 1, -ahead)
+    chance: Array = np.maximum(share, student)
+    return chance
+
+
+@lru_cache(maxsize=8)
+def _draws(runs: int) -> Array:
+    """(B, R) how often each of R manoeuvres is drawn, with replacement."""
+    rng = np.random.default_rng(SEED)
+    return rng.multinomial(runs, np.full(runs, 1 / runs), RESAMPLES).astype(float)
+
+
+def resampled_means(values: Array, counts: Array) -> Array:
+    """(B, ...) weighted means of values (..., R) over resampled manoeuvres, the same resamples for all values."""
+    draws = _draws(len(counts))
+    means: Array = np.tensordot(draws * counts, values, axes=(1, values.ndim - 1))
+    return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
+
+
+def over_worlds(values: Array) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than two."""
+    if len(values) < 2:
+        return np.nan, np.nan
+    wide = float(stdtrit(len(values) - 1, 1 - LEVEL) * values.std(ddof=1) / len(values) ** 0.5)
+    return float(values.mean()) - wide, float(values.mean()) + wide
+
+
+def holm(chances: Array) -> Array:
+    """Return p-values (J,) corrected for their number (Holm 1979): one of them at most `LEVEL` is a finding."""
+    order = np.argsort(chances)
+    raised = np.maximum.accumulate(chances[order] * np.arange(len(chances), 0, -1))
+    corrected = np.empty_like(chances)
+    corrected[order] = np.minimum(raised, 1.0)
+    return corrected
+
+
+def at_least(chances: Array, count: int) -> float:
+    """Return the p-value of "at least `count` of these are real" (partial conjunction; Benjamini and Heller 2008)."""
+    ordered = np.sort(chances)
+    return float(min(1.0, (len(chances) - count + 1) * ordered[count - 1]))
+
+
+def by_chance(A: Array, values: Array) -> Array:
+    """Chance (J,) of rank correlations with A as high as those of values (J, M), if models were in any order."""
+    ranks = _ranks(np.vstack([A, values]))
+    mine, others = ranks[0], ranks[1:]
+    rng = np.random.default_rng(SEED)
+    shuffled = rng.permuted(np.tile(mine, (RESAMPLES, 1)), axis=1)
+    share: Array = (1 + ((shuffled @ others.T) >= others @ mine - 1e-9).sum(axis=0)) / (RESAMPLES + 1)
+    return share
+
+
+def _ranks(values: Array) -> Array:
+    """Ranks (J, M) without their mean; ties keep their order, which no permutation prefers."""
+    ranks = np.argsort(np.argsort(values, axis=1, kind="stable"), axis=1, kind="stable").astype(float)
+    centred: Array = ranks - ranks.mean(axis=1, keepdims=True)
+    return centred
+
+
+def training_noise(H: Sequence[Array]) -> float:
+    """Relative standard deviation [1] of H between trainings, from H by seed of several models at one amount of data.
+
+    One seed cannot tell: then it is `TRAINING`, what bundled studies have; more seeds take its place.
+    """
+    squares, freedom = WORTH * TRAINING**2, float(WORTH)
+    for values in H:
+        if len(values) > 1 and values.mean() > 0:
+            squares += float(np.square(values / values.mean() - 1).sum())
+            freedom += len(values) - 1
+    return float(np.sqrt(squares / freedom))

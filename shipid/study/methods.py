@@ -1,0 +1,119 @@
+"""Methods on the same cells: their errors, price and failures, and what one gains on another over test manoeuvres."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from shipid.metrics import over_time, position_error
+from shipid.study.memory import paired_interval
+from shipid.study.plan import NO_MODEL
+from shipid.study.results import Results
+
+EVERY = "with physics"  # all families but pure data-driven
+CONFIDENCE = 0.95
+LEAST = 3  # worlds from which an interval over worlds is given
+COLUMNS = [
+    *("condition", "family", "N_D", "method", "cells", "failed", "H", "H_90", "end", "seconds", "trials"),
+    *("reference", "pairs", "difference", "low", "high", "runs", "better"),
+    *("worlds", "least", "greatest", "world_low", "world_high"),
+]
+
+
+def methods_frame(results: Results) -> pd.DataFrame:
+    """Compare the methods of one run, see `compared`; no rows where fewer than two learn from data."""
+    if sum(way.method.compensates for way in results.plan.methods) < 2:
+        return pd.DataFrame(columns=COLUMNS)
+    return compared(method_cells(results), results.plan.judged)
+
+
+def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
+    """A row per cell, as `compared` takes it.
+
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
+    horizon) [m], seconds (core-seconds), trials, and `sums`, `counts`: test run -> sum over its windows of the mean
+    error over the horizon [m], and number of windows. Without a result the errors are not numbers.
+    """
+    runs, place = np.unique(results.test.run, return_inverse=True)
+    counts = {str(run): int(count) for run, count in zip(runs, np.bincount(place), strict=True)}
+    rows = []
+    for row in results.rows:
+        kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
+        kept |= {"condition": condition, "world": world, "end": np.nan, "sums": {}, "counts": counts}
+        kept |= {"seconds": row["seconds"], "trials": len(row["trials"])}
+        if row["cell"] in results.paths:
+            error = position_error(results.paths[row["cell"]], results.test.future)
+            sums = np.bincount(place, over_time(error))
+            kept |= {"end": float(error[-1].mean()), "sums": dict(zip(map(str, runs), sums, strict=True))}
+        rows.append(kept)
+    return pd.DataFrame(rows)
+
+
+def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
+    """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
+
+    H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
+    the others. `difference` is H less that of the method `reference` over the `pairs` of cells in which both have one,
+    with a 95 % interval `low`, `high` by a bootstrap over test runs: all windows and cells of a run, in its world, are
+    drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
+    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family `with physics` is all of
+    them but `none`.
+    """
+    frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
+    every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
+    rows = []
+    for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
+        theirs = _by_key(group[group["method"] == reference])
+        for method, mine in group.groupby("method", sort=False):
+            good = mine[mine["status"] == "ok"]
+            row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
+            row |= {"cells": len(mine), "failed": len(mine) - len(good), "reference": reference}
+            row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
+            row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
+            rows.append(row | _difference(_by_key(mine), theirs))
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _by_key(cells: pd.DataFrame) -> dict[tuple[str, str, int], Mapping[str, Any]]:
+    good = cells[cells["status"] == "ok"].to_dict("records")
+    return {(row["world"], row["foundation"], row["seed"]): {str(k): v for k, v in row.items()} for row in good}
+
+
+def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapping[str, Any]]) -> dict[str, Any]:
+    """Difference of H over the cells that both have, its intervals, over test runs and over worlds."""
+    keys = [key for key in mine if key in theirs]
+    sums: dict[tuple[str, str], float] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for key in keys:
+        for run, count in mine[key]["counts"].items():
+            place = key[0], run
+            sums[place] = sums.get(place, 0.0) + mine[key]["sums"][run] - theirs[key]["sums"][run]
+            counts[place] = counts.get(place, 0) + count
+    blank = dict.fromkeys(("difference", "low", "high", "least", "greatest", "world_low", "world_high"), np.nan)
+    found = {**blank, "pairs": len(keys), "runs": len(sums), "better": 0, "worlds": 0}
+    if not keys:
+        return found
+    values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
+    low, high = paired_interval(values, weights)
+    worlds = list(dict.fromkeys(world for world, _ in sums))
+    means = np.array([_mean(sums, counts, world) for world in worlds])
+    found |= {"difference": float(values.sum() / weights.sum()), "low": low, "high": high, "worlds": len(worlds)}
+    found |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
+    if len(worlds) >= LEAST:
+        wide = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(worlds) - 1) * means.std(ddof=1) / len(worlds) ** 0.5)
+        found |= {"world_low": float(means.mean()) - wide, "world_high": float(means.mean()) + wide}
+    return found
+
+
+def _mean(sums: Mapping[tuple[str, str], float], counts: Mapping[tuple[str, str], int], world: str) -> float:
+    mine = [key for key in sums if key[0] == world]
+    return sum(sums[key] for key in mine) / sum(counts[key] for key in mine)
+
+
+def joined(cells: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Cells of several parts, one below the other."""
+    return pd.concat(list(cells), ignore_index=True)

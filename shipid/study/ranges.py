@@ -1,0 +1,101 @@
+"""Ranges of the numbers of a study document: slips of unit and of exponent are refused before anything is computed.
+
+A study that is meant so names the number in `unusual`, a list of dotted paths at the top of its document.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shipid import document as documents
+from shipid.capacity import too_much
+from shipid.document import Document
+from shipid.errors import DocumentError
+
+UNUSUAL = "unusual"
+"""Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
+MOST_SEED = 2**32 - 1  # of the generators of several libraries
+LONGEST_NAME = 200  # characters of the file of a cell: file systems allow 255
+
+RANGES: dict[str, tuple[float, float, str]] = {
+    "truth.duration": (0.0, 1e6, "s"),
+    "truth.run_up": (0.0, 1e6, "s"),
+    "truth.step": (1e-4, 60.0, "s"),
+    "truth.interval": (1e-4, 3600.0, "s"),
+    "truth.wind_speed.*": (0.0, 100.0, "m/s"),
+    "truth.current_speed.*": (0.0, 20.0, "m/s"),
+    "truth.waves.H_s": (0.0, 30.0, "m"),
+    "truth.waves.T_p": (0.1, 60.0, "s"),
+    "truth.manoeuvre.*_deg": (-360.0, 360.0, "deg"),
+    "truth.manoeuvre.*_deg.*": (-360.0, 360.0, "deg"),
+    "truth.manoeuvre.*n_rpm": (-1e5, 1e5, "rpm"),
+    "truth.manoeuvre.*n_rpm.*": (-1e5, 1e5, "rpm"),
+    "truth.manoeuvre.*start_speed": (-60.0, 60.0, "m/s"),
+    "truth.manoeuvre.*start_speed.*": (-60.0, 60.0, "m/s"),
+    "truth.manoeuvre.*_time": (0.0, 1e6, "s"),
+    "prediction.ahead": (0.0, 1e5, "s"),
+    "prediction.step": (1e-3, 3600.0, "s"),
+    "prediction.interval": (1e-3, 1e5, "s"),
+    "prediction.past": (0.0, 1e5, "s"),
+    "family.*.perturb.*.factor": (-100.0, 100.0, "a factor"),
+    "family.*.perturb.*.factor.*": (-100.0, 100.0, "a factor"),
+    "method.*.trials": (0, 1e5, "trials"),
+    "method.*.epochs": (0, 1e6, "epochs"),
+    "method.*.units": (0, 1e5, "units"),
+}
+"""Dotted path with * for any characters -> least, greatest, unit."""
+
+
+def check_ranges(document: Document, file: Path | str) -> None:
+    """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
+    meant = document.get(UNUSUAL, [])
+    for path, value in documents.leaves(document):
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            continue
+        pattern = next((pattern for pattern in RANGES if documents.match(pattern, [path])), None)
+        if pattern is None or any(documents.match(str(one), [path]) for one in meant):
+            continue
+        least, most, unit = RANGES[pattern]
+        if not least <= value <= most:
+            message = f"{value:g}: expected {least:g} to {most:g} {unit}"
+            remedy = f'if it is meant, write {UNUSUAL} = ["{path}"] at the top of the study'
+            raise DocumentError(f"{message}; {remedy}", file=file, path=path)
+
+
+def check_seeds(study: Any, file: Path | str) -> None:
+    """Raise DocumentError for seeds, in the world of the study, that generators of random numbers do not take."""
+    seeds = {"split.seed": study.split.seed, "grid.seeds": max(study.grid.seeds, default=0)}
+    for path, seed in seeds.items():
+        if seed > MOST_SEED:
+            raise DocumentError(f"{seed}: seeds, with 1000 times `seed`, are at most {MOST_SEED}", file=file, path=path)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What decides how much memory the windows of a study take.
+
+    horizon, past : steps. step, interval : s. columns : of the dataset. foundations : whose paths are kept.
+    """
+
+    horizon: int
+    past: int
+    step: float
+    interval: float
+    columns: int
+    foundations: int
+
+    def numbers(self, length: float) -> float:
+        """How many numbers the windows of a run of this length [s] are, with the paths of the foundations."""
+        count = math.floor(max(0.0, length - (self.horizon + self.past) * self.step) / self.interval) + 1
+        each = (self.horizon + 1) * (self.columns + 6 + 2 * self.foundations) + self.past * self.columns
+        return float(count) * each
+
+
+def check_memory(numbers: float, words: str, path: str, file: Path | str) -> None:
+    """Raise DocumentError with the number that causes it where so many numbers exceed this machine's memory."""
+    fault = too_much(numbers)
+    if fault is not None:
+        raise DocumentError(f"{words} {fault}", file=file, path=path)

@@ -1,0 +1,141 @@
+"""Digests of the files in a folder of results, so that damage is mended and an edit is never taken for a result.
+
+`seals/NAME.sha256` holds a line per file, as the tool `sha256sum` writes: in the folder of a run, `sha256sum -c
+seals/*` checks it too. A batch counts as done when its seal is there, which is written last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from shipid.data.dataset import read_dataset
+from shipid.errors import ResultError, ShipidError
+from shipid.files import read_arrays, write_text
+
+FOLDER = "seals"
+FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
+"""Name of a seal that is not of a batch -> the first file in it."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A file that is not what was written: `missing`, `damaged` (it cannot be read) or `edited`."""
+
+    seal: str
+    file: str
+    kind: str
+
+
+def seal_file(folder: Path, name: str) -> Path:
+    """Where the seal of a name is."""
+    return folder / FOLDER / f"{name}.sha256"
+
+
+def is_sealed(folder: Path, name: str) -> bool:
+    """Whether there is a seal of this name."""
+    return seal_file(folder, name).is_file()
+
+
+def write_seal(folder: Path, name: str, files: Iterable[Path]) -> None:
+    """Note the digests of files in the folder, which are on the disk already, under a name."""
+    lines = [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
+    write_text(seal_file(folder, name), "".join(lines))
+
+
+def remove(folder: Path, name: str) -> None:
+    """Remove a seal, before files that it names are written anew."""
+    seal_file(folder, name).unlink(missing_ok=True)
+
+
+def faults(folder: Path) -> list[Fault]:
+    """Every sealed file that is not as it was written; a seal that is damaged itself is one."""
+    return [fault for file in sorted((folder / FOLDER).glob("*.sha256")) for fault in _faults(folder, file)]
+
+
+def check(folder: Path) -> None:
+    """Raise ResultError for the first sealed file that is not as it was written; nothing is mended."""
+    for fault in faults(folder):
+        raise wrong(folder, fault)
+
+
+def wrong(folder: Path, fault: Fault) -> ResultError:
+    """The error for a file that is not as it was written."""
+    if fault.kind != "edited":
+        return ResultError("missing or damaged: continue with `shipid study resume`", file=folder / fault.file)
+    message = "was changed after it was written: put it back, or delete it and continue with `shipid study resume`"
+    return ResultError(message, file=folder / fault.file)
+
+
+def mend(folder: Path) -> Iterator[str]:
+    """Remove the seals of files that are missing or damaged, so that they are computed again; yield a sentence each.
+
+    Raises ResultError, before anything is removed, for a file that can be read and is not what was written.
+    """
+    found = faults(folder)
+    for fault in found:
+        if fault.kind == "edited":
+            raise wrong(folder, fault)
+        if (folder / fault.file).is_dir():
+            raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
+    for name in dict.fromkeys(fault.seal for fault in found):
+        these = [fault for fault in found if fault.seal == name]
+        for fault in these:
+            (folder / fault.file).unlink(missing_ok=True)
+        remove(folder, name)
+        words = ", ".join(f"{fault.file} {fault.kind}" for fault in these)
+        yield f"{words}: computed again"
+
+
+def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
+    name = seal.name.removesuffix(".sha256")
+    try:
+        lines = [line.split("  ", 1) for line in seal.read_text(encoding="utf-8").splitlines()]
+        known = [(digest, path) for digest, path in lines]
+        whole = known and all(len(digest) == 64 and _inside(path) for digest, path in known)
+        whole = whole and known[0][1] == FIRST.get(name, f"batches/{name}.json")
+    except (OSError, ValueError):
+        known, whole = [], False
+    if not whole:
+        yield Fault(name, f"{FOLDER}/{seal.name}", "damaged")
+        return
+    for digest, path in known:
+        try:
+            if _digest(folder / path) != digest:
+                yield Fault(name, path, "edited" if _readable(folder / path) else "damaged")
+        except OSError:
+            yield Fault(name, path, "damaged" if (folder / path).exists() else "missing")
+
+
+def _inside(path: str) -> bool:
+    return bool(path) and not Path(path).is_absolute() and ".." not in Path(path).parts
+
+
+def _digest(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _readable(file: Path) -> bool:
+    """Whether a file is a whole one of its kind, so that another digest is an edit and no damage."""
+    try:
+        _READERS.get(file.suffix, Path.read_text)(file)
+    except (OSError, ValueError, RecursionError, ShipidError):
+        return False
+    return True
+
+
+def _table(file: Path) -> object:
+    import pandas as pd
+
+    return pd.read_parquet(file)
+
+
+_READERS: dict[str, Callable[[Path], object]] = {
+    ".json": lambda file: json.loads(file.read_text(encoding="utf-8")),
+    ".npz": read_arrays,
+    ".parquet": lambda file: read_dataset(file) if file.name == "dataset.parquet" else _table(file),
+}

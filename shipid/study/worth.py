@@ -1,0 +1,126 @@
+"""What physics is worth: how good it must be to beat none, and how many runs it saves; interpolated, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, stdtrit
+
+from shipid.study.error_table import ALONE, ErrorTable
+from shipid.study.evidence import FEWEST_RUNS, LEVEL, SEED, resampled_means
+from shipid.study.plan import NO_MODEL
+
+Array = NDArray[np.float64]
+FEWEST_MODELS = 4  # for a line of H over A
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval over test manoeuvres; the interval is not a number where there are too few.
+
+    limits : least and greatest value that the study can tell; a value there is a bound.
+    """
+
+    value: float
+    low: float
+    high: float
+    limits: tuple[float, float]
+
+    @property
+    def below(self) -> bool:
+        """Whether the value is at most the least that can be told."""
+        return self.value <= self.limits[0]
+
+    @property
+    def above(self) -> bool:
+        """Whether the value is at least the greatest that can be told."""
+        return self.value >= self.limits[1]
+
+    @property
+    def unknown(self) -> bool:
+        """Whether the interval covers all that can be told."""
+        return self.low <= self.limits[0] and self.high >= self.limits[1]
+
+
+def _estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]) -> Estimate:
+    """Quantiles of resampled values, further out where manoeuvres are few (expanded percentiles; Hesterberg 2015)."""
+    level = float(ndtr(stdtrit(runs - 1, LEVEL) * (runs / (runs - 1)) ** 0.5)) if runs >= FEWEST_RUNS else np.nan
+    low, high = np.quantile(drawn, [level, 1 - level]) if runs >= FEWEST_RUNS else (np.nan, np.nan)
+    found = (
+        next((end for end in limits if np.isclose(end, number)), float(number)) for number in (value[0], low, high)
+    )
+    return Estimate(*found, limits)
+
+
+def _trained(drawn: Array, noise: Array) -> Array:
+    """Resampled means (B, ...) as other trainings would give them: each times a factor of relative spread `noise`."""
+    factors = np.random.default_rng(SEED).normal(1.0, 1.0, drawn.shape)
+    return drawn * np.exp((factors - 1) * noise)
+
+
+def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate | None:
+    """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
+
+    A line ln H over ln A is fitted to the models by least squares, and crosses H of `none`; values beyond the models
+    that were tried are bounds. None with fewer than four models.
+    """
+    if len(models) < FEWEST_MODELS:
+        return None
+    values = np.stack(
+        [
+            [table.by_run(model, ALONE) for model in (*models, models[0])],
+            [table.by_run(model, place) for model in (*models, NO_MODEL)],
+        ]
+    )  # (A or H, models and none, R)
+    noise = np.array([[0.0], [float(table.noise[place])]])
+    means, drawn = values @ table.weights, _trained(resampled_means(values, table.counts), noise)
+    A = means[0, :-1]
+    limits = float(A.min()), float(A.max())
+    return _estimate(_crossing(means[None], limits), _crossing(drawn, limits), table.runs, limits)
+
+
+def _crossing(values: Array, limits: tuple[float, float]) -> Array:
+    """Where the line through (A, H) of models reaches the H of none, within limits; values (B, 2, models and none)."""
+    logs = np.log(np.maximum(values, 1e-9))
+    x, y, none = logs[:, 0, :-1], logs[:, 1, :-1], logs[:, 1, -1]
+    centred = x - x.mean(axis=1, keepdims=True)
+    slope = (centred * y).sum(axis=1) / np.maximum((centred**2).sum(axis=1), 1e-12)
+    margin = none - y.mean(axis=1)  # above 0: the models are better than none in the mean
+    low, high = np.log(limits)
+    rising = slope > 1e-9
+    at = x.mean(axis=1) + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
+    flat = np.where(margin > 0, high, low)  # no better for being more accurate: all pay, or none does
+    crossing: Array = np.exp(np.clip(np.where(rising, at, flat), low, high))
+    return crossing
+
+
+def runs_without_physics(table: ErrorTable, model: str, place: int, rival: str = NO_MODEL) -> Estimate:
+    """Runs that a rival needs for the error that a model has with the amount of this place.
+
+    Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts.
+    """
+    rivals = np.stack([table.by_run(rival, k) for k in range(len(table.amounts))])
+    values = np.vstack([rivals, table.by_run(model, place)[None]])
+    limits = float(table.amounts[0]), float(table.amounts[-1])
+    noise = np.array([*table.noise, table.noise[place]])
+    mean, drawn = (values @ table.weights)[None], _trained(resampled_means(values, table.counts), noise)
+    amounts = np.array(table.amounts, dtype=float)
+    return _estimate(_runs(amounts, mean), _runs(amounts, drawn), table.runs, limits)
+
+
+def _runs(amounts: Array, values: Array) -> Array:
+    """Amounts (B,) at which curves reach a level; values (B, amounts and level)."""
+    curves, level = np.log(np.minimum.accumulate(values[:, :-1], axis=1)), np.log(values[:, -1])
+    found = np.full(len(values), amounts[-1])
+    for row, (curve, goal) in enumerate(zip(curves, level, strict=True)):
+        enough = np.flatnonzero(curve <= goal)
+        if len(enough) and enough[0] == 0:
+            found[row] = amounts[0]
+        elif len(enough):
+            k = enough[0]
+            share = (curve[k - 1] - goal) / (curve[k - 1] - curve[k])
+            found[row] = np.exp(np.log(amounts[k - 1]) + share * np.log(amounts[k] / amounts[k - 1]))
+    return found

@@ -1,0 +1,114 @@
+"""Ranges of what any ship or model of one can be: slips of unit, sign of the exponent and place are refused.
+
+A vessel that is meant so names the number in `unusual`, a list of dotted paths at the top of its document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from shipid import document as documents
+
+UNUSUAL = "unusual"
+"""Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
+WATER = 1000.0  # kg/m^3, to judge a mass by
+TURN = 6.2832  # rad: a table of angles in degrees goes further
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size of a ship by which numbers are judged: length L [m] and mass m [kg]."""
+
+    L: float
+    m: float
+
+
+@dataclass(frozen=True)
+class Range:
+    """Least and greatest magnitude of a number, and what it should be, in words."""
+
+    least: Callable[[Size], float]
+    most: Callable[[Size], float]
+    words: str
+
+
+def _at_most(most: Callable[[Size], float], words: str) -> Range:
+    return Range(lambda _: 0.0, most, words)
+
+
+_NAMED: dict[str, Range] = {
+    "particulars.L_pp": Range(lambda _: 0.05, lambda _: 600.0, "a length between perpendiculars of 0.05 to 600 m"),
+    "inertia.m": Range(
+        lambda s: 1e-4 * WATER * s.L**3, lambda s: 0.5 * WATER * s.L**3, "a mass of 0.0001 to 0.5 rho L^3 in kg"
+    ),
+    **{
+        f"inertia.I_{axis}": Range(
+            lambda s: s.m * (0.01 * s.L) ** 2, lambda s: s.m * s.L**2, "a radius of gyration of 0.01 to 1 ship length"
+        )
+        for axis in "xyz"
+    },
+    "constants.rho": Range(lambda _: 500.0, lambda _: 3000.0, "a density of water in kg/m^3"),
+    "constants.rho_a": Range(lambda _: 0.01, lambda _: 100.0, "a density of air in kg/m^3"),
+    "constants.g": Range(lambda _: 0.1, lambda _: 100.0, "an acceleration in m/s^2"),
+}
+_BY_UNIT: dict[str, Range] = {
+    "m": _at_most(lambda s: 5 * s.L, "at most 5 ship lengths, in m"),
+    "m^2": _at_most(lambda s: 10 * s.L**2, "at most 10 squares of the ship length, in m^2"),
+    "m^3": _at_most(lambda s: 10 * s.L**3, "at most 10 cubes of the ship length, in m^3"),
+    "s": _at_most(lambda _: 1e4, "at most 10,000 s"),
+    "deg": _at_most(lambda _: 360.0, "an angle of at most 360 deg"),
+    "m s^-1": _at_most(lambda _: 100.0, "a speed of at most 100 m/s"),
+    "-": _at_most(lambda _: 100.0, "without unit, at most 100"),
+    "prime": _at_most(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)"),
+}
+_ADDED: dict[str, Range] = {
+    "kg": _at_most(lambda s: 20 * s.m, "at most 20 times the mass"),
+    "kg m": _at_most(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
+    "kg m^2": _at_most(lambda s: 20 * s.m * s.L**2, "at most 20 times mass times length squared"),
+}
+
+
+def out_of_range(
+    document: Mapping[str, Any], values: Mapping[str, float], units: Mapping[str, str]
+) -> tuple[str, str] | None:
+    """Dotted path of the first number that no ship has, and a sentence; None where all are usual.
+
+    values, units : of every number that the equations use, by dotted path.
+    """
+    meant = document.get(UNUSUAL, [])
+    size = _size(document, values)
+    for path, value in values.items():
+        limits = _range(path, units[path])
+        if limits is None:
+            continue
+        least, most = limits.least(size), limits.most(size)
+        if not least <= abs(value) <= most and not _is_meant(path, meant):
+            return path, f"{value:g}: expected {limits.words} ({least:.3g} to {most:.3g}); {_remedy(path)}"
+    for path in {path.rsplit(".", 1)[0] for path, unit in units.items() if unit == "deg"}:
+        angles = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[0] == path]
+        if len(angles) > 2 and max(angles) <= TURN and not _is_meant(path, meant):
+            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_remedy(path)}"
+    return None
+
+
+def _range(path: str, unit: str) -> Range | None:
+    if path in _NAMED:
+        return _NAMED[path]
+    return (_ADDED if path.startswith("added_mass.") else _BY_UNIT).get(unit)
+
+
+def _size(document: Mapping[str, Any], values: Mapping[str, float]) -> Size:
+    """Length and mass; the length of a ship of this mass where the document gives none."""
+    m = abs(values["inertia.m"])
+    usual = 5.4 * (m / WATER) ** (1 / 3)
+    return Size(float((document.get("particulars") or {}).get("L_pp") or usual), m)
+
+
+def _is_meant(path: str, meant: Iterable[str]) -> bool:
+    return any(documents.match(pattern, [path]) for pattern in meant)
+
+
+def _remedy(path: str) -> str:
+    return f'if it is meant, write {UNUSUAL} = ["{path}"] at the top of the vessel'

@@ -1,0 +1,247 @@
+"""Compiled libraries: whatever lies in the cache or happens to the compiler, a rollout gives its numbers or a line."""
+
+from __future__ import annotations
+
+import logging
+import os
+import stat
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.engine import libraries, native
+from shipid.engine.libraries import NoLibrary, build, load, run_compiler, stranger
+from shipid.engine.native import Target, compiler
+from shipid.engine.rollout import rollout
+from shipid.errors import ShipidError
+from shipid.vessel.load import load_vessel
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+SHIP = load_vessel("gunnerus-28.9")
+SOURCE = "double run(void) { return 1.0; }"
+
+
+def forget() -> None:
+    """As a new process: nothing is compiled, no folder is chosen, no compiler is known."""
+    native._library.cache_clear()
+    native._probed.cache_clear()
+    native.target.cache_clear()
+    native.compiler_version.cache_clear()
+    libraries.folder.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setattr(native, "_refused", [])
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache" / "shipid"
+    forget()
+
+
+@pytest.fixture
+def numbers(draw_inputs: Callable[..., Any]) -> Callable[..., np.ndarray]:
+    given = draw_inputs(SHIP, 3)
+
+    def run(engine: str = "repeated") -> np.ndarray:
+        return rollout(SHIP, **given, step=1.0, num_steps=4, engine=engine).states
+
+    return run
+
+
+def made(folder: Path, source: str = SOURCE) -> Path:
+    """A library in a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    library = folder / "model.so"
+    command = compiler()
+    assert command is not None
+    assert build(native._command(command, Target(1, (), "")), source, library) is None
+    return library
+
+
+@pytest.mark.parametrize("kept", [0, 1, 100, 4096, 0.5, 0.9, -1, -33])
+def test_a_truncated_library_is_never_loaded(kept: float, tmp_path: Path) -> None:
+    library = made(tmp_path / "a")
+    content = library.read_bytes()
+    library.write_bytes(content[: int(kept * len(content)) if isinstance(kept, float) else kept])
+    with pytest.raises(NoLibrary, match="is damaged"):
+        load(library)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_library_with_another_byte_is_never_loaded(seed: int, tmp_path: Path) -> None:
+    library = made(tmp_path / "a")
+    content, rng = bytearray(library.read_bytes()), np.random.default_rng(seed)
+    content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
+    library.write_bytes(content)
+    with pytest.raises(NoLibrary, match="is damaged"):
+        load(library)
+
+
+def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> None:
+    library = made(tmp_path / "a")
+    other = library.rename(library.with_name("other.so"))
+    with pytest.raises(NoLibrary, match="is damaged"):
+        load(other)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
+def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    library = made(tmp_path / "a")
+    assert stranger(library) is None
+    for place, mode in ((library, 0o720), (library, 0o702), (library.parent, 0o720), (library.parent, 0o702)):
+        before = stat.S_IMODE(place.stat().st_mode)
+        place.chmod(mode)
+        assert "written by other" in str(stranger(library))
+        place.chmod(before)
+    tmp_path.chmod(0o707)  # others could put another folder in the place of this one
+    assert "written by other" in str(stranger(library))
+    tmp_path.chmod(0o1707)
+    assert stranger(library) is None
+    tmp_path.chmod(0o700)
+    link = library.with_name("link.so")
+    link.symlink_to(library)
+    assert "no file" in str(stranger(link))
+    monkeypatch.setattr(os, "geteuid", lambda: 12345)
+    with pytest.raises(NoLibrary, match="belongs to another user"):
+        load(library)
+
+
+@pytest.mark.parametrize("damage", ["truncated", "foreign", "open to others", "folder"])
+def test_a_rollout_mends_the_cache(
+    damage: str, own_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
+) -> None:
+    sound = numbers()
+    (library,) = own_cache.iterdir()
+    content = library.read_bytes()
+    library.unlink()  # what is loaded stays as it is
+    if damage == "folder":
+        library.mkdir()
+    else:
+        library.write_bytes(content[:5000] if damage == "truncated" else content)
+        library.chmod(0o777 if damage == "open to others" else 0o700)
+        if damage == "foreign":
+            if os.geteuid():
+                pytest.skip("only root can give files away")
+            os.chown(library, 12345, 12345)
+    forget()
+    with caplog.at_level(logging.WARNING):
+        found = numbers()
+    if damage != "folder":
+        np.testing.assert_array_equal(found, sound)
+        assert load(library) is not None
+    np.testing.assert_allclose(found, sound, rtol=1e-9)
+    assert len([record for record in caplog.records if "anew" in record.message or "not used" in record.message]) <= 2
+
+
+def test_a_folder_of_another_user_is_not_used(
+    own_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
+) -> None:
+    sound = numbers()
+    if os.geteuid():
+        pytest.skip("only root can give folders away")
+    os.chown(own_cache, 12345, 12345)
+    forget()
+    with caplog.at_level(logging.WARNING):
+        np.testing.assert_array_equal(numbers(), sound)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "not kept for the next run" in line
+    assert "another user" in line
+
+
+def test_a_cache_that_others_can_write_is_closed(own_cache: Path, numbers: Callable[..., np.ndarray]) -> None:
+    own_cache.mkdir(parents=True)
+    own_cache.chmod(0o777)
+    numbers()
+    assert stat.S_IMODE(own_cache.stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize("everywhere", [False, True])
+def test_a_place_that_runs_no_programs(
+    everywhere: bool,
+    own_cache: Path,
+    numbers: Callable[..., np.ndarray],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """A cache mounted noexec, and a machine on which every such place is: the call of the system is replaced."""
+    sound, load_it = numbers("native"), libraries.ctypes.CDLL
+
+    def refused(name: str) -> Any:
+        if everywhere or name.startswith(str(own_cache)):
+            raise OSError(f"{name}: failed to map segment from shared object: Operation not permitted")
+        return load_it(name)
+
+    monkeypatch.setattr(libraries.ctypes, "CDLL", refused)
+    forget()
+    with caplog.at_level(logging.WARNING):
+        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "Operation not permitted" in line
+    assert ("not used" if everywhere else "not kept") in line
+    if everywhere:
+        with pytest.raises(ShipidError, match="use 'torch'"):
+            numbers("native")
+
+
+def test_a_full_disk_is_one_line(
+    numbers: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """No library fits anywhere, after the probe has fitted."""
+    sound = numbers()
+    forget()
+    assert compiler() is not None
+    monkeypatch.setattr(native, "build", lambda *_: "ld: final link failed: No space left on device")
+    (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").rename(Path(os.environ["XDG_CACHE_HOME"]) / "gone")
+    (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").mkdir(mode=0o700)
+    with caplog.at_level(logging.WARNING):
+        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
+        numbers()
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "No space left" in line
+    assert compiler() is None
+
+
+def test_a_compiler_that_never_returns_is_ended(
+    tmp_path: Path,
+    numbers: Callable[..., np.ndarray],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    sound = numbers()
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "gcc").write_text("#!/bin/sh\n/bin/sleep 600 & echo $! > " + str(tmp_path / "child") + "\nwait\n")
+    (tools / "gcc").chmod(0o700)
+    monkeypatch.setenv("PATH", str(tools))
+    monkeypatch.setattr(native, "PROBE_LIMIT", 0.5)
+    forget()
+    with caplog.at_level(logging.WARNING):
+        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "hangs: not done after 0.5 s" in line
+    assert not _alive(int((tmp_path / "child").read_text()))
+
+
+def _alive(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text().split()[2] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
+    reason, _ = run_compiler([str(tmp_path / "none")])
+    assert reason is not None
+    assert reason.startswith("cannot be started")
+
+
+def test_without_a_home_it_works(numbers: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = numbers()
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", "/dev/null")
+    forget()
+    np.testing.assert_array_equal(numbers(), sound)

@@ -1,0 +1,66 @@
+"""The rows of the campaign and how many trials each has: what the product must survive, and how the fault is made."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tests.faults import clusters, documents, folders
+from tests.faults.trials import HANG, Outcome, outcomes
+
+
+@dataclass(frozen=True)
+class Row:
+    """One kind of fault.
+
+    trial : seed -> None; it raises for a failure. count : trials at scale 5. limit : s that a trial may take.
+    made : how the fault is made, for the table.
+    """
+
+    trial: Callable[[int], None]
+    count: int
+    made: str
+    limit: float = HANG
+
+
+ROWS: dict[str, Row] = {
+    "study": Row(documents.study, 800, "mutated text"),
+    "vessel": Row(documents.vessel, 800, "mutated text"),
+    "mapping": Row(documents.mapping, 400, "mutated text"),
+    "chain": Row(documents.chain, 40, "patches on patches"),
+    "log": Row(documents.log, 1000, "mutated text"),
+    "predictor": Row(folders.predictor, 300, "arrays and header changed"),
+    "dataset": Row(folders.dataset, 300, "columns and metadata changed"),
+    "damaged": Row(folders.damaged, 1000, "files of a folder changed", 60.0),
+    "killed": Row(folders.killed, 1000, "SIGKILL at an intercepted call", 200.0),
+    "full": Row(folders.full, 200, "limit of file size, and intercepted calls", 200.0),
+    "together": Row(folders.together, 60, "processes", 300.0),
+    "two plans": Row(folders.two_plans, 60, "processes", 300.0),
+    "memory": Row(documents.memory, 100, "sizes beyond the machine"),
+    "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
+}
+SMALLEST = 1.0 / 100
+
+
+def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, list[Outcome]]:
+    """Outcomes of every row, `scale` fifths of its trials; seeds begin at a million times `seed`."""
+    found = {}
+    for name, row in ROWS.items():
+        if only and name not in only:
+            continue
+        begun, count = time.perf_counter(), max(1, round(row.count * scale / 5))
+        first = 1_000_000 * seed
+        if row.trial.__module__ == folders.__name__:
+            folders.reference()  # once, before the trials fork
+        trials = []
+        for one in outcomes(row.trial, range(first, first + count), row.limit):
+            trials.append(one)
+            if one.failed:
+                print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
+        found[f"{name} ({row.made})"] = trials
+        failed = sum(one.failed for one in trials)
+        words = f"{count} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
+        print(f"{name}: {words}", file=sys.stderr, flush=True)
+    return found

@@ -1,0 +1,88 @@
+"""A row of the campaign: a Dask scheduler or its workers die while a study runs on them."""
+
+from __future__ import annotations
+
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from shipid.errors import ShipidError
+from shipid.study.run import run_study
+from tests.faults.folders import _continued, a_place, reference
+from tests.faults.trials import Failure
+from tests.study.tiny import tiny_plan
+
+
+@contextmanager
+def a_cluster(place: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """Address of a scheduler on this machine with one worker, and their processes: scheduler, worker."""
+    command = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+    ]
+    log = (place / "scheduler.log").open("w")
+    processes = [subprocess.Popen(command, stderr=log, stdout=log, text=True, cwd=place)]
+    try:
+        address = _address(place / "scheduler.log")
+        worker = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--no-nanny",
+        ]
+        processes.append(subprocess.Popen(worker, stderr=log, stdout=log, text=True, cwd=place))
+        yield address, processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+        log.close()
+
+
+def _address(log: Path) -> str:
+    for _ in range(600):
+        found = re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text())
+        if found:
+            return found[1]
+        time.sleep(0.1)
+    raise Failure("no cluster", log.read_text()[-500:])
+
+
+def died(seed: int) -> None:
+    """The scheduler or the worker is killed after a while: one line, and what is finished is kept."""
+    rng = random.Random(seed)
+    reference()
+    with a_place() as place, a_cluster(place) as (address, processes):
+        plan = tiny_plan(place)
+        victim = processes[0] if seed % 2 == 0 else processes[1]
+        after = rng.choice(["start", "cell"])
+        began = time.monotonic()
+        try:
+            for event in run_study(plan, place / "run", scheduler=address):
+                if event.kind == after and victim.poll() is None:
+                    victim.send_signal(signal.SIGKILL)
+                    if victim is processes[1]:
+                        time.sleep(0.5)
+                        processes[0].send_signal(signal.SIGKILL)  # else it waits for another worker, as it should
+        except ShipidError as error:
+            if "go on with `shipid study resume`" not in str(error) and "no Dask scheduler" not in str(error):
+                raise Failure("no line", str(error)) from None
+        if time.monotonic() - began > 120:
+            raise Failure("hang", "more than 120 s until the line")
+        _continued(place, f"killed at {after}")

@@ -1,0 +1,158 @@
+"""Rows of the campaign: mutated documents, read and used as a user would."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from shipid.engine.rollout import rollout
+from shipid.errors import DocumentError
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
+from shipid.study.plan import read_plan
+from shipid.study.prepare import obtain, prepare
+from shipid.study.run import run_batch
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from tests.faults.mutations import mutated
+from tests.faults.trials import Failure
+
+BAD = Path(__file__).parents[1] / "bad"
+RUNNABLE = 2e5  # steps of a truth, or cells: a larger one is planned only
+
+
+def study(seed: int) -> None:
+    """Plan a mutated study; run a small one as far as its first batch, as it may not fail later."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "x.toml"
+        content, words = mutated("study", seed)
+        file.write_bytes(content)
+        plan = read_plan(file)
+        plan.text()
+        truth = plan.study.truth
+        if truth is None or plan.cells > 60 or not words.startswith(("plain", "rich")):
+            return
+        steps = truth.manoeuvres * truth.length / truth.step
+        searched = max(getattr(way.method, "trials", 1) * getattr(way.method, "units", 1) for way in plan.methods)
+        if steps < RUNNABLE and plan.study.prediction.horizon < 100 and searched < 50:
+            prepared = prepare(plan, obtain(plan))
+            run_batch(plan, prepared, plan.batches[-1], "cpu")
+
+
+def vessel(seed: int) -> None:
+    """Load a mutated vessel and let it move one second."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "x.toml"
+        file.write_bytes(mutated("vessel", seed)[0])
+        found = load_vessel(str(file))
+        model = dynamics(found)
+        rest = [{name: np.ones(1) for name in names} for names in (model.state, model.commands, model.environment)]
+        rollout(found, *rest, step=0.5, num_steps=2, engine="casadi")
+
+
+def mapping(seed: int) -> None:
+    """Import a sound log by a mutated mapping."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "x.toml"
+        file.write_bytes(mutated("mapping", seed)[0])
+        found = read_mapping(file)
+        with patch("shipid.logs.catalogue.fetch", side_effect=AssertionError):
+            import_log(found, BAD / "logs" / "good.csv")
+
+
+def chain(seed: int) -> None:
+    """Patches on patches, or vessels that extend vessels, in a long chain or a ring."""
+    length, ring, word = [1, 5, 80, 1200][seed % 4], seed % 3 == 0, ("base", "extends")[seed // 4 % 2]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for number in range(length):
+            last = "./0.toml" if ring else "gunnerus-28.9"
+            other = f"./{number + 1}.toml" if number + 1 < length else last
+            (folder / f"{number}.toml").write_text(f'{word} = "{other}"\n')
+        load_vessel(str(folder / "0.toml"))
+
+
+def log(seed: int) -> None:
+    """Import a mutated log by a sound mapping."""
+    rng = random.Random(f"log {seed}")
+    content = bytearray((BAD / "logs" / "good.csv").read_bytes())
+    lines = bytes(content).split(b"\n")
+    kind = rng.randrange(8)
+    if kind == 0:
+        content = content[: rng.randrange(len(content))]
+    elif kind == 1:
+        for _ in range(rng.choice([1, 5, 50])):
+            content[rng.randrange(len(content))] = rng.randrange(256)
+    elif kind == 2:
+        del lines[rng.randrange(len(lines))]
+        rng.shuffle(lines)
+        content = bytearray(b"\n".join(lines))
+    elif kind == 3:
+        place = rng.randrange(1, len(lines) - 1)
+        cells = lines[place].split(b",")
+        values = [
+            b"",
+            b"nan",
+            b"inf",
+            b"1e308",
+            b"-",
+            b"1e400",
+            b'"',
+            b"\x00",
+            b"9" * 5000,
+            b"2022-01-01",
+            b"\x1b[2J",
+            b"1,5",
+        ]
+        cells[rng.randrange(len(cells))] = rng.choice(values)
+        lines[place] = b",".join(cells)
+        content = bytearray(b"\n".join(lines))
+    elif kind == 4:
+        content = bytearray(
+            rng.choice([b"", b"\n" * 1000, b"," * 10**6, b"a," * 10**5 + b"\n1\n", b"\xff\xfe" + content])
+        )
+    elif kind == 5:
+        content = content * rng.choice([2, 50])
+    elif kind == 6:
+        head = lines[0].split(b",")
+        head[rng.randrange(len(head))] = rng.choice([b"", head[0], b"\x1b[31m", b"a" * 10**5])
+        content = bytearray(b"\n".join([b",".join(head), *lines[1:]]))
+    else:
+        content = bytearray(content.replace(b",", rng.choice([b";", b"\t", b" ", b"|"])))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.csv"
+        file.write_bytes(bytes(content))
+        import_log(read_mapping(BAD / "logs" / "plain.toml"), file)
+
+
+def memory(seed: int) -> None:
+    """A study that would take more memory than any machine has: refused, with the number that causes it."""
+    rng = random.Random(f"memory {seed}")
+    changes: dict[str, Any] = {"unusual": ["*"]}
+    path, value = rng.choice(
+        [
+            ("truth.interval", 10.0 ** -rng.randrange(8, 12)),
+            ("prediction.interval", 10.0 ** -rng.randrange(10, 13)),
+            ("truth.step", 10.0 ** -rng.randrange(9, 12)),
+            ("truth.duration", 10.0 ** rng.randrange(11, 14)),
+        ]
+    )
+    changes[path] = value
+    if path == "truth.interval":
+        changes["truth.step"] = value
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "x.toml"
+        file.write_text((BAD / "studies" / "plain.toml").read_text())
+        try:
+            plan = read_plan(file, changes)
+            prepare(plan, obtain(plan))
+        except DocumentError as error:
+            if "GiB" not in error.message:
+                raise Failure("not said", str(error)) from None
+            return
+        raise Failure("not refused", f"{path} = {value:g}")

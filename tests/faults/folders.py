@@ -1,0 +1,443 @@
+"""Rows of the campaign: folders of results that are killed, filled up, shared and damaged, and then continued."""
+
+from __future__ import annotations
+
+import atexit
+import errno
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pyarrow.parquet
+
+from shipid.data.checks import check_dataset
+from shipid.data.dataset import read_dataset
+from shipid.errors import ShipidError
+from shipid.files import TEMPORARY
+from shipid.predictor import Predictor
+from shipid.study import claims, seals
+from shipid.study.check import check_folder
+from shipid.study.results import read_results
+from tests.faults.trials import Failure
+from tests.study.tiny import run_here as run_in_process
+from tests.study.tiny import tiny_plan
+
+PLACE = "/dev/shm" if Path("/dev/shm").is_dir() else None
+"""Where the folders of trials are: in memory, where syncing takes no time."""
+CALLS = ("mkdir", "replace", "rename", "link", "unlink", "rmdir", "fsync", "utime")
+"""Calls of the system by which a folder changes: a run is stopped before, within and after each."""
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def run_here(plan: Any, folder: Path) -> Any:
+    """Run a plan in this process, which is a fork: without the server from which workers fork."""
+    with patch("shipid.study.run.import_for_workers", lambda: None):
+        return run_in_process(plan, folder)
+
+
+@cache
+def reference() -> tuple[Path, dict[str, bytes], int]:
+    """A finished run, the bytes of its cells and batches, and how many calls it makes."""
+    folder = Path(tempfile.mkdtemp(prefix="faults-", dir=PLACE))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    count = [0]
+
+    def counted(_name: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        count[0] += 1
+        return call(*arguments, **named)
+
+    plan = tiny_plan(folder)
+    run_here(plan, folder / "warm")
+    with intercepted(counted):
+        run_here(plan, folder / "run")
+    return folder / "run", stored(folder / "run"), count[0]
+
+
+@contextmanager
+def intercepted(instead: Callable[..., Any]) -> Iterator[None]:
+    """Give every call of `CALLS` to `instead`: (name, call, arguments, named arguments) -> result."""
+    before = {name: getattr(os, name) for name in CALLS}
+
+    def replacement(name: str) -> Callable[..., Any]:
+        return lambda *arguments, **named: instead(name, before[name], arguments, named)
+
+    try:
+        for name in CALLS:
+            setattr(os, name, replacement(name))
+        yield
+    finally:
+        for name, call in before.items():
+            setattr(os, name, call)
+
+
+def stored(folder: Path) -> dict[str, bytes]:
+    """What a run has computed: bytes of the predictors, and the rows without the seconds they took."""
+    found = {f"cells/{file.name}": file.read_bytes() for file in (folder / "cells").glob("*.npz")}
+    for file in (folder / "batches").glob("*.json"):
+        rows = json.loads(file.read_text())
+        for row in rows:
+            row.pop("seconds")
+            row["trials"] = [{k: v for k, v in trial.items() if k != "seconds"} for trial in row["trials"]]
+        found[f"batches/{file.name}"] = json.dumps(rows).encode()
+    found["study.toml"] = (folder / "study.toml").read_bytes()
+    return found
+
+
+def child(work: Callable[[], Any], limit: float = 60.0) -> int:
+    """Exit code of work in a forked process: 0 done, 1 refused in one line, 2 traceback; negative for a signal."""
+    process = start(work)
+    return finish(process, limit)
+
+
+def start(work: Callable[[], Any]) -> int:
+    """Start work in a forked process; its id."""
+    process = os.fork()
+    if process:
+        return process
+    code = 2
+    try:
+        work()
+        code = 0
+    except (ShipidError, OSError) as error:
+        code = 1
+        if os.environ.get("FAULTS_WORDS"):
+            print(error, flush=True)
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+def finish(process: int, limit: float = 60.0) -> int:
+    """Exit code of a process; it is killed after a limit [s], which is a failure."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        done, status = os.waitpid(process, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.01)
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    raise Failure("hang", f"more than {limit:g} s")
+
+
+def _same_as_reference(folder: Path, what: str) -> None:
+    """Raise Failure unless a folder holds the numbers of an undisturbed run, sealed, and nothing else."""
+    wanted, found = reference()[1], stored(folder)
+    for name in sorted(wanted.keys() | found.keys()):
+        if wanted.get(name) != found.get(name):
+            raise Failure("mixed", what, name)
+    if faults := seals.faults(folder):
+        raise Failure("not sealed", what, faults[0].file)
+    left = [*folder.rglob(f"{TEMPORARY}*"), *folder.parent.glob(f"{TEMPORARY}*")]
+    if left:
+        raise Failure("left over", what, left[0].name)
+    if claims.held(folder):
+        raise Failure("left over", what, "a claim")
+
+
+@contextmanager
+def a_place() -> Iterator[Path]:
+    """A folder of one trial."""
+    with tempfile.TemporaryDirectory(prefix="faults-", dir=PLACE) as folder:
+        yield Path(folder)
+
+
+def _continued(place: Path, what: str) -> None:
+    """Run the plan to its end in a folder, as often as a patient user would, and compare."""
+    plan = tiny_plan(place)
+    code = child(lambda: run_here(plan, place / "run"))
+    if code:
+        raise Failure("not resumed", what, f"exit code {code}")
+    _same_as_reference(place / "run", what)
+
+
+def killed(seed: int) -> None:
+    """A run is killed before, within or after one of its changes of the folder, twice, and continued."""
+    rng, calls = random.Random(seed), reference()[2]
+    with a_place() as place:
+        plan = tiny_plan(place)
+        words = []
+        for _ in range(rng.choice([1, 1, 2])):
+            at, when = rng.randrange(calls), rng.choice(["before", "within", "after"])
+            words.append(f"{when} call {at}")
+            child(lambda at=at, when=when: _stopped(plan, place / "run", at, when))  # type: ignore[misc]
+        _continued(place, " and ".join(words))
+
+
+def _stopped(plan: Any, folder: Path, at: int, when: str) -> None:
+    count = [0]
+
+    def stop(name: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        count[0] += 1
+        if count[0] <= at:
+            return call(*arguments, **named)
+        if when == "within" and name == "fsync":
+            with suppress(OSError):
+                os.ftruncate(arguments[0], os.fstat(arguments[0]).st_size // 2)
+        if when == "after":
+            call(*arguments, **named)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    with intercepted(stop):
+        run_here(plan, folder)
+
+
+def full(seed: int) -> None:
+    """The disk is full from one change on (an intercepted call, or a limit of file size), then it has space again."""
+    rng, calls = random.Random(seed), reference()[2]
+    with a_place() as place:
+        plan = tiny_plan(place)
+        at, limit = rng.randrange(calls), rng.choice([0, 100, 1000, 5000, 9800, 20000, 27050])
+        by_size = seed % 2 == 0
+        count = [0]
+
+        def fail(name: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+            count[0] += 1
+            if count[0] > at and name in ("mkdir", "fsync", "replace", "link"):
+                raise FULL
+            return call(*arguments, **named)
+
+        def work() -> None:
+            if by_size:
+                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+                run_here(plan, place / "run")
+            else:
+                with intercepted(fail):
+                    run_here(plan, place / "run")
+
+        what = f"files of at most {limit} bytes" if by_size else f"no space from call {at} on"
+        code = child(work)
+        if code not in (0, 1):
+            raise Failure("traceback", what, f"exit code {code}")
+        if list(place.rglob(f"{TEMPORARY}*")) and by_size:
+            raise Failure("left over", what)
+        _continued(place, what)
+
+
+def together(seed: int) -> None:
+    """Two or three runs of one plan in one folder at once, one of them perhaps killed; then of another plan."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        plan = tiny_plan(place)
+        runs = []
+        for _ in range(rng.choice([2, 2, 3])):
+            runs.append(start(lambda: run_here(plan, place / "run")))
+            time.sleep(rng.choice([0.0, 0.0, 0.1, 0.5]))
+        killed_one = rng.random() < 0.4
+        if killed_one:
+            with suppress(ProcessLookupError):
+                os.kill(runs[0], signal.SIGKILL)
+        codes = [finish(one) for one in runs]
+        if any(codes[killed_one:]):
+            raise Failure("not together", f"exit codes {codes}")
+        _continued(place, f"{len(runs)} runs at once")
+        other = tiny_plan(place, {"truth.seed": 7})
+        if child(lambda: run_here(other, place / "run")) != 1:
+            raise Failure("mixed", "another plan was not refused")
+        _same_as_reference(place / "run", "after another plan")
+
+
+def two_plans(seed: int) -> None:
+    """Two plans begin in one folder at once: one is refused in one line, the other ends as if alone."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        plans = [tiny_plan(place), tiny_plan(place, {"truth.seed": 7})]
+        if rng.random() < 0.5:
+            (place / "run").mkdir()
+        runs = []
+        for plan in plans:
+            runs.append(start(lambda plan=plan: run_here(plan, place / "run")))  # type: ignore[misc]
+            time.sleep(rng.choice([0.0, 0.0, 0.01, 0.1]))
+        codes = [finish(one) for one in runs]
+        if sorted(codes) != [0, 1]:
+            raise Failure("mixed", f"exit codes {codes}")
+        if codes[0] == 0:
+            _same_as_reference(place / "run", "two plans at once")
+
+
+def damaged(seed: int) -> None:
+    """A finished folder with one to three damages: refused in one line, or the numbers of the undisturbed run."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        shutil.copytree(reference()[0], place / "run")
+        words = [_damage(place / "run", rng) for _ in range(rng.choice([1, 1, 2, 3]))]
+        what = ", ".join(words)
+        with suppress(ShipidError):
+            found = read_results(place / "run")
+            wanted = reference()[1]
+            for row in found.cells["cell"]:
+                if (place / "run" / "cells" / f"{row}.npz").read_bytes() != wanted[f"cells/{row}.npz"]:
+                    raise Failure("mixed", what, "read without a word")
+        with suppress(ShipidError):
+            check_folder(place / "run")
+        plan = tiny_plan(place)
+        run_here(plan, place / "run")  # a refusal ends the trial here
+        _same_as_reference(place / "run", what)
+
+
+def _damage(folder: Path, rng: random.Random) -> str:
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    file = rng.choice(files)
+    name = f"{file.relative_to(folder)}"
+    kind = rng.choice(
+        ["gone", "empty", "half", "byte", "swapped", "rubbish", "folder", "link", "grown", "edited", "edited"]
+    )
+    content = file.read_bytes()
+    if kind == "gone":
+        file.unlink()
+    elif kind in ("empty", "half", "rubbish", "grown"):
+        changed = {"empty": b"", "half": content[: len(content) // 2], "rubbish": rng.randbytes(300)}
+        file.write_bytes(changed.get(kind, content + b"\0" * 9))
+    elif kind == "byte" and content:
+        place = rng.randrange(len(content))
+        file.write_bytes(content[:place] + bytes([content[place] ^ (1 << rng.randrange(8))]) + content[place + 1 :])
+    elif kind == "swapped":
+        other = rng.choice([one for one in files if one.suffix == file.suffix])
+        if other.exists() and other.is_file():
+            file.write_bytes(other.read_bytes())
+            other.write_bytes(content)
+    elif kind == "folder":
+        file.unlink()
+        file.mkdir()
+    elif kind == "link":
+        file.unlink()
+        file.symlink_to("/nowhere" if rng.random() < 0.5 else "/dev/null")
+    else:
+        _edit(file, rng)
+    return f"{name} {kind}"
+
+
+def _edit(file: Path, rng: random.Random) -> None:
+    """Other numbers in a sound file of its kind."""
+    if file.suffix == ".npz":
+        with np.load(file) as found:
+            arrays = dict(found)
+        name = rng.choice(sorted(arrays))
+        if arrays[name].dtype.kind == "f" and arrays[name].size:
+            arrays[name] = np.where(rng.random() < 0.5, np.nan, arrays[name] * 1.01)
+        np.savez(file, **arrays)
+    elif file.suffix == ".parquet":
+        table = pyarrow.parquet.read_table(file)
+        pyarrow.parquet.write_table(table.slice(0, max(1, table.num_rows // 2)), file)
+    else:
+        text = file.read_text()
+        digits = [place for place, sign in enumerate(text) if sign.isdigit()]
+        if digits:
+            place = rng.choice(digits)
+            file.write_text(text[:place] + str((int(text[place]) + 1) % 10) + text[place + 1 :])
+
+
+def predictor(seed: int) -> None:
+    """A predictor with arrays of other types, shapes or values, and another header: refused, or it predicts."""
+    rng = random.Random(seed)
+    run = reference()[0]
+    file = rng.choice(sorted((run / "cells").glob("*.npz")))
+    with a_place() as place, np.load(file) as found:
+        arrays: dict[str, Any] = dict(found)
+        for _ in range(rng.choice([1, 1, 2])):
+            name = rng.choice(sorted(arrays))
+            if name == "header" or rng.random() < 0.3:
+                arrays["header"] = np.array(_other_header(str(arrays["header"]), rng))
+            else:
+                arrays[name] = _other_array(arrays[name], rng)
+        np.savez(place / "x.npz", **arrays)
+        loaded = Predictor.load(place / "x.npz")
+        columns = {name: np.zeros(3) for name in ("u", "v", "r", "psi", "north", "east", "V_w", "beta_w")}
+        columns |= {f"{side}.{signal}": np.ones(3) for side in ("port", "starboard") for signal in ("n", "alpha")}
+        from shipid.data.windows import Instants
+
+        loaded.predict(Instants(columns))
+
+
+def _other_array(array: np.ndarray, rng: random.Random) -> np.ndarray:
+    changes: list[Callable[[], np.ndarray]] = [
+        lambda: array.astype(str),
+        lambda: array.astype(complex) if array.dtype.kind != "U" else array,
+        lambda: array[..., None],
+        lambda: array.reshape(-1)[: array.size // 2],
+        lambda: np.zeros((0, 3)),
+        lambda: np.array(3.0),
+        lambda: array > array if array.dtype.kind == "f" else array,
+        lambda: array.astype(np.float16) if array.dtype.kind == "f" else array,
+        lambda: array.astype(np.int8) if array.dtype.kind == "f" else array,
+        lambda: array * np.nan if array.dtype.kind == "f" else array,
+        lambda: np.array(["x", "y"]),
+        lambda: np.array(np.datetime64("2020-01-01")),
+    ]
+    with np.errstate(all="ignore"):
+        return rng.choice(changes)()
+
+
+def _other_header(text: str, rng: random.Random) -> str:
+    header = json.loads(text)
+    node: Any = header
+    while isinstance(node, dict | list) and node:
+        key = rng.choice(list(node)) if isinstance(node, dict) else rng.randrange(len(node))
+        if not isinstance(node[key], dict | list) or not node[key] or rng.random() < 0.4:
+            node[key] = rng.choice([None, "x", -1, 0, 1e300, [], {}, [[1]], True, {"a": 1}, 10**400, "position"])
+            break
+        node = node[key]
+    return json.dumps(header)
+
+
+def dataset(seed: int) -> None:
+    """A dataset whose metadata or columns are not what they should be: refused, or read and judged."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        table = pyarrow.parquet.read_table(reference()[0] / "dataset.parquet")
+        metadata = dict(table.schema.metadata or {})
+        if rng.random() < 0.6:
+            key = rng.choice([b"shipid", b"pandas"])
+            text = metadata[key].decode()
+            values = ["[]", "null", "1", '"x"', "{", "{}", '{"flags": 3}', '{"flags": [1, []]}', '{"units": []}']
+            values += [
+                '{"clock": 7}',
+                '{"repairs": 5}',
+                '{"flags": ' + "[" * 5000 + "]" * 5000 + "}",
+                text[: len(text) // 2],
+            ]
+            values += [
+                '{"flags": ["a", "a"]}',
+                '{"repairs": [1]}',
+                '{"units": {"u": 3}}',
+                '{"manoeuvres": 3}',
+                _other_header(text, rng),
+            ]
+            metadata[key] = rng.choice(values).encode()
+            table = table.replace_schema_metadata(metadata)
+        else:
+            number = rng.randrange(table.num_columns)
+            field = table.schema.field(number)
+            column = rng.choice(
+                [
+                    lambda: pyarrow.array(["x"] * table.num_rows),
+                    lambda: pyarrow.array([None] * table.num_rows, "float64"),
+                    lambda: pyarrow.array([[1.0]] * table.num_rows),
+                    lambda: pyarrow.array([2**70] * table.num_rows, pyarrow.decimal128(38)),
+                    lambda: pyarrow.array([0] * table.num_rows, "timestamp[s]"),
+                    lambda: pyarrow.array([{"a": 1}] * table.num_rows),
+                    lambda: pyarrow.array([1e308] * table.num_rows),
+                    lambda: pyarrow.array(["x", None] * (table.num_rows // 2) + ["x"] * (table.num_rows % 2)),
+                ]
+            )()
+            table = table.set_column(number, field.name, column)
+        pyarrow.parquet.write_table(table, place / "x.parquet")
+        found = read_dataset(place / "x.parquet")
+        _ = (found.runs, found.commands, found.digest)
+        check_dataset(found)

@@ -1,0 +1,73 @@
+"""A few seconds of the campaign of faults; `make faults` runs more of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.faults.campaign import ROWS
+from tests.faults.mutations import MUTATIONS, documents, mutated
+from tests.faults.trials import Failure, outcome, outcomes, table
+
+QUICK = {
+    "study": 12,
+    "vessel": 25,
+    "mapping": 25,
+    "log": 25,
+    "predictor": 15,
+    "dataset": 8,
+    "memory": 6,
+    "damaged": 4,
+    "killed": 3,
+}
+
+
+@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.filterwarnings("ignore")
+def test_a_few_faults(name: str) -> None:
+    found = [outcome(ROWS[name].trial, seed) for seed in range(5000, 5000 + QUICK[name])]
+    assert not [one for one in found if one.failed], table({name: found})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(ROWS.keys() - QUICK.keys()))
+@pytest.mark.filterwarnings("ignore")
+def test_a_few_slow_faults(name: str) -> None:
+    found = [outcome(ROWS[name].trial, seed) for seed in range(2)]
+    assert not [one for one in found if one.failed], table({name: found})
+
+
+def test_mutations_are_drawn_by_seed() -> None:
+    assert [mutated("study", seed) for seed in range(20)] == [mutated("study", seed) for seed in range(20)]
+    found = {mutated(kind, seed)[0] for kind in ("study", "vessel", "mapping") for seed in range(50)}
+    sources = {file.read_bytes() for kind in ("study", "vessel", "mapping") for file in documents(kind).values()}
+    assert len(found - sources) > 100
+    assert len(MUTATIONS) > 5
+
+
+def _hangs(_: int) -> None:
+    while True:
+        pass
+
+
+def _dies(seed: int) -> None:
+    import os
+
+    os._exit(seed)
+
+
+def _wrong(_: int) -> None:
+    raise Failure("mixed", "two runs")
+
+
+def _fails(_: int) -> None:
+    raise KeyError("no line")
+
+
+@pytest.mark.filterwarnings("ignore")  # a fork in a process with threads
+def test_every_way_to_fail_is_told_apart() -> None:
+    """The campaign can fail: each outcome is recognised, and the next trial runs."""
+    kinds = {"hang": _hangs, "died": _dies, "mixed": _wrong, "traceback": _fails}
+    for kind, work in kinds.items():
+        found = list(outcomes(work, [3, 4], 0.3))
+        assert [(one.trial, one.kind) for one in found] == [(3, kind), (4, kind)]
+        assert f"2 {kind}" in table({"row": found})

@@ -1,0 +1,110 @@
+"""Trials in a process of their own: each ends in an outcome, and none may hang or bring the campaign down."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+from shipid.errors import ShipidError
+
+HANG = 20.0  # s of processor or wall time that no trial may take
+MEMORY = 12 << 30  # bytes of address space of a trial
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a trial ended.
+
+    kind : `sound` (accepted, or mended), `refused` (one line), or a failure: `traceback`, `hang`, `died`, and what a
+        trial says itself.
+    """
+
+    trial: int
+    kind: str
+    words: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Whether the product has failed."""
+        return self.kind not in ("sound", "refused")
+
+
+class Failure(Exception):
+    """A trial that found what must not be; the first argument is the kind of failure."""
+
+
+def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HANG) -> Iterator[Outcome]:
+    """Outcome of each trial; `work` is called with its seed in a forked process, which a hanging trial ends."""
+    context: Any = multiprocessing.get_context("fork")
+    left = list(seeds)
+    while left:
+        here, there = context.Pipe()
+        process = context.Process(target=_serve, args=(there, work, tuple(left)), daemon=False)
+        process.start()
+        there.close()
+        begun = time.monotonic()
+        while left:
+            try:
+                waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
+                found = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
+            except EOFError:
+                process.join()
+                found = Outcome(left[0], "died", f"exit code {process.exitcode}")
+            begun = time.monotonic()
+            left.pop(0)
+            yield found
+            if found.kind in ("hang", "died"):
+                break
+        process.kill()
+        process.join()
+        here.close()
+
+
+def _serve(pipe: Connection, work: Callable[[int], Any], seeds: Sequence[int]) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    for seed in seeds:
+        pipe.send(outcome(work, seed))
+    pipe.close()
+
+
+def outcome(work: Callable[[int], Any], seed: int) -> Outcome:
+    """Outcome of one trial in this process."""
+    try:
+        work(seed)
+    except ShipidError as error:
+        line = str(error)
+        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
+        return Outcome(seed, "refused" if good else "no line", line)
+    except Failure as error:
+        return Outcome(seed, str(error.args[0]), " ".join(map(str, error.args[1:])))
+    except OSError as error:
+        if error.filename is not None or error.strerror:  # the command line writes these in one line
+            return Outcome(seed, "refused", f"{error.filename}: {error.strerror}")
+        return Outcome(seed, "traceback", _short(error))
+    except BaseException as error:
+        return Outcome(seed, "traceback", _short(error))
+    return Outcome(seed, "sound")
+
+
+def _short(error: BaseException) -> str:
+    places = [frame for frame in traceback.extract_tb(error.__traceback__) if "/shipid/" in frame.filename]
+    where = f"{places[-1].filename.rsplit('/', 1)[-1]}:{places[-1].lineno}" if places else "?"
+    return f"{where} {type(error).__name__}: {str(error)[:120]!r}"
+
+
+def table(rows: dict[str, list[Outcome]]) -> str:
+    """A line per row of the campaign, and one per failure."""
+    lines = [f"{'row':34} {'trials':>6}  outcomes"]
+    for name, found in rows.items():
+        counts = Counter(one.kind for one in found)
+        lines.append(f"{name:34} {len(found):6}  " + ", ".join(f"{n} {kind}" for kind, n in counts.most_common()))
+    for name, found in rows.items():
+        lines += [f"FAILED {name}, trial {one.trial}: {one.kind}: {one.words}" for one in found if one.failed]
+    return "\n".join(lines)

@@ -1,0 +1,120 @@
+"""The journal of trials: Optuna opens it, processes share it, and a write that was cut off harms nothing."""
+
+from __future__ import annotations
+
+import math
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+import pytest
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
+
+from shipid.errors import ResultError
+from shipid.hybrid.journal import Journal
+from shipid.hybrid.settings import Span
+
+SPACE: dict[str, Any] = {"scale": Span(1.0, 16.0), "layers": Span(1, 3, log=False, whole=True), "mirror": (0.0, 1.0)}
+
+
+def rows(count: int, seed: int = 0, first: int = 0) -> list[dict[str, Any]]:
+    """Trials drawn by a seed: some diverged, some values just outside of their span, with one fixed setting."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for number in range(first, first + count):
+        bad = rng.random() < 0.2
+        params = {"scale": float(np.exp(rng.uniform(0, np.log(16)))), "layers": int(rng.integers(1, 4))}
+        if rng.random() < 0.2:
+            params["scale"] = math.nextafter(16.0, 17.0)
+        params |= {"mirror": float(rng.integers(0, 2)), "offset": 1.5}
+        found.append(
+            {"number": number, "params": params, "value": math.nan if bad else float(rng.lognormal(0, 5)),
+             "seconds": float(rng.random()), "epochs": int(rng.integers(0, 9)),
+             "state": "diverged" if bad else "complete"}
+        )  # fmt: skip
+    return found
+
+
+def told(kept: list[dict[str, Any]]) -> str:
+    return repr([{**row, "params": dict(sorted(row["params"].items()))} for row in kept])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_trials_come_back_to_the_digit(tmp_path: Path, seed: int) -> None:
+    written = {"a+drawn-N0010-s0": rows(9, seed), "b": rows(4, seed + 100), "c": []}
+    Journal(tmp_path / "t.log").add(written, SPACE)
+    read = Journal(tmp_path / "t.log")
+    for cell, mine in written.items():
+        assert told(read.rows(cell)) == told(mine)
+    read.add({"b": rows(3, seed, first=4)}, SPACE)
+    assert told(Journal(tmp_path / "t.log").rows("b")) == told(written["b"] + rows(3, seed, first=4))
+    assert Journal(tmp_path / "t.log").rows("unknown") == []
+
+
+def test_optuna_opens_the_file_as_it_is(tmp_path: Path) -> None:
+    """What its dashboard does: a journal storage on the path, with its lock and its reader."""
+    mine = rows(12, 3)
+    journal = Journal(tmp_path / "t.log")
+    journal.add({"a": mine}, SPACE)
+    journal.decide(["a"], 40)
+    storage = JournalStorage(JournalFileBackend(str(tmp_path / "t.log")))
+    study = optuna.load_study(study_name="a", storage=storage)
+    assert len(study.trials) == 12
+    assert study.best_value == min(row["value"] for row in mine if row["state"] == "complete")
+    assert study.user_attrs == {"trials": 40}
+    assert set(study.best_params) == set(SPACE)
+    study.enqueue_trial({"scale": 2.0})  # and writes to it
+    assert len(Journal(tmp_path / "t.log").rows("a")) == 12
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_write_that_was_cut_off_anywhere_loses_its_last_trial_at_most(tmp_path: Path, seed: int) -> None:
+    file = tmp_path / "t.log"
+    Journal(file).add({"a": rows(5, 1)}, SPACE)
+    whole = file.read_bytes()
+    Journal(file).add({"a": rows(1, 2, first=5)}, SPACE)
+    longer = file.read_bytes()
+    cut = int(np.random.default_rng(seed).integers(len(whole), len(longer)))
+    file.write_bytes(longer[:cut])
+    again = Journal(file)
+    assert told(again.rows("a")) == told(rows(5, 1))
+    again.add({"a": rows(1, 3, first=5), "b": rows(2, 4)}, SPACE)
+    last = Journal(file)
+    assert told(last.rows("a")) == told(rows(5, 1) + rows(1, 3, first=5))
+    assert told(last.rows("b")) == told(rows(2, 4))
+
+
+def _write(file: Path, name: str) -> None:
+    journal = Journal(file)
+    journal.decide([name], 30)
+    for number in range(30):
+        journal.add({name: rows(1, number, first=number)}, SPACE)
+
+
+def test_several_processes_write_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "t.log"
+    Journal(file)
+    context = get_context("spawn")
+    workers = [context.Process(target=_write, args=(file, name)) for name in "abc"]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+        assert worker.exitcode == 0
+    wanted = [row for number in range(30) for row in rows(1, number, first=number)]
+    for name in "abc":
+        assert told(Journal(file).rows(name)) == told(wanted)
+        assert Journal(file).count(name) == 30
+    assert [entry.name for entry in tmp_path.iterdir()] == ["t.log"]  # no lock is left
+
+
+def test_a_file_that_is_no_journal_is_one_line(tmp_path: Path) -> None:
+    for number, content in enumerate((b"hello\nworld\n", b"[1]\n[2]\n", b'{"op_code": 4}\n{"op_code": 4}\n')):
+        file = tmp_path / f"{number}.log"
+        file.write_bytes(content)
+        with pytest.raises(ResultError, match="damaged") as caught:
+            Journal(file)
+        assert "\n" not in str(caught.value)

@@ -1,0 +1,165 @@
+"""A search that was interrupted goes on to the digits of one that was not; a budget is a number of trials."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.hybrid import search as searches
+from shipid.hybrid.journal import Journal
+from shipid.hybrid.method import Task
+from shipid.hybrid.methods import METHODS, method_of
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import CLOSING, TIMED, Search, affordable
+from tests.hybrid.worlds import HORIZON, World, ship, world
+
+#: settings that make each method quick, with as many trials as an interruption needs
+QUICK: dict[str, dict[str, Any]] = {
+    "calibrator": {"trials": 3, "units": 8, "averaged": 2},
+    "forest": {"trials": 3, "trees": 3},
+    "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
+    "learned-force": {"trials": 3, "units": 3, "iterations": 2},
+    "modules": {"trials": 3, "units": 4, "centres": 16},
+    "one-step": {"trials": 3, "units": 8, "averaged": 2},
+    "path-drawn": {"trials": 3, "units": 8, "averaged": 2},
+    "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12), "layers": 1},
+    "recurrent": {"trials": 3, "epochs": 2, "units": 4, "seconds": 4.0},
+}
+
+
+def test_every_method_that_searches_is_tested_here() -> None:
+    assert set(QUICK) == {kind for kind, method in METHODS.items() if method.compensates}
+
+
+@pytest.fixture(scope="module")
+def here() -> World:
+    return world(ship().with_values({"hull.derivatives.N_ur": -2.0e6}), ship(), runs=6, seconds=30, past=4, known=True)
+
+
+def quick(kind: str, **settings: Any) -> Any:
+    if kind == "forest":
+        pytest.importorskip("sklearn")
+    return method_of(kind, QUICK[kind] | settings)
+
+
+def cases_of(here: World, kind: str) -> dict[str, Physics]:
+    return {"a": here.physics, **({"none": Physics(None, HORIZON, 1.0)} if METHODS[kind].meets_none else {})}
+
+
+class Stopped(Exception):
+    pass
+
+
+class Stopping(Journal):
+    """A journal whose process dies before the write that would take it beyond so many trials."""
+
+    left = 0
+
+    def add(self, rows: Any, space: Any) -> None:
+        if self.left <= 0:
+            raise Stopped
+        self.left -= 1
+        super().add(rows, space)
+
+
+def digits(found: Any, here: World, kind: str) -> dict[str, Any]:
+    """What a fit gave, without what a clock measured."""
+    instants = here.test.instants(known=True)
+    told = {}
+    for name, physics in cases_of(here, kind).items():
+        fitted = found[name]
+        rows = [{key: value for key, value in row.items() if key != "seconds"} for row in fitted.trials]
+        told[name] = rows, fitted.corrector.predict(physics, instants, physics.paths(instants)).tobytes()
+    return told
+
+
+def task_in(here: World, kind: str, journal: Journal | None) -> Task:
+    return replace(here.task(cases_of(here, kind), seed=2), journal=journal, cells={"a": "a+way-N0006-s2"})
+
+
+@pytest.mark.parametrize(("kind", "after"), [*((kind, 1 + len(kind) % 2) for kind in QUICK), ("path-trained", 12)])
+def test_a_search_that_was_interrupted_ends_with_the_same_digits(kind: str, after: int, here: World, tmp_path) -> None:
+    method = quick(kind)
+    whole = digits(method.fit(task_in(here, kind, None)), here, kind)
+    file = tmp_path / "trials.log"
+    journal = Stopping(file)
+    journal.left = after
+    with suppress(Stopped):  # those that write once at the end have ended
+        method.fit(task_in(here, kind, journal))
+    resumed = method.fit(task_in(here, kind, Journal(file)))
+    assert digits(resumed, here, kind) == whole
+    again = Journal(file)  # and the journal holds it all, each trial once
+    for name, cell in (("a", "a+way-N0006-s2"), ("none", "none")):
+        if name in resumed:
+            kept = again.rows(cell)
+            assert [row["number"] for row in kept] == list(range(len(resumed[name].trials)))
+            for row, other in zip(kept, resumed[name].trials, strict=True):
+                assert {**row, "seconds": 0} == {**other, "seconds": 0}
+
+
+def test_the_sampler_learns_from_the_trials_before(here: World) -> None:
+    """The law above would be empty if TPE had not begun: its first ten trials are drawn at random."""
+    method = quick("path-trained")
+    first = method.fit(task_in(here, "path-trained", None))["a"].trials
+    other = method.model_copy(update={"epochs": 6}).fit(task_in(here, "path-trained", None))["a"].trials
+    params = [[row["params"]["learning_rate"] for row in rows] for rows in (first, other)]
+    assert params[0][:10] == params[1][:10]
+    assert params[0][11:] != params[1][11:]
+
+
+@pytest.mark.parametrize("kind", ["path-drawn", "one-step", "path-trained"])
+def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World, tmp_path, monkeypatch) -> None:
+    """Whatever the clock says the second time: what was decided is written down."""
+    file = tmp_path / "trials.log"
+    method = quick(kind, budget=100.0) if kind != "path-drawn" else quick(kind, budget=100.0, averaged=1)
+    monkeypatch.setattr(searches, "affordable", lambda *known: 2 if known[-1] else None)
+    first = method.fit(task_in(here, kind, Journal(file)))
+    assert {len(found.trials) for found in first.values()} == {2}
+    monkeypatch.setattr(searches, "affordable", lambda *_: 3)
+    second = method.fit(task_in(here, kind, Journal(file)))
+    assert digits(second, here, kind) == digits(first, here, kind)
+    assert Journal(file).count("a+way-N0006-s2") == 2
+    named = quick(kind, trials=2).model_copy(update={"averaged": 1} if kind == "path-drawn" else {})
+    assert digits(named.fit(task_in(here, kind, None)), here, kind) == digits(first, here, kind)
+
+
+def test_a_price_is_that_of_the_trials_after_the_first() -> None:
+    assert affordable(10.0, 0.0, []) is None
+    assert affordable(10.0, 0.0, [0.5]) is None
+    assert affordable(10.0, 0.0, [2.0, 0.5, 0.5, 0.5]) == 20 - CLOSING
+    assert affordable(10.0, 4.0, [2.0, 0.5, 0.5, 0.5]) == 12 - CLOSING
+    assert affordable(10.0, 0.0, [6.0]) == 1  # one trial took more than half
+    assert affordable(10.0, 9.0, [0.1]) == 10 - CLOSING
+    assert affordable(1.0, 0.0, [0.2] * TIMED) == 5 - CLOSING
+    assert affordable(1e-9, 0.0, [5.0]) == 1
+    assert affordable(100.0, 0.0, [0.0] * TIMED) > 1000  # a clock that does not tick
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_budget_is_kept_by_trials_of_any_price(seed: int) -> None:
+    """Drawn prices: the trials after the first cost about the same; what all cost is the budget, give or take one."""
+    rng = np.random.default_rng(seed)
+    price, before, budget = rng.uniform(0.01, 1.0), rng.uniform(0.0, 2.0), rng.uniform(8.0, 20.0)
+    seconds: list[float] = []
+    while (found := affordable(budget, before, seconds)) is None or len(seconds) < found:
+        seconds.append(price * rng.uniform(0.98, 1.02))
+    assert budget - 3 * price < before + sum(seconds) + CLOSING * price < 1.03 * budget + price
+
+
+def test_foundations_that_go_together_share_a_budget(here: World) -> None:
+    method = PathDrawn(budget=50.0)
+    search = Search(here.task(cases_of(here, "path-drawn")), ["a", "none"], method)
+    for number, _ in search.left(count()):
+        row = {"number": number, "params": {}, "value": 1.0, "seconds": 1.0, "epochs": 0, "state": "complete"}
+        search.keep({"a": row, "none": row})
+        if number > 200:
+            break
+    assert search.count is not None
+    assert abs(search.count - 50) <= 2  # 2 x 50 s at 2 s a trial of both
+    assert search.done == search.count

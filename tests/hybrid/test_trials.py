@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.method import Fitted
+from shipid.hybrid.modules import Modules
+from shipid.hybrid.one_step import OneStep
+from shipid.hybrid.trials import (
+    diverged,
+    fit_each,
+    mean_square,
+    points_of,
+    ridge_trial,
+    ridges_of,
+    row_of,
+    some_of,
+    sound,
+    used,
+)
+from tests.hybrid.tasks import task_of
+
+RUNS = {"u": np.arange(12.0)}
+FOLDS = [(np.arange(0, 6), np.arange(6, 9)), (np.arange(3, 9), np.arange(0, 3))]
+
+
+def task(**options):
+    rng = np.random.default_rng(4)
+    targets = {name: rng.normal(size=(5, 12, 2)) for name in ("one", "other")}
+    return task_of(RUNS, (), targets, FOLDS, 0, **options)
+
+
+def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
+    points = list(points_of(OneStep(trials=16, offset=1.5)))
+    assert len(points) == 16
+    assert {point["offset"] for point in points} == {1.5}
+    assert all(1 <= point["motion_scale"] <= 16 for point in points)
+    assert len({point["motion_scale"] for point in points}) == 16
+    assert len(list(points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0)))) == 1
+    np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
+    assert ridges_of(0.5, 4) == [0.5]
+
+
+def test_some_windows_are_drawn_by_a_seed_alone():
+    many = np.arange(100) * 2
+    np.testing.assert_array_equal(some_of(many, 100, 0), many)
+    few = some_of(many, 10, 3)
+    np.testing.assert_array_equal(few, some_of(many, 10, 3))
+    assert len(set(few)) == 10
+    assert set(few) <= set(many)
+
+
+def test_every_foundation_is_fitted_or_has_diverged():
+    """Paths that are no numbers on windows of the folds: all trials diverged, and the method is not asked."""
+    told, asked = [], []
+    here = task(on_trial=lambda done, count: told.append((done, count)))
+    broken = here.cases["one"].paths.copy()
+    broken[0, 4] = np.nan
+    far = here.cases["other"].paths.copy()
+    far[0, 11] = np.nan  # a window of no fold
+    here = replace(
+        here,
+        cases={
+            "one": replace(here.cases["one"], paths=broken),
+            "other": replace(here.cases["other"], paths=far),
+        },
+    )
+
+    def fit(name):
+        asked.append(name)
+        return Fitted(Unchanged({}), [], 1.0)
+
+    fitted = fit_each(here, [{"a": 1.0}, {"a": 2.0}], fit)
+    assert asked == ["other"]
+    assert told == [(1, 2), (2, 2)]
+    assert fitted["one"].corrector is None
+    assert [(row["number"], row["params"], row["state"]) for row in fitted["one"].trials] == [
+        (0, {"a": 1.0}, "diverged"),
+        (1, {"a": 2.0}, "diverged"),
+    ]
+    assert (sound(here, "one"), sound(here, "other")) == (False, True)
+    np.testing.assert_array_equal(used(here), np.arange(9))
+    assert diverged([]).trials == []
+
+
+def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
+    """Three correctors in one that miss the true path by 2, 1 and 3 m; of two folds the mean is taken."""
+    here, seen = task(), []
+    missed = (2.0, 1.0, 3.0)
+
+    class Off:
+        def predict(self, _physics, instants, _paths):
+            seen.append(np.split(instants.columns["u"], 3))
+            count = len(instants) // 3
+            return np.concatenate([np.full((5, count, 2), value) for value in missed], axis=1)
+
+    trained = []
+
+    def solved(training):
+        trained.append(training)
+        return Off()
+
+    assert ridge_trial(here, "one", [0.1, 1.0, 10.0], 2, solved) == (1.0, 1.0)  # the true path is 0: 1 m^2
+    assert [list(part) for part in trained] == [list(training) for training, _ in FOLDS]
+    for (first, *others), (_, validation) in zip(seen, FOLDS, strict=True):
+        assert len(first) == 2
+        assert set(first) <= set(validation)
+        assert all(np.array_equal(first, other) for other in others)
+
+
+@pytest.mark.parametrize(("value", "state"), [(2.0, "complete"), (np.inf, "diverged"), (np.nan, "diverged")])
+def test_a_trial_that_is_no_number_has_diverged(value, state):
+    row = row_of(3, {"ridge": 0.5}, value, 0.0, epochs=7)
+    assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
+    assert row["seconds"] > 0
+
+
+def test_a_path_that_is_no_number_has_an_infinite_error():
+    paths = np.zeros((2, 3, 2))
+    assert mean_square(paths, paths + 2.0) == 4.0
+    paths[1, 1, 0] = np.nan
+    assert mean_square(paths, np.zeros((2, 3, 2))) == np.inf

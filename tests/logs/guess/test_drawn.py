@@ -1,0 +1,32 @@
+"""A few logs drawn by seed: the guess is right, or says that it is unsure; the benchmark `guess` takes 400."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.logs.drawn_logs import draw, judge
+
+SEEDS = range(300, 320)
+LEAST = 0.85  # share right of these
+
+
+@pytest.fixture(scope="module")
+def words(tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
+    return {seed: judge(draw(seed, tmp_path_factory.mktemp("drawn") / "logs")).word for seed in SEEDS}
+
+
+def test_nothing_is_wrong_and_silent(words: dict[int, str]) -> None:
+    assert [seed for seed, word in words.items() if word == "silent"] == []
+
+
+def test_most_are_right(words: dict[int, str]) -> None:
+    assert sum(word == "right" for word in words.values()) >= LEAST * len(words)
+
+
+def test_a_log_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
+    first, second = (draw(7, tmp_path / name / "logs") for name in ("a", "b"))
+    files = [sorted(file for file in (tmp_path / name).rglob("*") if file.is_file()) for name in ("a", "b")]
+    assert [file.read_bytes() for file in files[0]] == [file.read_bytes() for file in files[1]]
+    assert first.asks == second.asks

@@ -1,0 +1,75 @@
+"""A folder, its sub-folders and a glob are one source of several runs; a file that cannot be read is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shipid.errors import DataError
+from shipid.files import write_new
+from shipid.logs.guess.columns import guess
+from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.guess.sources import kind_said, read_source
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.simulated import as_bridge, si_log
+
+LOG = as_bridge(si_log()).round(4)
+
+
+def folder_of(path: Path, *names: str) -> Path:
+    for index, name in enumerate(names):
+        file = path / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        LOG.iloc[240 * (index + 1) : 240 * (index + 1) + 900].to_csv(file, index=False)
+    return path
+
+
+def test_a_folder_is_one_source_that_imports(tmp_path: Path) -> None:
+    logs = folder_of(tmp_path / "logs", "day1/ZZ20-20_1.csv", "day2/TC25_1.csv", "day2/run3.csv")
+    (logs / "day2" / "notes.csv").write_text("nothing to see\nhere\n")
+    found = guess(logs)
+    assert found.source.pattern == "**/*.csv"
+    assert list(found.source.skipped) == ["day2/notes.csv"]
+    mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
+    dataset = import_log(read_mapping(mapping), logs)
+    assert dataset.runs == ["day1/ZZ20-20_1", "day2/TC25_1", "day2/run3"]
+    assert dataset.metadata["manoeuvres"] == {"day1/ZZ20-20_1": "zigzag", "day2/TC25_1": "turning"}
+    assert "notes.csv is left out" in mapping.read_text()
+
+
+def test_a_glob_takes_the_files_that_fit(tmp_path: Path) -> None:
+    folder_of(tmp_path, "ZZ_1.csv", "ZZ_2.csv", "other.csv")
+    source = read_source(tmp_path / "ZZ_*.csv")
+    assert (source.path, source.pattern, sorted(source.files)) == (tmp_path, "ZZ_*.csv", ["1", "2"])
+
+
+def test_a_file_with_other_columns_is_left_out_and_named(tmp_path: Path) -> None:
+    folder_of(tmp_path, "a.csv", "b.csv", "c.csv")
+    LOG.drop(columns="psi").to_csv(tmp_path / "d.csv", index=False)
+    source = read_source(tmp_path)
+    assert sorted(source.files) == ["a", "b", "c"]
+    assert "lacks 'psi'" in source.skipped["d.csv"]
+
+
+def test_a_folder_without_a_log(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="a folder without a log"):
+        read_source(tmp_path)
+    (tmp_path / "a.csv").write_text("no\n")
+    with pytest.raises(DataError, match=r"no file can be read: a\.csv"):
+        read_source(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("stem", "kind"),
+    [
+        ("zigzag_20_20_1", "zigzag"),
+        ("ZZ10-10", "zigzag"),
+        ("TC35_2", "turning"),
+        ("Drehkreis_35_1", "turning"),
+        ("run007", None),
+        ("log", None),
+    ],
+)
+def test_a_name_says_the_kind(stem: str, kind: str | None) -> None:
+    assert kind_said(stem) == kind

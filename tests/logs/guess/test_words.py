@@ -1,0 +1,79 @@
+"""Names of columns, cut into parts, fit their meanings in several languages and styles."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipid.logs.guess.words import OTHERS, PHRASES, fits, is_order, parts_of, side_of
+from shipid.physics.signals import SIGNALS
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("GPS_Lat", ("gps", "lat")),
+        ("ShaftRPM_port", ("shaft", "rpm", "port")),
+        ("yawRate", ("yaw", "rate")),
+        ("Ruderwinkel [Grad]", ("ruder", "winkel")),
+        ("Kurs über Grund", ("kurs", "ueber", "grund")),
+        ("ψ_m", ("psi", "m")),
+        ("eta_1", ("eta", "1")),
+        ("", ()),
+        ("[deg]", ()),
+    ],
+)
+def test_parts(name: str, parts: tuple[str, ...]) -> None:
+    assert parts_of(name) == parts
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning"),
+    [
+        ("GPS_Lat", "latitude"),
+        ("Rudder angle [deg]", "delta"),
+        ("psi_meas", "psi"),
+        ("Heading(deg T)", "psi"),
+        ("v_long_ms", "u"),
+        ("Speed trans.", "v"),
+        ("yawRate", "r"),
+        ("ShaftRPM_port", "n"),
+        ("Wellendrehzahl", "n"),
+        ("Svingrate", "r"),
+        ("WIND SPD", "V_w"),
+        ("water depth", ""),
+        ("STW", ""),
+    ],
+)
+def test_the_best_meaning(name: str, meaning: str) -> None:
+    scores = fits(name)
+    assert max(scores, key=lambda one: scores[one]) == meaning
+
+
+@pytest.mark.parametrize("name", ["Heading setpoint", "psi_d", "Sollkurs", "HDG SET", "rudder_cmd"])
+def test_an_order_is_no_measured_motion(name: str) -> None:
+    assert is_order(name)
+    motion = {meaning for meaning in fits(name) if meaning in SIGNALS and SIGNALS[meaning].role == "motion"}
+    assert not motion
+
+
+def test_an_order_of_the_rudder_is_a_command() -> None:
+    assert fits("Rudder order")["delta"] > 0.6
+
+
+@pytest.mark.parametrize(
+    ("name", "side"), [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None)]
+)
+def test_sides(name: str, side: str | None) -> None:
+    assert side_of(name) == side
+
+
+def test_every_phrase_fits_its_meaning() -> None:
+    for meaning, phrases in {**PHRASES, "": OTHERS}.items():
+        for phrase in phrases.split(", "):
+            if not is_order(phrase):
+                assert fits(phrase).get(meaning, 0.0) > 0.6, (meaning, phrase, fits(phrase))
+
+
+def test_a_name_that_says_nothing_fits_nothing() -> None:
+    assert fits("Kanal 17") == {}
+    assert fits("") == {}

@@ -1,0 +1,29 @@
+"""Short names are explained, words are left alone, and no text becomes a tag."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from shipid.report.glossary import MEANINGS, glossed
+
+
+def plain(text: str) -> str:
+    return re.sub(r"<[^>]*>", "", text)
+
+
+@pytest.mark.parametrize("name", MEANINGS)
+def test_every_short_name_is_explained(name: str) -> None:
+    assert f">{name}</abbr>" in glossed(f"its {name} = 3")
+
+
+def test_words_are_left_alone() -> None:
+    assert glossed("A model and H-shaped bars at N_Dx") == "A model and H-shaped bars at N_Dx"
+    assert glossed("A model of 3 m").count("abbr") == 0
+
+
+def test_no_text_becomes_a_tag() -> None:
+    said = glossed('<b onclick="x">H_90</b> & more')
+    assert "<b" not in said
+    assert plain(said) == "&lt;b onclick=&#34;x&#34;&gt;H_90&lt;/b&gt; &amp; more"

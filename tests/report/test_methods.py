@@ -1,0 +1,75 @@
+"""The section and the page that compare methods."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.report.comparison import write_comparison
+from shipid.report.methods import MethodsContent, methods, table, verdicts
+from shipid.study.methods import COLUMNS, EVERY
+
+
+def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: bool = True) -> pd.DataFrame:
+    """Rows drawn by a seed; of method `c` some cells fail, of method `lost` all."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for condition in conditions:
+        for family in ("nominal", "none", EVERY):
+            for N_D in (3, 30):
+                for method in ("a", "b", "c", *(["lost"] if failing else [])):
+                    H = float(rng.uniform(0.5, 9)) if method != "lost" else np.nan
+                    difference = 0.0 if method == "a" else H - 3
+                    failed = {"c": 1 if failing else 0, "lost": 4}.get(method, 0)
+                    rows.append(
+                        dict(zip(COLUMNS, [condition, family, N_D, method, 4, failed, H, 2 * H, 1.7 * H, 2.0, 8.0, "a",
+                             4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
+                             difference + 0.1, np.nan, np.nan], strict=True))
+                    )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def content(rows: pd.DataFrame) -> MethodsContent:
+    return MethodsContent("Which is <best>?", "compared", {"methods": rows}, {"study": "x"})
+
+
+def test_the_sentences_name_the_least_error_among_methods_that_never_failed() -> None:
+    rows = frame(1)
+    for said, (condition, N_D) in zip(
+        verdicts(rows), [("calm", 3), ("calm", 30), ("rough", 3), ("rough", 30)], strict=True
+    ):
+        mine = rows[rows.condition.eq(condition) & rows.family.eq(EVERY) & rows.N_D.eq(N_D) & rows.failed.eq(0)]
+        best = mine.loc[mine.H.idxmin()]
+        assert said.startswith(f"{condition.capitalize()}, N_D = {N_D}: {best.method} errs least")
+        assert "c (1 of 4) and lost (4 of 4)" in said
+
+
+@pytest.mark.parametrize("conditions", [("",), ("calm", "rough")])
+def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: tuple[str, ...]) -> None:
+    rows = frame(2, conditions)
+    drawn, told = methods(content(rows)), table(content(rows))
+    assert drawn is not None
+    assert told is not None
+    assert len(drawn.views) == len(conditions) * 2
+    assert all(len(panels) == 2 for panels in drawn.views.values())
+    assert len(told.rows) == len(rows)
+    assert {len(row) for row in told.rows} == {len(told.columns)} == {len(told.numeric)}
+    for given, shown in zip(rows.to_dict("records"), told.rows, strict=True):
+        texts = [cell.text for cell in shown]
+        assert given["method"] in texts
+        assert ("–" if np.isnan(given["H"]) else f"{given['H']:.2f}") in texts
+        assert any(cell.bad for cell in shown) == bool(given["failed"])
+
+
+def test_the_page_is_one_file_that_escapes_what_it_is_told(tmp_path: Path) -> None:
+    text = write_comparison(content(frame(3)), tmp_path / "report.html").read_text()
+    assert "Which is &lt;best&gt;?" in text
+    assert 'id="methods-table"' in text
+
+
+def test_nothing_to_compare_is_no_section() -> None:
+    assert methods(content(pd.DataFrame(columns=COLUMNS))) is None
+    assert table(content(pd.DataFrame(columns=COLUMNS))) is None

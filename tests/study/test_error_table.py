@@ -1,0 +1,42 @@
+"""Errors by test manoeuvre: the means of a study are the weighted means of its table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipid.study.error_table import ALONE, error_table
+from tests.study.byhand import grid
+
+H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
+
+
+def test_means_are_those_of_the_cells(made: Any) -> None:
+    table = error_table(made(grid(H), runs=8), ["good", "bad"])
+    assert (table.amounts, table.runs) == ((10, 30), 8)
+    assert [table.mean("good", k) for k in (0, 1)] == pytest.approx([1.5, 1.0])
+    assert table.mean("bad", ALONE) == pytest.approx(6.0)
+    lead = table.against("none", ["good", "bad"], 0)
+    assert lead.mean.tolist() == pytest.approx([7.5, 6.0])
+    assert (lead.low > 0).all()
+
+
+def test_a_model_without_a_result_in_every_cell_is_not_there(made: Any) -> None:
+    table = error_table(made(grid({**H, "bad": (3.0, None)}), runs=8), ["good", "bad"])
+    assert set(table.H) == {"good", "none"}
+
+
+def test_percentiles_are_taken_within_manoeuvres(made: Any) -> None:
+    curves = {("good", 10, 0): [0.0, 0.0, 0.0, 10.0]}
+    table = error_table(made(grid(H), curves=curves, runs=8), ["good"], "H_90")
+    assert table.mean("good", 0) == pytest.approx(np.quantile([0.0, 0.0, 0.0, 10.0], 0.9))
+
+
+def test_physics_alone_has_no_noise_of_training(made: Any) -> None:
+    table = error_table(made(grid(H), runs=8), ["good", "bad"])
+    alone = table.compare([[(1.0, "bad", ALONE), (-1.0, "good", ALONE)]])
+    trained = table.compare([[(1.0, "bad", 0), (-1.0, "good", 0)]])
+    relative = [(found.high - found.low)[0] / found.mean[0] for found in (alone, trained)]
+    assert relative[0] < relative[1]

@@ -1,0 +1,117 @@
+"""Intervals over test manoeuvres: what they cover, and what corrections do by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from shipid.study.evidence import (
+    FEWEST_RUNS,
+    LEVEL,
+    TRAINING,
+    at_least,
+    by_chance,
+    contrasts,
+    holm,
+    over_worlds,
+    resampled_means,
+    training_noise,
+)
+
+
+@pytest.mark.parametrize("runs", [6, 20])
+@pytest.mark.parametrize("tail", ["normal", "heavy", "skewed"])
+def test_intervals_cover(runs: int, tail: str) -> None:
+    """Of 400 differences of mean 0, at most 5 % and what chance adds have an interval that is free of 0 on one side."""
+    rng = np.random.default_rng([runs, len(tail)])
+    draw = {
+        "normal": lambda: rng.normal(size=(400, runs)),
+        "heavy": lambda: rng.standard_t(3, (400, runs)),
+        "skewed": lambda: rng.lognormal(0, 0.5, (400, runs)) - np.exp(0.125),
+    }[tail]
+    found = contrasts(draw(), rng.integers(30, 60, runs).astype(float))
+    limit = stats.binom.ppf(0.999, 400, 0.05)
+    assert (found.low > 0).sum() <= limit
+    assert (found.high < 0).sum() <= limit
+
+
+def test_an_interval_free_of_0_and_a_small_p_value_are_the_same() -> None:
+    rng = np.random.default_rng(2)
+    found = contrasts(rng.normal(0.4, 1.0, (300, 12)), np.ones(12), 0.05)
+    same = (found.low > 0) == (found.above <= LEVEL)
+    assert same.mean() > 0.99, "but for the rounding of a quantile"
+    assert ((found.high < 0) == (found.below <= LEVEL)).mean() > 0.99
+
+
+def test_student_for_normal_differences_by_hand() -> None:
+    values = np.random.default_rng(3).normal(1.0, 1.0, (1, 30))
+    found = contrasts(values, np.ones(30))
+    wide = stats.t.ppf(0.975, 29) * values.std(ddof=1) / 30**0.5
+    assert found.low[0] <= values.mean() - wide + 1e-9
+    assert found.high[0] == pytest.approx(values.mean() + wide, rel=0.15)
+
+
+def test_weights_are_windows_and_training_widens() -> None:
+    values = np.array([[1.0, 2.0, 3.0, 4.0, 5.0]])
+    assert contrasts(values, np.array([1.0, 1.0, 1.0, 1.0, 4.0])).mean[0] == pytest.approx(30 / 8)
+    narrow, wide = contrasts(values, np.ones(5)), contrasts(values, np.ones(5), 2.0)
+    assert wide.low[0] < narrow.low[0]
+    assert wide.high[0] > narrow.high[0]
+    assert wide.above[0] > narrow.above[0]
+
+
+def test_differences_that_are_all_alike() -> None:
+    found = contrasts(np.array([[0.5] * 6, [0.0] * 6]), np.ones(6))
+    assert found.low[0] == pytest.approx(0.5)
+    assert found.above[0] < 1e-6
+    assert (found.low[1], found.high[1]) == (0.0, 0.0)
+    assert found.above[1] >= 0.5
+
+
+def test_too_few_manoeuvres_have_no_interval() -> None:
+    found = contrasts(np.ones((2, FEWEST_RUNS - 1)), np.ones(FEWEST_RUNS - 1))
+    assert found.mean.tolist() == [1.0, 1.0]
+    assert np.isnan([*found.low, *found.high, *found.above, *found.below]).all()
+    assert len(found) == 2
+
+
+def test_holm_by_hand() -> None:
+    """0.01 x 3, then 0.02 x 2, then 0.03 x 1, never falling."""
+    assert holm(np.array([0.02, 0.01, 0.03])) == pytest.approx([0.04, 0.03, 0.04])
+    assert holm(np.array([0.5, 0.9])) == pytest.approx([1.0, 1.0])
+
+
+def test_at_least_so_many() -> None:
+    chances = np.array([0.001, 0.01, 0.02, 0.9])
+    assert at_least(chances, 1) == pytest.approx(0.004)
+    assert at_least(chances, 3) == pytest.approx(0.04)
+    assert at_least(chances, 4) == pytest.approx(0.9)
+
+
+def test_an_order_by_chance() -> None:
+    """Five models in the very order have one of 120 orders, or half of them where nothing is alike."""
+    A = np.arange(5.0)
+    assert by_chance(A, np.array([[1.0, 2.0, 3.0, 4.0, 5.0]]))[0] == pytest.approx(1 / 120, abs=0.006)
+    assert by_chance(A, np.array([[5.0, 4.0, 3.0, 2.0, 1.0]]))[0] == 1.0
+
+
+def test_resampled_means_keep_pairs() -> None:
+    values = np.random.default_rng(4).normal(size=(2, 3, 7))
+    drawn = resampled_means(np.concatenate([values, values + 1.0]), np.arange(1.0, 8.0))
+    assert drawn.shape[1:] == (4, 3)
+    np.testing.assert_allclose(drawn[:, 2:] - drawn[:, :2], 1.0)
+
+
+def test_noise_of_training() -> None:
+    """One seed says nothing; many seeds of many models take the place of what is assumed."""
+    assert training_noise([np.array([2.0]), np.array([3.0])]) == pytest.approx(TRAINING)
+    rng = np.random.default_rng(5)
+    many = [rng.normal(2.0, 0.2, 5) for _ in range(200)]
+    assert training_noise(many) == pytest.approx(0.1, rel=0.1)
+
+
+def test_worlds() -> None:
+    assert np.isnan(over_worlds(np.array([1.0]))).all()
+    wide = 12.706 * 0.5**0.5 / 2**0.5
+    assert over_worlds(np.array([1.0, 2.0])) == pytest.approx((1.5 - wide, 1.5 + wide), abs=1e-3)

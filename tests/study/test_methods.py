@@ -1,0 +1,85 @@
+"""What the comparison of methods says, on tables made by hand and drawn by seed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.study.methods import COLUMNS, EVERY, compared
+
+
+def cells(
+    rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, **more: Any
+) -> pd.DataFrame:
+    """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much."""
+    rows = []
+    for world in range(worlds):
+        for family, members in (("moderate", 2), ("none", 1)):
+            for member in range(members):
+                hard = rng.uniform(1.0, 4.0, runs)
+                for method, more_error in (("drawn", 0.0), ("other", effect)):
+                    error = hard + more_error + noise * rng.standard_normal(runs)
+                    counts = {f"T{k}": int(5 + k % 3) for k in range(runs)}
+                    sums = {name: float(error[k] * counts[name]) for k, name in enumerate(counts)}
+                    H = sum(sums.values()) / sum(counts.values())
+                    rows.append(
+                        {"condition": "", "world": str(world), "foundation": f"{family}-{member}", "family": family,
+                         "method": method, "N_D": 10, "seed": world, "status": "ok", "H": H, "H_90": 2 * H,
+                         "end": 1.5 * H, "seconds": 3.0, "trials": 4, "sums": sums, "counts": counts, **more}
+                    )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
+    return frame[frame.method.eq(method) & frame.family.eq(family)].iloc[0]
+
+
+def test_the_difference_is_that_of_the_means() -> None:
+    made = cells(np.random.default_rng(0), 0.5)
+    found = compared(made, "drawn")
+    assert list(found.columns) == COLUMNS
+    for family in ("moderate", "none"):
+        mine = made[made.family.eq(family)].groupby("method").H.mean()
+        assert row(found, family=family).difference == pytest.approx(mine["other"] - mine["drawn"])
+        assert pytest.approx(mine["other"]) == row(found, family=family).H
+    assert row(found, "drawn").difference == 0
+    assert row(found).pairs == 4
+    assert row(found).runs == 24  # 12 runs of each world, whatever the number of members
+    assert row(found).worlds == 2
+    assert row(found).least <= row(found).difference <= row(found).greatest
+    assert np.isnan(row(found).world_low)
+    assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    """100 tables without and with an effect: 95 % intervals over test runs, give or take what chance allows."""
+    rng = np.random.default_rng(1)
+    for effect in (0.0, -0.4):
+        inside, free = 0, 0
+        for _ in range(100):
+            found = row(compared(cells(rng, effect), "drawn"))
+            inside += found.low <= effect <= found.high
+            free += found.high < 0
+        assert inside >= 86
+        assert free <= 9 if effect == 0 else free >= 90
+
+
+def test_a_failed_cell_is_counted_and_not_averaged() -> None:
+    made = cells(np.random.default_rng(2), 1.0)
+    worst = made.index[made.method.eq("other") & made.family.eq("moderate")][0]
+    made.loc[worst, "status"] = "diverged"
+    made.loc[worst, ["H", "H_90", "end"]] = np.nan
+    made.at[worst, "sums"] = {}
+    found = row(compared(made, "drawn"))
+    assert (found.failed, found.cells, found.pairs) == (1, 4, 3)
+    assert np.isfinite([found.H, found.difference, found.low, found.high]).all()
+    assert row(compared(made, "drawn"), "drawn").failed == 0
+    every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
+    lost = row(compared(every, "drawn"))
+    assert lost.failed == lost.cells
+    assert lost.pairs == 0
+    assert np.isnan(lost.H)
+    assert np.isnan(lost.difference)

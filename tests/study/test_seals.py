@@ -1,0 +1,95 @@
+"""Seals: what is damaged is named and removed, what is edited is refused, what is whole is left alone."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from shipid.errors import ResultError
+from shipid.files import read_json, write_json
+from shipid.study import seals, store
+from shipid.study.check import check_folder
+
+
+@pytest.fixture
+def folder(tiny_run: Path, tmp_path: Path) -> Path:
+    shutil.copytree(tiny_run, tmp_path / "run")
+    return tmp_path / "run"
+
+
+def test_a_finished_run_is_sealed(folder: Path) -> None:
+    assert seals.faults(folder) == []
+    seals.check(folder)
+    assert list(seals.mend(folder)) == []
+    sealed = {line.split("  ")[1] for file in (folder / "seals").iterdir() for line in file.read_text().splitlines()}
+    for name in ("dataset.parquet", "test.npz", "envelope.json", "foundations.json", "results.parquet"):
+        assert name in sealed
+    assert {f"cells/{file.name}" for file in (folder / "cells").iterdir()} <= sealed
+
+
+@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum here")
+def test_the_usual_tool_reads_seals(folder: Path) -> None:
+    files = [str(file.relative_to(folder)) for file in (folder / "seals").iterdir()]
+    done = subprocess.run(["sha256sum", "--check", "--strict", "--quiet", *files], cwd=folder, capture_output=True)
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["missing", "empty", "half", "folder"])
+@pytest.mark.parametrize("pattern", ["cells/*.npz", "batches/*.json", "dataset.parquet", "test.npz", "seals/N*"])
+def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: Path) -> None:
+    file = sorted(folder.glob(pattern))[0]
+    content = file.read_bytes()
+    file.unlink()
+    if kind == "folder":
+        if pattern.startswith("seals"):
+            pytest.skip("a seal is a file that this program alone writes")
+        file.mkdir()
+    elif kind != "missing":
+        file.write_bytes(b"" if kind == "empty" else content[: len(content) // 2])
+    elif pattern.startswith("seals"):
+        assert seals.faults(folder) == []  # then the batch is not done
+        assert len(store.finished(folder, store.stored_plan(folder).batches)) == 1
+        return
+    with pytest.raises(ResultError, match="missing or damaged"):
+        seals.check(folder)
+    if kind == "folder":
+        with pytest.raises(ResultError, match="a folder where a file belongs"):
+            list(seals.mend(folder))
+        return
+    (words,) = list(seals.mend(folder))
+    assert "computed again" in words
+    assert seals.faults(folder) == []
+
+
+def test_what_was_edited_is_refused(folder: Path) -> None:
+    file = next((folder / "batches").iterdir())
+    rows = read_json(file)
+    rows[0]["H"] = 0.1
+    write_json(file, rows)
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(ResultError, match="was changed after it was written") as caught:
+        list(seals.mend(folder))
+    assert caught.value.file == str(file)
+    assert sorted(folder.rglob("*")) == before
+    found = check_folder(folder)
+    assert [fault.kind for fault in found.faults] == ["edited"]
+    assert "put it back" in found.lines[0]
+
+
+def test_two_cells_swapped_are_refused(folder: Path) -> None:
+    one, other = sorted((folder / "cells").iterdir())[:2]
+    content = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(content)
+    with pytest.raises(ResultError, match="was changed after it was written"):
+        seals.check(folder)
+
+
+def test_a_seal_names_files_inside_the_folder_only(folder: Path) -> None:
+    seal = next((folder / "seals").glob("N*"))
+    seal.write_text(f"{'0' * 64}  ../../etc/passwd\n")
+    (fault,) = seals.faults(folder)
+    assert (fault.kind, fault.file) == ("damaged", f"seals/{seal.name}")

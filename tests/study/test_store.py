@@ -1,0 +1,92 @@
+"""The folder of a run: whose it is, what it holds, and what is said where it is damaged."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import ResultError
+from shipid.study import store
+from shipid.study.plan import Batch
+from tests.study.tiny import tiny_plan
+
+
+def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
+    plan, other = tiny_plan(tmp_path), tiny_plan(tmp_path, {"grid.N_D": [4]})
+    store.open_folder(tmp_path / "run", plan)
+    store.open_folder(tmp_path / "run", plan)
+    assert store.stored_plan(tmp_path / "run").digest == plan.digest
+    with pytest.raises(ResultError, match="another study"):
+        store.open_folder(tmp_path / "run", other)
+
+
+def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.tex").write_text("words")
+    with pytest.raises(ResultError, match="not empty"):
+        store.open_folder(tmp_path / "full", plan)
+    with pytest.raises(ResultError, match="is a file"):
+        store.open_folder(tmp_path / "tiny.toml", plan)
+    assert [entry.name for entry in (tmp_path / "full").iterdir()] == ["thesis.tex"]
+
+
+def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    store.open_folder(folder, tiny_plan(tmp_path))
+    text = (folder / store.STUDY).read_text()
+    (folder / store.STUDY).write_text(text.replace("ahead = 5.0", "ahead = 6.0"))
+    with pytest.raises(ResultError, match="changed by hand"):
+        store.stored_plan(folder)
+    (folder / store.STUDY).write_text("[")
+    with pytest.raises(ResultError, match="damaged"):
+        store.stored_plan(folder)
+    with pytest.raises(ResultError, match="not the folder of a run"):
+        store.stored_plan(tmp_path)
+
+
+def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
+    batches = [Batch(4, 1), Batch(4, 0), Batch(2, 0)]
+    row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right"}
+    for batch in batches[:2]:
+        file = store.batch_file(tmp_path, batch)
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(json.dumps([{**row, "N_D": batch.N_D, "seed": batch.seed, "H": None}]))
+    assert store.finished(tmp_path, batches) == batches[:2]
+    rows = store.read_rows(tmp_path)
+    assert rows["seed"].tolist() == [0, 1]
+    assert rows["H"].isna().all()
+    with pytest.raises(ResultError, match="no cell is finished"):
+        store.read_rows(tmp_path / "empty")
+
+
+def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_path: Path) -> None:
+    rows = store.read_rows(tiny_run)
+    file = store.write_results(tmp_path, rows)
+    table, trials = pd.read_parquet(file), pd.read_parquet(tmp_path / "trials.parquet")
+    assert len(table) == len(rows) * len(store.METRICS)
+    assert len(trials) == sum(len(each) for each in rows["trials"])
+    wide = table[table["metric"] == "H"].set_index("cell")["value"]
+    np.testing.assert_array_equal(wide.loc[rows["cell"]], rows["H"])
+    assert set(table.loc[table["metric"] == "seconds", "unit"]) == {"s"}
+
+
+def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:
+    windows, paths, naive = store.read_test(tiny_run)
+    store.write_test(tmp_path, windows, paths, naive)
+    again, others, floor = store.read_test(tmp_path)
+    np.testing.assert_array_equal(again.future, windows.future)
+    np.testing.assert_array_equal(floor, naive)
+    assert (again.horizon, again.step, again.shared_clock) == (windows.horizon, windows.step, windows.shared_clock)
+    for name in ("columns", "planned", "past", "states"):
+        one, other = getattr(windows, name), getattr(again, name)
+        assert one.keys() == other.keys()
+        assert all(np.array_equal(one[key], other[key]) for key in one)
+    assert others.keys() == paths.keys()
+    (tmp_path / store.TEST).write_bytes(b"no archive")
+    with pytest.raises(ResultError, match="damaged"):
+        store.read_test(tmp_path)

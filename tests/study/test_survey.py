@@ -1,0 +1,68 @@
+"""A survey of runs against motion known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.study.survey import helm_sense, separation, survey, typical_runs
+from tests.logs.conftest import as_dataset, turning
+
+T = np.arange(0.0, 100.0, 0.5)
+
+
+def test_a_steady_turn_is_described_by_its_numbers() -> None:
+    found = survey(as_dataset(turning(T), turning(T[:81])))
+    assert list(found.runs.index) == ["a", "b"]
+    assert found.runs["duration"].tolist() == [99.5, 40.0]
+    assert found.step == 0.5
+    assert found.speed == pytest.approx(np.hypot(4.0, 0.5))
+    np.testing.assert_allclose(found.runs["rate"], 0.05)
+    assert found.factor == pytest.approx(1.0, abs=1e-3)
+    assert found.runs["whole"].all()
+
+
+@pytest.mark.parametrize(("scale", "turn"), [(0.5, 0.0), (1.2, 0.3)])
+def test_the_factor_is_how_positions_differ_from_velocities(scale: float, turn: float) -> None:
+    frame = turning(T)
+    place = scale * np.exp(1j * turn) * (frame["north"].to_numpy() + 1j * frame["east"].to_numpy())
+    found = survey(as_dataset(frame.assign(north=place.real, east=place.imag)))
+    assert found.factor == pytest.approx(scale * np.exp(1j * turn), abs=2e-3)
+
+
+def test_a_broken_run_is_judged_by_its_longest_piece() -> None:
+    frame = turning(T)
+    frame["flags"] = np.where(T == 30.0, 1, 0)
+    found = survey(as_dataset(frame)).runs.loc["a"]
+    assert not found["whole"]
+    assert found["duration"] == 99.5 - 30.0
+
+
+def test_jitter_does_not_grow_with_the_lag_and_a_wrong_speed_does() -> None:
+    rng, frame = np.random.default_rng(2), turning(T)
+    jitter = as_dataset(frame.assign(north=frame["north"] + rng.normal(0, 2.0, len(T))))
+    wrong = as_dataset(frame.assign(u=1.1 * frame["u"]))
+    assert separation(jitter, 20.0) == pytest.approx(separation(jitter, 5.0), rel=0.3)
+    assert separation(wrong, 20.0) > 3 * separation(wrong, 5.0)
+    assert separation(wrong, 1000.0) == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_sense_of_a_helm_is_that_of_the_yaw_it_starts(sign: float) -> None:
+    helm = np.where((T // 10) % 2 == 0, 0.2, -0.2)
+    r = np.append(0.0, np.cumsum(0.01 * helm[:-1]))
+    frame = turning(T).assign(r=r, **{"rudder.delta": sign * helm, "other.delta": 0.0})
+    assert helm_sense(as_dataset(frame)) == {"rudder.delta": pytest.approx(sign)}
+
+
+def test_the_typical_run_is_the_middle_one_and_neither_broken_nor_the_longest() -> None:
+    speeds = [3.0, 3.9, 4.0, 4.1, 5.0]
+    runs = pd.DataFrame(
+        {"kind": "zigzag", "speed": speeds, "rate": 0.05, "helm": 0.2, "whole": True, "sound": True, "duration": 60.0},
+        index=list("abcde"),
+    )
+    runs.loc["e", "duration"] = 90.0
+    assert typical_runs(runs) == ["c"]
+    runs.loc["c", "whole"] = False
+    assert typical_runs(runs)[0] in ("b", "d")

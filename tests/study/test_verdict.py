@@ -1,0 +1,65 @@
+"""Words of verdicts and numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipid.study.plan import NO_MODEL
+from shipid.study.verdict import (
+    every,
+    interval,
+    metres,
+    named,
+    runs,
+    shown,
+    some,
+    too_few,
+    undecided,
+    verdict,
+    weakest,
+    words,
+)
+
+
+def test_verdicts() -> None:
+    assert verdict(True, False) == "confirmed"
+    assert verdict(False, True) == "refuted"
+    assert verdict(False, False) == "undecided"
+    assert weakest(["confirmed", "confirmed"]) == "confirmed"
+    assert weakest(["confirmed", "undecided"]) == "undecided"
+    assert weakest(["undecided", "refuted"]) == "refuted"
+
+
+def test_all_need_no_correction_and_some_do() -> None:
+    """0.02 for each of three: all are shown; beside one that is not, 0.02 x 3 shows none."""
+    assert every(np.array([0.02, 0.02, 0.02]))
+    assert shown(np.array([0.02, 0.02, 0.02])).all()
+    assert not some(np.array([0.02, 0.02, 0.5]))
+    assert shown(np.array([0.002, 0.02, 0.5])).tolist() == [True, False, False]
+    assert not every(np.array([]))
+    assert not every(np.array([np.nan]))
+
+
+def test_numbers_in_words() -> None:
+    assert metres(9.99) == "9.99 m"
+    assert metres(9.996) == "10.0 m"
+    assert interval(1.0, 12.0) == " [1.0, 12.0]"
+    assert interval(np.nan, np.nan) == ""
+    assert runs(1) == "1 run"
+    assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
+    assert too_few(5) == ""
+
+
+def test_undecided_claims_keep_their_words_and_say_why() -> None:
+    found = undecided({"S1": "one", "S2": "two"}, "not finished")
+    assert [(f["id"], f["claim"], f["verdict"], f["evidence"], f["numbers"]) for f in found] == [
+        ("S1", "one", "undecided", "not finished", {}),
+        ("S2", "two", "undecided", "not finished", {}),
+    ]
+
+
+def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:
+    assert words(NO_MODEL) == "pure data-driven"
+    assert named([NO_MODEL, "b"]) == "pure data-driven, b"
+    assert named("abcdef") == "a, b, c, d, e, f"
+    assert named("abcdefg") == "a, b, c, d, e and 2 more"

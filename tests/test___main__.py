@@ -1,0 +1,25 @@
+"""`python -m shipid` is the command `shipid`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from shipid.version import __version__
+
+
+def python_m(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "shipid", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_the_package_runs_as_the_command() -> None:
+    assert python_m("--version").stdout.strip() == __version__
+
+
+def test_a_mistake_is_one_line_and_status_1() -> None:
+    result = python_m("vessel", "show", "marinre")
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: ")
+    assert "did you mean 'mariner'?" in result.stderr
+    assert len(result.stderr.splitlines()) == 1

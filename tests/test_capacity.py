@@ -1,0 +1,29 @@
+"""Memory: what cannot be had is said in GiB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shipid import capacity
+
+
+def test_what_fits_is_no_word() -> None:
+    assert capacity.too_much(1000) is None
+    assert capacity.memory() > 2**20
+
+
+def test_what_does_not_fit_is_said_with_both_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(capacity, "memory", lambda: 16 * 2**30)
+    assert capacity.too_much(2**31) is None
+    assert capacity.too_much(28 * 2**30) == "take 224 GiB of memory, and there are 16"
+
+
+def test_the_limit_of_a_container_counts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(capacity, "_GROUP", tmp_path)
+    whole = capacity.memory()
+    (tmp_path / "memory.max").write_text("max\n")
+    assert capacity.memory() == whole
+    (tmp_path / "memory.max").write_text("1048576\n")
+    assert capacity.memory() == 1048576

@@ -1,0 +1,39 @@
+"""Every source file has a test file of the same name in the mirrored folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted(path.relative_to(ROOT / "shipid") for path in (ROOT / "shipid").rglob("*.py"))
+#: sources that other test files cover, with these
+ELSEWHERE = {
+    "__init__.py": "test_shipid.py",
+    "cli/__init__.py": "cli/test_cli.py",
+    "physics/__init__.py": "test_laws.py",
+    "measures/__init__.py": "measures/test_laws.py",
+    "report/__init__.py": "report/test_page.py",
+    "study/apply.py": "study/test_whole.py",
+}
+
+
+def mirrored(source: Path) -> Path:
+    """Path of the test file of a source, in `tests`."""
+    return source.with_name(f"test_{source.name}")
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=str)
+def test_a_source_has_its_tests(source: Path) -> None:
+    if source.name == "__init__.py" and len((ROOT / "shipid" / source).read_text().splitlines()) == 1:
+        return  # words alone
+    expected = ROOT / "tests" / ELSEWHERE.get(source.as_posix(), mirrored(source).as_posix())
+    assert expected.is_file(), f"{source} has no {expected.relative_to(ROOT)}"
+    assert "def test_" in expected.read_text()
+
+
+def test_what_is_covered_elsewhere_is_there_and_has_no_tests_of_its_name() -> None:
+    for source in ELSEWHERE:
+        assert Path(source) in SOURCES
+        assert not (ROOT / "tests" / mirrored(Path(source))).exists(), source
