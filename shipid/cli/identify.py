@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +14,9 @@ from shipid.cli.terminal import digits, iterations, show, table
 from shipid.errors import ShipidError
 
 if TYPE_CHECKING:
+    from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identified
+    from shipid.vessel.load import Vessel
 
 
 def identify(
@@ -74,6 +76,7 @@ def identify(
     options = {key: value for key, value in given.items() if value is not None}
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    _look(ship, log, runs or (), test or ())
     try:
         with iterations() as progress:
             outcome = run_identification(
@@ -93,6 +96,25 @@ def identify(
 
         content = identification_content(outcome, dataset, command_line())
         typer.echo(f"page -> {write_identification(content, html)}")
+
+
+def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) -> None:
+    """Say what is off between vessel and log before anything is fitted, and draft the correction."""
+    from shipid.errors import DataError
+    from shipid.identification.outcome import pick_runs
+    from shipid.study.first_look import first_look
+    from shipid.study.new import proposed_horizon
+
+    fitted, _ = pick_runs(log, runs, test)
+    try:
+        ahead, step = proposed_horizon(ship, log)
+        found = first_look(ship, log, fitted, ahead=ahead, step=step)
+    except DataError:
+        return  # the fit says what is missing
+    typer.echo(f"warning: {found.sentence}" if found.wrong else found.sentence, err=found.wrong)
+    if found.changes:
+        typer.echo("draft of a correction, to begin with:")
+        typer.echo(found.patch(str(ship.file)))
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:

@@ -49,6 +49,12 @@ def study_new(
     show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
+    for named, look in draft.looks.items():
+        if not look.wrong:
+            typer.echo(look.sentence)
+        elif look.changes:
+            typer.echo(f"draft of a correction, in the study as {look.vessel.key}-corrected; as a patch of its own:")
+            typer.echo(look.patch(named))
     names = ", ".join(model.name for model in draft.plan.foundations)
     typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.foundations)} foundations ({names}) -> {file}")
     typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")

@@ -22,6 +22,7 @@ from shipid.identification.bands import LONG, Measure, bands, check_level, refus
 from shipid.identification.collinearity import listed, short
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
 from shipid.identification.solve import Solution, identify
@@ -237,6 +238,7 @@ def run_identification(
             manoeuvres, refused = _banded(manoeuvres, vessel, solution, judged, band)
         _go_on(held)
         warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
+        warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
         if refused:
             warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
         return Identified(

@@ -26,6 +26,7 @@ ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "m
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
+    "kinds": parts.kinds_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
     "coverage": bands.coverage_frame,

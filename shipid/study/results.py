@@ -27,8 +27,10 @@ from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
+from shipid.study.survey import kinds_of
 from shipid.vessel.outline import ship_outline
 
+ALL_KINDS = "all"
 MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
@@ -164,6 +166,35 @@ def horizon_frame(results: Results) -> pd.DataFrame:
         error = position_error(results.paths[row["cell"]], results.test.future)
         parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
     return pd.concat(parts, ignore_index=True)
+
+
+def kinds_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon and at its end [m], by kind of test run: kind, runs, model, source, N_D, mean, end.
+
+    At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
+    """
+    known = kinds_of(results.dataset)
+    kinds = np.array([known.get(str(run), "") for run in results.test.run])
+    errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
+    for model, path in results.physics.items():
+        if model != NO_MODEL and np.isfinite(path).all():
+            errors[model, "physics", 0] = [position_error(path, results.test.future)]
+    largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
+    for row in results.rows:
+        if row["cell"] in results.paths and row["N_D"] == largest:
+            one = position_error(results.paths[row["cell"]], results.test.future)
+            errors.setdefault((row["model"], "cooperative", largest), []).append(one)
+    rows = []
+    for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
+        mask = (kinds == kind) | (kind == ALL_KINDS)
+        runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
+        for (model, source, N_D), found in errors.items():
+            mean = float(np.mean([error[:, mask].mean() for error in found]))
+            end = float(np.mean([error[-1, mask].mean() for error in found]))
+            rows.append(
+                {"kind": kind, "runs": runs, "model": model, "source": source, "N_D": N_D, "mean": mean, "end": end}
+            )
+    return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
 def _horizon(error: np.ndarray, ahead: np.ndarray, model: str, N_D: int, seed: int, source: str) -> pd.DataFrame:
