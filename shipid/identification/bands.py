@@ -101,7 +101,7 @@ def bands(
             factors = solution.factors.copy()
             factors[free] += sign * axis
             sides.append(factors)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for title, measure in measures:
         try:
             centre = measure(at)
@@ -114,14 +114,9 @@ def bands(
             slopes, bends = (ends[:, 0] - ends[:, 1]) / 2, ends.mean(axis=1) - value
             deviation, shift = float(np.sqrt((slopes**2 + 2 * bends**2).sum())), float(bends.sum())
             wide, note = quantile * deviation, "" if np.isfinite(deviation) else "not reached on both sides of an axis"
-            row: dict[str, Any] = {
-                "manoeuvre": title,
-                "measure": name,
-                "value": value,
-                "deviation": deviation,
-                "note": note,
-            }
-            rows.append({**row, "low": value - wide + min(shift, 0.0), "high": value + wide + max(shift, 0.0)})
+            low, high = value - wide + min(shift, 0.0), value + wide + max(shift, 0.0)
+            numbers = {"value": value, "deviation": deviation, "low": low, "high": high}
+            rows.append({"manoeuvre": title, "measure": name, **numbers, "note": note})
     return pd.DataFrame(rows, columns=["manoeuvre", "measure", "value", "deviation", "low", "high", "note"])
 
 

@@ -102,7 +102,7 @@ def _lines(
 ) -> go.Figure:
     sizes = sorted(content.cells.N_D.unique())
     traces = []
-    for name, style in reversed(looks.items()):  # what has no physics first: it must not cover the others
+    for name, style in reversed(list(looks.items())):  # what has no physics first: it must not cover the others
         mine = means[means.model == name].set_index("N_D")[statistic.cell]
         if mine.empty:
             continue

@@ -53,8 +53,9 @@ class ErrorTable:
         by_seed = {model: values @ self.weights for model, values in self.H.items()}
         seeds = max((values.shape[1] for values in by_seed.values()), default=1)
         every = range(len(self.amounts))
-        noise = [training_noise([values[k] for values in by_seed.values()]) for k in every]
-        return np.asarray(noise) / float(seeds) ** 0.5
+        noise = np.array([training_noise([values[k] for values in by_seed.values()]) for k in every], dtype=float)
+        relative: Array = noise / seeds**0.5
+        return relative
 
     def by_run(self, model: str, place: int) -> Array:
         """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
