@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import numpy as np
 from casadi import MX
 
 from shipid.engine.integrate import Method
 from shipid.export.blocks import Precision
 from shipid.export.c import VesselParts
+from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.model import Model
+from shipid.hybrid.bands import FEWEST, LEVELS
 from shipid.files import whole, write_json
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -40,20 +43,44 @@ def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, 
     """(now, reached, past, planned, estimates, parameters) -> path (2, T), and the names of the entries.
 
     path : x and y [m] in body axes at the instant, a column for each step. ShipidError for a forest.
+
+    With bands there are the inputs level, pointwise (0 or 1) and kind (0: any, or its number), and the outputs
+    along, across (1, T) [m], ahead (2, T), and promised: 0 where no band can be, and then the band is not a number.
     """
     names, function = model.layout, model.graph.function
     inputs = {key: MX.sym(key, size) for key, size in names.sizes.items()}
-    path = ca.reshape(function(*inputs.values()), 2, names.horizon)
+    row = function(*inputs.values())
+    results = {"path": ca.reshape(row, 2, names.horizon)}
     outputs = {"path": [{"name": axis, "unit": "m"} for axis in "xy"]}
+    if model.band is not None and model.predictor.bands is not None:
+        level, pointwise, kind = (MX.sym(key) for key in CHOICE)
+        bands = model.predictor.bands
+        counts = ca.DM([bands.runs, *bands.kinds.values()])
+        runs = ca.dot(counts, kind == ca.DM(range(len(bands.kinds) + 1)))
+        promised = ca.logic_and(ca.logic_and(level > 0, level <= LEVELS[-1]), runs >= FEWEST)
+        promised = ca.logic_and(promised, level / (1 - level) - 1e-9 <= runs)
+        promised = ca.logic_and(promised, ca.logic_not(ca.logic_and(pointwise, kind)))
+        band = ca.reshape(model.band.function(inputs["now"], row, level, pointwise, kind), len(COLUMNS), names.horizon)
+        band = ca.if_else(promised, band, np.nan)
+        results |= {"along": band[0, :], "across": band[1, :], "ahead": band[2:, :], "promised": promised}
+        outputs |= {"along": [{"name": "along", "unit": "m"}], "across": [{"name": "across", "unit": "m"}]}
+        outputs |= {"ahead": [{"name": axis, "unit": "-"} for axis in "xy"]}
+        outputs |= {"promised": [{"name": "promised", "unit": "-"}]}
+        inputs |= {"level": level, "pointwise": pointwise, "kind": kind}
     rows: Mapping[str, int] = {"past": names.num_past, "planned": names.horizon}
     listed = {key: [{"name": entry, "unit": model.unit(entry)} for entry in getattr(names, key)] for key in names.sizes}
-    return ca.Function(name, list(inputs.values()), [path], list(inputs), ["path"]), {
+    listed |= {key: [{"name": key, "unit": "-"}] for key in inputs if key not in listed}
+    found = ca.Function(name, list(inputs.values()), list(results.values()), list(inputs), list(results))
+    bands_ = model.predictor.bands
+    said = {"no_band": model.no_band} if bands_ is None else {"kinds": ["any", *bands_.kinds], "runs": bands_.runs}
+    return found, {
         "what": f"path after 1 ... {names.horizon} steps of {model.physics.step:g} s, method {model.predictor.method}",
         "inputs": listed,
         "rows": rows,
         "outputs": outputs,
         "defaults": {"parameters": model.parameters.tolist()},
         "limits": model.limits,
+        **said,
         "provenance": dict(model.predictor.provenance),
     }
 
