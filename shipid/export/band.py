@@ -123,9 +123,9 @@ def _growth(bands: Bands, step: float, horizon: int) -> Formula:
     x = [points[0], points[2] - points[0], points[4] - points[2]]
     y = [points[1], points[3] - points[1], points[5] - points[3]]
     length = sum(ca.sqrt(x[k] ** 2 + y[k] ** 2) for k in range(3))
-    first, second = (
-        ca.atan2(x[k] * y[k + 1] - y[k] * x[k + 1], x[k] * x[k + 1] + y[k] * y[k + 1]) for k in range(2)
-    )
+    cross = [x[k] * y[k + 1] - y[k] * x[k + 1] for k in range(2)]
+    dot = [x[k] * x[k + 1] + y[k] * y[k + 1] for k in range(2)]
+    first, second = (ca.atan2(cross[k], ca.if_else(dot[k] == 0, 0, dot[k])) for k in range(2))  # 0 and not -0
     held = r * step * horizon * 2 / 3
     traits = ca.vertcat(
         ca.log(length / bands.length + 0.02),

@@ -242,7 +242,8 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     chords = np.diff(points, axis=0)
     size = np.hypot(chords[..., 0], chords[..., 1])
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
-    angles = np.arctan2(cross, (chords[:-1] * chords[1:]).sum(axis=-1))
+    dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
+    angles = np.arctan2(cross, dot)
     first, second = angles
     held = columns["r"] * step * horizon * 2 / 3
     return np.column_stack(
