@@ -145,26 +145,29 @@ def test_a_band_adapts_as_in_python(tmp_path):
     assert np.isnan(loaded.odd_factor(0.1, 0.9, 9))
 
 
-def test_the_casadi_function_gives_path_and_band(tmp_path):
+def test_casadi_gives_path_and_band(tmp_path):
     strange = drawn("path-drawn", 5, count=4, vessel="mariner")
     predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10))
-    file, _ = predictor.export("casadi", tmp_path / "ship.casadi")
-    function, given = ca.Function.load(str(file)), model(predictor).inputs(strange.instants)
+    files = predictor.export("casadi", tmp_path / "ship.casadi")
+    assert [file.name for file in files[2:]] == ["ship-band.casadi", "ship-band.casadi.json"]
+    path, band = (ca.Function.load(str(file)) for file in (files[0], files[2]))
+    given = model(predictor).inputs(strange.instants)
     for level, pointwise in ((0.9, False), (0.6, True)):
         right = predictor.predict(strange.instants, level=level, pointwise=pointwise)
         for i in range(4):
             entry = {key: values[i] for key, values in given.items()}
-            found = function(**entry, level=level, pointwise=pointwise)
+            ahead = path(**entry)["path"]
+            found = band(now=entry["now"], path=ahead, level=level, pointwise=pointwise)
             assert found["promised"] == 1
-            np.testing.assert_allclose(np.array(found["path"]).T, right.paths[:, i], rtol=0, atol=1e-11)
+            np.testing.assert_allclose(np.array(ahead).T, right.paths[:, i], rtol=0, atol=1e-11)
             for name in ("along", "across"):
                 axis = getattr(right.region, name)[:, i]
                 np.testing.assert_allclose(np.array(found[name]).ravel(), axis, rtol=NEAR, atol=0)
             np.testing.assert_allclose(np.array(found["ahead"]).T, right.region.ahead[:, i], rtol=0, atol=NEAR)
-    refused = function(**entry, level=0.95)
-    assert refused["promised"] == 0
-    assert np.isnan(np.array(refused["along"])).all()
-    assert np.isfinite(np.array(refused["path"])).all()
+    for asked in ({"level": 0.95}, {"level": 0.0}, {"level": 0.5, "kind": 9}, {"level": 0.5, "pointwise": 1, "kind": 1}):
+        refused = band(now=entry["now"], path=ahead, **asked)
+        assert refused["promised"] == 0
+        assert np.isnan(np.array(refused["along"])).all()
 
 
 def test_no_bands_leave_no_trace(tmp_path):
@@ -172,8 +175,7 @@ def test_no_bands_leave_no_trace(tmp_path):
     files = predictor_files(model(predictor), "m", Precision())
     assert "No band: too few." in files.texts["m.h"]
     assert "m_band" not in files.texts["m.c"]
-    file, _ = predictor.export("casadi", tmp_path / "m.casadi")
-    assert ca.Function.load(str(file)).name_out() == ["path"]
+    assert len(predictor.export("casadi", tmp_path / "m.casadi")) == 2
 
 
 def test_the_tables_of_a_band_are_interpolated_in_c_alone():

@@ -21,7 +21,7 @@ from tests.export.strange import drawn
 @pytest.mark.parametrize("kind", ["hankel-dmd", "modules", "path-drawn"])
 def test_a_predictor_is_one_function(kind, tmp_path):
     strange = drawn(kind, 5, count=4, vessel="mariner")
-    file, names = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
+    file, names, *_ = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
     given = model(strange.predictor).inputs(strange.instants)
     expected = strange.predictor.predict(strange.instants)
@@ -43,14 +43,15 @@ def hybrid(horizon):
     corrector = found.corrector
     heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
     physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
-    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known")
+    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None)
 
 
+@pytest.mark.slow
 def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
     """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard."""
     horizon = 8
     predictor = hybrid(horizon)
-    file, names = predictor.export("casadi", tmp_path / "ship.casadi")
+    file, names, *_ = predictor.export("casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
     entries = {key: [entry["name"] for entry in rows] for key, rows in listed["inputs"].items()}
     rudder = entries["planned"].index("rudder.delta")
@@ -81,6 +82,7 @@ def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
     assert abs(ship["east"] - 20) < 8
 
 
+@pytest.mark.slow
 def test_a_loop_is_closed_with_a_vessel(tmp_path):
     """A receding horizon holds a course 20 m to starboard: the file is all that the controller knows."""
     vessel = load_vessel("mariner")
