@@ -867,6 +867,14 @@ double {name}_factor(double miss, double level, int kind)
                 repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else "")
             )
         rows = names.num_past + 1
+        predict, around, shown = "predict(&ship, 0, path)", "", ""
+        if self.bands is not None:
+            predict, around = "predict_band(&ship, 0, 0.5, 0, 0, path, band)", f"    {name}_real band[{name}_BAND * {name}_HORIZON];\n"
+            shown = (
+                f'    for (i = 0; i < {name}_HORIZON && !(status & {name}_NO_BAND); ++i)\n'
+                f'        printf("half of the paths: %.2f m along the track, %.2f m across\\n", '
+                f"(double)band[{name}_BAND * i], (double)band[{name}_BAND * i + 1]);\n"
+            )
         return f"""/* A ship that does the same for a while, and where she goes. cc -std=c99 main.c {name}.c -lm */
 #include <stdio.h>
 
@@ -878,17 +886,17 @@ int main(void)
     /* {", ".join(row)} */
     {name}_real row[{name}_NUM_ROW] = {{{", ".join(values)}}};
     {name}_real path[2 * {name}_HORIZON];
-    int i, status;
+{around}    int i, status;
     {name}_init(&ship);
     for (i = 0; i < {rows}; ++i) {{
         {name}_record(&ship, {self.model.physics.step!r} * i, row);
         row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* north, as if she sailed that way */
     }}
-    status = {name}_predict(&ship, 0, path);
+    status = {name}_{predict};
     printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");
     for (i = 0; i < {name}_HORIZON; ++i)
         printf("%g s: %.2f m ahead, %.2f m to starboard\\n", {self.model.physics.step!r} * (i + 1), (double)path[2 * i], (double)path[2 * i + 1]);
-    return status & ~{name}_OUTSIDE;
+{shown}    return status & ~{name}_OUTSIDE;
 }}
 """
 

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.export.band import band_graph, radii
 from shipid.export.blocks import Precision, c_functions
@@ -19,7 +20,7 @@ from shipid.hybrid.bands import Region, adapted, adaptive, factor
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
-from tests.export.compiled import bands, library
+from tests.export.compiled import bands, library, pointer, run_example
 from tests.export.strange import KINDS, drawn
 
 NEAR = 1e-10
@@ -183,3 +184,36 @@ def test_the_tables_of_a_band_are_interpolated_in_c_alone():
     strange = drawn("alone", 6, vessel="mariner")
     text, _ = c_functions([radii(strange.predictor.bands)], Precision())
     assert text.count("static const real") == 2
+
+
+def test_the_recorder_gives_path_and_band(tmp_path):
+    """From rows alone; a ship of which nothing is known has no band, and the example shows one."""
+    strange = drawn("alone", 6, count=4, vessel="mariner")
+    predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), commands="held")
+    exported = model(predictor)
+    files = predictor_files(exported, "odd", Precision())
+    loaded, horizon = library(files, tmp_path), exported.layout.horizon
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    around = [ctypes.c_double, ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+    loaded.odd_predict_band.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *around]
+    kept, path, band = np.zeros(1_000_000), np.zeros((horizon, 2)), np.zeros((horizon, 4))
+    loaded.odd_init(pointer(kept))
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    columns = strange.instants.columns
+
+    def result(level):
+        return loaded.odd_predict_band(pointer(kept), None, level, 0, 0, pointer(path), pointer(band))
+
+    assert result(0.9) == 8
+    assert np.isnan(band).all()
+    loaded.odd_record(pointer(kept), 0.0, pointer(np.array([columns.get(name, [0.0])[0] for name in order])))
+    held = {name: columns[name][:1] for name in exported.layout.reached}
+    now = Instants({name: values[:1] for name, values in columns.items()}, hidden=held or None)
+    right = predictor.predict(now, level=0.9)
+    assert result(0.9) == 2 * int(right.outside[0])
+    np.testing.assert_allclose(path, right.paths[:, 0], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(band[:, :2], rows_of(right.region)[:, 0, :2], rtol=NEAR)
+    assert result(0.95) == 2 * int(right.outside[0]) + 32
+    assert np.isfinite(path).all()
+    assert np.isnan(band).all()
+    assert "half of the paths" in run_example(files, tmp_path / "example")

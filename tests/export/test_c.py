@@ -121,8 +121,9 @@ def test_a_thousand_instants_with_faults(kind, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_sanitizers_are_silent(kind, tmp_path):
-    """The example runs under address and undefined behaviour sanitizers; so does a bank of filters."""
-    strange = drawn(kind, 2)
+    """The example runs under address and undefined behaviour sanitizers; compilers take minutes for a bank of filters."""
+    plain = (drawn(kind, seed) for seed in range(2, 20))
+    strange = next(one for one in plain if one.predictor.physics.observer is None)
     run_example(predictor_files(model(strange.predictor), "odd", Precision()), tmp_path, *SANITIZERS)
 
 
