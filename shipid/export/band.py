@@ -24,7 +24,7 @@ COLUMNS = ("along", "across", "ahead_x", "ahead_y")
 class Radii(Block):
     """(level, pointwise, kind) -> radius of a band for each of T steps, by linear interpolation in tables.
 
-    whole : (1 + kinds, 99) for `LEVELS`, of whole paths: of all kinds, then of each. steps : (99, T) of each step alone.
+    whole : (1 + kinds, 99) for `LEVELS`, of whole paths: of all kinds, then of each. steps : (99, T) of steps alone.
     """
 
     whole: Array

@@ -499,7 +499,9 @@ enum {{
     {name}_DIVERGED = 4,   /* the path is not finite */
     {name}_NO_PAST = 8,    /* the past is shorter than {names.num_past} steps, or there is no row: the path is NAN */
     {name}_TIME = 16,      /* time does not go on: the row is not kept */
-    {name}_NO_BAND = 32    /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
+    {
+            name
+        }_NO_BAND = 32    /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
 }};
 
 {declared}
@@ -869,9 +871,12 @@ double {name}_factor(double miss, double level, int kind)
         rows = names.num_past + 1
         predict, around, shown = "predict(&ship, 0, path)", "", ""
         if self.bands is not None:
-            predict, around = "predict_band(&ship, 0, 0.5, 0, 0, path, band)", f"    {name}_real band[{name}_BAND * {name}_HORIZON];\n"
+            predict, around = (
+                "predict_band(&ship, 0, 0.5, 0, 0, path, band)",
+                f"    {name}_real band[{name}_BAND * {name}_HORIZON];\n",
+            )
             shown = (
-                f'    for (i = 0; i < {name}_HORIZON && !(status & {name}_NO_BAND); ++i)\n'
+                f"    for (i = 0; i < {name}_HORIZON && !(status & {name}_NO_BAND); ++i)\n"
                 f'        printf("half of the paths: %.2f m along the track, %.2f m across\\n", '
                 f"(double)band[{name}_BAND * i], (double)band[{name}_BAND * i + 1]);\n"
             )

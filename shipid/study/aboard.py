@@ -265,8 +265,8 @@ def _promise(played: Played) -> list[str]:
         adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
         inside = f"{held[promised].mean():.0%} of the {promised.sum()}" if promised.any() else "none of the 0"
         lines.append(
-            f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole paths that "
-            f"can be judged, {inside} without alarm, where it is promised"
+            f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
+            f"paths that can be judged, {inside} without alarm, where it is promised"
         )
         usual = at_level(bands.table(band.kind), band.level)
         shares = []
@@ -281,7 +281,9 @@ def _promise(played: Played) -> list[str]:
         lines.append(f"band of {band.level:.0%}: no whole path can be judged, the log ends before")
     if band.rate is not None:
         factors = instants["factor"].to_numpy()
-        last = ", ".join(f"{run} {value:.2f}" for run, value in instants.groupby("run", sort=False)["factor"].last()[:5].items())
+        last = ", ".join(
+            f"{run} {value:.2f}" for run, value in instants.groupby("run", sort=False)["factor"].last()[:5].items()
+        )
         lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
     points = played.points
     for moment in _moments(points):

@@ -78,7 +78,8 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     corrector = _corrector(kind, rng, physics, inputs, instants, slow)
     limits = {key: tuple(np.quantile(instants.columns[key], [0.05, 0.95])) for key in (*MOTIONS, *commands, "V_w")}
     predictor = Predictor(
-        physics, kind, corrector, limits, {"seed": seed, "odd": 'a "quote", a */ and ??('}, "known" if known else "held",
+        physics, kind, corrector, limits, {"seed": seed, "odd": 'a "quote", a */ and ??('},
+        "known" if known else "held",
         bands=bands_of(np.random.default_rng([seed, 77]), physics, instants, tuple(limits), slow),
     )  # fmt: skip
     return Strange(predictor, instants)

@@ -165,7 +165,12 @@ def test_casadi_gives_path_and_band(tmp_path):
                 axis = getattr(right.region, name)[:, i]
                 np.testing.assert_allclose(np.array(found[name]).ravel(), axis, rtol=NEAR, atol=0)
             np.testing.assert_allclose(np.array(found["ahead"]).T, right.region.ahead[:, i], rtol=0, atol=NEAR)
-    for asked in ({"level": 0.95}, {"level": 0.0}, {"level": 0.5, "kind": 9}, {"level": 0.5, "pointwise": 1, "kind": 1}):
+    for asked in (
+        {"level": 0.95},
+        {"level": 0.0},
+        {"level": 0.5, "kind": 9},
+        {"level": 0.5, "pointwise": 1, "kind": 1},
+    ):
         refused = band(now=entry["now"], path=ahead, **asked)
         assert refused["promised"] == 0
         assert np.isnan(np.array(refused["along"])).all()

@@ -90,7 +90,7 @@ def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
 
 
 def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tmp_path):
-    predictor, file = banded
+    _, file = banded
     frame = log()
     played = play(file, saved(frame, tmp_path), level=0.9)
     assert (played.instants["factor"] == 1).all()
@@ -116,7 +116,9 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
     assert f"held {np.mean(held):.0%} of the {len(held)} whole paths" in line
     assert any("50% held" in line and "95%" not in line for line in summary(played))  # ten runs do not promise 95 %
     write(played, tmp_path / "seen.csv")
-    assert {"band_along", "band_across", "band_course", "band_factor"} <= set(pd.read_csv(tmp_path / "seen.csv").columns)
+    assert {"band_along", "band_across", "band_course", "band_factor"} <= set(
+        pd.read_csv(tmp_path / "seen.csv").columns
+    )
 
 
 def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
