@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from shipid.report.paths import browser, fixed_data, snapshots, window_data, windows_of
+from shipid.report.selection import FEW_RUNS
 from shipid.report.wording import number
 
 
@@ -44,9 +45,9 @@ def test_many_instants_are_spread_with_both_ends(full_scale):
 
 def test_many_runs_share_the_room_of_the_page(simulation):
     first = simulation.snapshots[0]
-    many = [replace(first, run=f"run-{i:02d}", t=float(t)) for i in range(30) for t in range(50)]
+    many = [replace(first, run=f"run-{i:02d}", t=float(t)) for i in range(60) for t in range(50)]
     runs = windows_of(replace(simulation, snapshots=many))
-    assert len(runs) == 12
+    assert len(runs) == FEW_RUNS
     assert sum(map(len, runs.values())) <= 600
     assert all(windows[0].t == 0 and windows[-1].t == 49 for windows in runs.values())
 
