@@ -1,12 +1,17 @@
 import json
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from shipid.report.paths import browser, fixed_data, snapshots, window_data, windows_of
+from shipid.report import paths
+from shipid.report.paths import browser, fixed_data, windows_of
 from shipid.report.selection import FEW_RUNS
 from shipid.report.wording import number
+
+window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
+snapshots = lru_cache(maxsize=2)(paths.snapshots)
 
 
 def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
