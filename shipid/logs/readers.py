@@ -286,9 +286,10 @@ def _without_ragged(
         message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
         raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
     if lines and form.ragged == "refuse":
-        row = table.iloc[int(np.argmax(wrong))]
+        first = int(np.argmax(wrong))
+        row = table.iloc[first]
         filled = row.fillna("").str.strip().ne("").to_numpy()
-        cells = short.get(int(table.index[np.argmax(wrong)]), int(filled.nonzero()[0].max()) + 1)
+        cells = short.get(int(table.index[first]), int(filled.nonzero()[0].max()) + 1)
         count = len(named) if not beyond or cells < beyond[0] else beyond[0]
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
         message = (
