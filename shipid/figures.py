@@ -40,6 +40,7 @@ Statistic = Literal["mean", "90th percentile", "root mean square"]
 
 __all__ = [
     "correlations",
+    "coverage",
     "envelope",
     "error_map",
     "error_over_horizon",
@@ -57,6 +58,7 @@ __all__ = [
     "spiral",
     "track",
     "tracks",
+    "width_map",
 ]
 
 
@@ -76,6 +78,16 @@ def gain(
     content = content_of(source)
     chosen = [statistic, scale] if content.cells["N_D"].nunique() > 1 else [statistic]
     return standalone("gain", content, chosen, dark=dark)
+
+
+def coverage(source: Source, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
+    """Share of whole test paths in their bands over the share promised, with intervals; `N_D` default: the most."""
+    return standalone("coverage", content_of(source), [N_D], dark=dark)
+
+
+def width_map(source: Source, *, dark: bool = False) -> go.Figure:
+    """Mean radius of the bands over the accuracy A of the physics and the amount of data N_D."""
+    return standalone("width_map", content_of(source), dark=dark)
 
 
 def error_over_horizon(

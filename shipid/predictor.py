@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self, overload
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -16,6 +16,8 @@ from pydantic import BaseModel, Field
 from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
 from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
+from shipid.hybrid.bands import FEWEST, Bands, Region
+from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
 from shipid.hybrid.physics import Physics, check_columns
@@ -24,7 +26,20 @@ from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
 FORMAT = 4
+BANDS = "bands."  # before the names of arrays of a band in a saved predictor
 MOST_STEPS = 100_000  # of a horizon
+
+
+class Banded(NamedTuple):
+    """A prediction with its band.
+
+    paths : (T, S, 2) [m] in the frame (11). region : around every step, see `shipid.hybrid.bands.Region`.
+    outside : whether the instant (S,) lies outside what training has seen: there no band is promised.
+    """
+
+    paths: Array
+    region: Region
+    outside: Array
 
 
 @dataclass(frozen=True)
@@ -38,6 +53,7 @@ class Predictor:
     commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
         in force in each step, `Instants.planned`, name -> (T, S).
     causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
+    bands : what says how far off a prediction may be; None where no runs could calibrate it.
     """
 
     physics: Physics
@@ -47,6 +63,7 @@ class Predictor:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     commands: Commands = "held"
     causal: tuple[str, ...] = ()
+    bands: Bands | None = None
 
     @property
     def vessel(self) -> Vessel | None:
@@ -58,24 +75,74 @@ class Predictor:
         """Steps of the past that `Instants.past` must hold."""
         return math.ceil(self.corrector.past / self.physics.step - 1e-9)
 
-    def predict(self, instants: Instants, paths: Array | None = None) -> Array:
-        """Return paths (T, S, 2) [m] in the frame (11).
+    @overload
+    def predict(self, instants: Instants, paths: Array | None = None) -> Array: ...
+
+    @overload
+    def predict(
+        self,
+        instants: Instants,
+        paths: Array | None = None,
+        *,
+        level: float,
+        pointwise: bool = False,
+        kind: str | None = None,
+    ) -> Banded: ...
+
+    def predict(
+        self,
+        instants: Instants,
+        paths: Array | None = None,
+        *,
+        level: float | None = None,
+        pointwise: bool = False,
+        kind: str | None = None,
+    ) -> Array | Banded:
+        """Return paths (T, S, 2) [m] in the frame (11); with a level, also the band around them.
 
         Parameters
         ----------
         instants : what is known at the instants of prediction.
         paths : those of the physics alone, if they are known already.
+        level : share of the true paths that the band is to hold whole, such as 0.9.
+        pointwise : the band holds that share of the positions at each step alone: it is narrower, and a whole path
+            leaves it more often.
+        kind : kind of manoeuvre under way, one of `bands.kinds`: the share then holds for runs of this kind.
 
         Raises
         ------
-        DataError : planned commands, a column or a part of the past is missing.
+        DataError : planned commands, a column or a part of the past is missing; there were too few runs for the level.
         """
+        if level is not None:
+            self.check_level(level, kind)
         instants = self._known(instants)
         alone = self.physics.paths(instants) if paths is None else paths
         try:
-            return self.corrector.predict(self.physics, instants, alone)
+            predicted = self.corrector.predict(self.physics, instants, alone)
         except (ValueError, TypeError, IndexError) as error:
             raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
+        if level is None:
+            return predicted
+        return Banded(
+            predicted,
+            self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
+            self.outside(instants.columns),
+        )
+
+    def band(
+        self, paths: Array, instants: Instants, level: float, *, pointwise: bool = False, kind: str | None = None
+    ) -> Region:
+        """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
+        bands = self.check_level(level, kind)
+        return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
+
+    def check_level(self, level: float, kind: str | None = None) -> Bands:
+        """Return the bands; DataError, one sentence, where there are none of this level."""
+        if self.bands is None:
+            reason = self.provenance.get("no_band", "it was made without")
+            raise DataError(f"this predictor has no band: {reason}")
+        self.bands.check(level, kind)
+        return self.bands
 
     def alone(self, instants: Instants) -> Array:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
@@ -114,11 +181,22 @@ class Predictor:
             "provenance": dict(self.provenance),
             "method": self.method,
             "corrector": self.corrector.header(),
+            "bands": None if self.bands is None else self.bands.header(),
         }
         target = Path(file)
         arrays = {"header": np.array(json.dumps(header)), **self.corrector.arrays()}
+        if self.bands is not None:
+            arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink
         return target
+
+    def export(
+        self, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
+    ) -> list[Path]:
+        """Write it for others, to `c`, `fmu`, `casadi` or `onnx`: see `shipid.export.write.export_predictor`."""
+        from shipid.export.write import export_predictor  # a study does not need it
+
+        return export_predictor(self, to, out, single=single, name=name)
 
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Self:
@@ -138,9 +216,10 @@ class Predictor:
                 f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
             )
         _check_arrays(arrays, file)
+        band = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
         try:
             known = _Header.model_validate(header)
-            vessel = header["vessel"]
+            vessel, bands = header["vessel"], header.get("bands")
             return cls(
                 physics=Physics(
                     None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
@@ -156,6 +235,7 @@ class Predictor:
                 provenance=known.provenance,
                 commands=known.commands,
                 causal=tuple(known.causal),
+                bands=None if bands is None else Bands.from_arrays(bands, band),
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
@@ -193,6 +273,8 @@ def fit(
     validation_runs: Iterable[str] | None = None,
     commands: Commands = "held",
     seed: int = 0,
+    refits: int = 0,
+    kinds: Mapping[str, str] | None = None,
 ) -> Predictor:
     """Fit a method on windows and return a predictor that is ready to predict and to save.
 
@@ -208,6 +290,9 @@ def fit(
         is split in time.
     commands : `held` at their value at the instant, or `known` over the horizon.
     seed : of all that is random.
+    refits : of methods that have no errors on runs left out for nothing (all but `alone` and `path-drawn`), fit so many
+        times more, each without a share of the runs, to calibrate a band; 0 makes such predictors without a band.
+    kinds : kind of manoeuvre by run, for bands that hold their share for runs of a kind.
 
     Raises
     ------
@@ -239,12 +324,43 @@ def fit(
         known=commands == "known",
         seed=seed,
     )
-    corrector = method.fit(task)[name].corrector
+    fitted = method.fit(task)[name]
+    corrector, left_out = fitted.corrector, fitted.left_out
     if corrector is None:
         raise DataError("no training converged: check the windows for outliers, or widen the ranges of the method")
     limits = limits_of(windows, windows.planned)
-    provenance = {"runs": list(windows.spans), "seed": seed}
-    return Predictor(physics, kind_of(method), corrector, limits, provenance, commands)
+    provenance: dict[str, Any] = {"runs": list(windows.spans), "seed": seed}
+    if left_out is None and refits:
+        left_out = np.full_like(windows.future, np.nan)
+        for training, judged in refit_folds(windows, refits, seed):
+            part = windows.select(judged)
+            other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
+            left_out[:, judged] = part.future - other.predict(part.instants(known=commands == "known"))
+    bands, reason = bands_of(left_out, windows, limits, kinds)
+    if bands is None:
+        provenance["no_band"] = reason
+    return Predictor(physics, kind_of(method), corrector, limits, provenance, commands, bands=bands)
+
+
+NO_REFITS = "its errors on runs left out need further fits: set `refits`, such as 5"
+
+
+def bands_of(
+    left_out: Array | None,
+    windows: Windows,
+    limits: Mapping[str, tuple[float, float]],
+    kinds: Mapping[str, str] | None = None,
+) -> tuple[Bands | None, str]:
+    """Bands from errors (T, S, 2) [m] on windows by models that did not see their runs, and why there are none."""
+    if left_out is None:
+        return None, NO_REFITS
+    bands = calibrated(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
+    return bands, "" if bands is not None else "fewer than 3 runs have errors of models that did not see them"
+
+
+def refit_folds(windows: Windows, refits: int, seed: int) -> list[tuple[Index, Index]]:
+    """(Training, judged) indices of windows for each refit, split by run; no more refits than runs, none of one run."""
+    return [] if len(windows.spans) < FEWEST else run_folds(windows, "share", seed, max(refits, 2))
 
 
 def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[float, float]]:

@@ -22,6 +22,7 @@ from shipid.predictor import FORMAT, Predictor
 from shipid.study.apply import predict_log
 from shipid.study.store import DATASET, cell_file, read_test
 from shipid.vessel.load import load_vessel
+from tests.hybrid.runs import made
 from tests.study.tiny import logged
 
 CELL, PURE = "wrong-1+drawn-N0006-s0", "none+drawn-N0006-s0"
@@ -48,7 +49,8 @@ def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
 def test_every_field_survives_a_file(tmp_path: Path) -> None:
     """Each field has a value that is not its default, so that none can be left out of the file."""
     physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
-    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"))
+    bands = made(0)[1]
+    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands)
     for one in (first, physics):
         for place in fields(one):
             value = getattr(one, place.name)
@@ -56,7 +58,28 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
             assert place.default_factory is MISSING or value != place.default_factory(), place.name
     again = Predictor.load(first.save(tmp_path / "all.npz"))
     for place in fields(Predictor):
-        assert getattr(again, place.name) == getattr(first, place.name), place.name
+        if place.name != "bands":
+            assert getattr(again, place.name) == getattr(first, place.name), place.name
+    assert again.bands is not None
+    assert again.bands.header() == bands.header()
+    for name, values in bands.arrays().items():
+        np.testing.assert_array_equal(again.bands.arrays()[name], values)
+
+
+def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
+    predictor = Predictor.load(cell_file(tiny_run, CELL))
+    instants = read_test(tiny_run)[0].instants()
+    found = predictor.predict(instants, level=0.7)
+    np.testing.assert_array_equal(found.paths, predictor.predict(instants))
+    assert found.region.along.shape == found.paths.shape[:2]
+    assert (found.region.radius > 0).all()
+    np.testing.assert_array_equal(found.outside, predictor.outside(instants.columns))
+    alone = predictor.predict(instants, level=0.7, pointwise=True)
+    assert alone.region.radius.mean() < found.region.radius.mean()
+    with pytest.raises(DataError, match="a band of 90 % needs 9 runs or more to calibrate it: there are"):
+        predictor.predict(instants, level=0.9)
+    with pytest.raises(DataError, match="this predictor has no band: it was made without"):
+        replace(predictor, bands=None).predict(instants, level=0.7)
 
 
 def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli import data, identify, predict, simulation, study, vessel
+from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError
 
@@ -19,8 +19,11 @@ app = typer.Typer(
 )
 app.command("simulate")(simulation.simulate)
 app.command("manoeuvre")(simulation.manoeuvre)
+app.command("replay")(replay.replay)
 app.command("identify")(identify.identify)
 app.command("predict")(predict.predict)
+app.command("export")(export.export)
+app.command("aboard")(export.aboard)
 app.add_typer(vessel.app, name="vessel")
 app.add_typer(data.app, name="data")
 app.add_typer(study.app, name="study")

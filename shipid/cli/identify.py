@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +14,9 @@ from shipid.cli.terminal import digits, iterations, show, table
 from shipid.errors import ShipidError
 
 if TYPE_CHECKING:
+    from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identified
+    from shipid.vessel.load import Vessel
 
 
 def identify(
@@ -43,6 +45,9 @@ def identify(
     test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
     ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
     profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
+    band: Annotated[
+        float | None, typer.Option(help="level of bands on the measures of standard manoeuvres, such as 0.9")
+    ] = None,
     design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
     out: Annotated[
         Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml in this folder")
@@ -71,11 +76,12 @@ def identify(
     options = {key: value for key, value in given.items() if value is not None}
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    _look(ship, log, runs or (), test or ())
     try:
         with iterations() as progress:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
-                progress=progress,
+                band=band, progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
@@ -90,6 +96,25 @@ def identify(
 
         content = identification_content(outcome, dataset, command_line())
         typer.echo(f"page -> {write_identification(content, html)}")
+
+
+def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) -> None:
+    """Say what is off between vessel and log before anything is fitted, and draft the correction."""
+    from shipid.errors import DataError
+    from shipid.identification.outcome import pick_runs
+    from shipid.study.first_look import first_look
+    from shipid.study.new import proposed_horizon
+
+    fitted, _ = pick_runs(log, runs, test)
+    try:
+        ahead, step = proposed_horizon(ship, log)
+        found = first_look(ship, log, fitted, ahead=ahead, step=step)
+    except DataError:
+        return  # the fit says what is missing
+    typer.echo(f"warning: {found.sentence}" if found.wrong else found.sentence, err=found.wrong)
+    if found.changes:
+        typer.echo("draft of a correction, to begin with:")
+        typer.echo(found.patch(str(ship.file)))
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:
@@ -133,11 +158,16 @@ def _show_identified(outcome: Identified) -> None:
         typer.echo(f"  {sentence}")
     typer.echo(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(outcome)))
+    banded = "low" in outcome.manoeuvres
     compared = [
-        [row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"]), row["unit"], row["note"]]
+        [
+            *(row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"])),
+            *([f"{digits(row['low'])} ... {digits(row['high'])}"] if banded else []),
+            *(row["unit"], row["note"]),
+        ]
         for row in outcome.manoeuvres.to_dict("records")
     ]
-    show(table(["calm water", "measure", "before", "after", "unit", "note"], compared))
+    show(table(["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"], compared))
     for curve in outcome.profiles:
         typer.echo(f"profile: {curve.sentence}")
     if outcome.programme is not None:

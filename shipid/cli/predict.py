@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from shipid.cli.options import Folder
+from shipid.errors import ShipidError
 
 
 def predict(
@@ -16,12 +17,28 @@ def predict(
     cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv")] = None,
+    level: Annotated[
+        float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: adds its columns")
+    ] = None,
+    kind: Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")] = None,
+    adaptive: Annotated[
+        float | None,
+        typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
+    ] = None,
 ) -> None:
     """Write physics and cooperative paths in north-east for every instant of a log."""
     from shipid.study.apply import predict_log
 
+    if level is None and (kind is not None or adaptive is not None):
+        raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
+    if adaptive is not None and not 0 < adaptive <= 1:
+        raise ShipidError(
+            f"{adaptive:g} is no rate: give a number above 0 and up to 1, such as 0.02", path="--adaptive"
+        )
+
     file = out or Path(f"{cell}.parquet")
-    frame, outside = predict_log(folder, cell, log, mapping, file)
+    frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
-        typer.echo(f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)")
+        said = f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)"
+        typer.echo(said + (": no band is promised there" if level is not None else ""))

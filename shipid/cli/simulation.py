@@ -58,7 +58,9 @@ def manoeuvre(
             metavar="[ANGLES]...",
         ),
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="of the approach in m/s; default: Froude number 0.2")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="of the approach in m/s; default: U_0, else Froude number 0.2")
+    ] = None,
     side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
     step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,

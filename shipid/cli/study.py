@@ -49,6 +49,12 @@ def study_new(
     show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
     for warning in draft.warnings:
         typer.echo(f"warning: {warning}", err=True)
+    for named, look in draft.looks.items():
+        if not look.wrong:
+            typer.echo(look.sentence)
+        elif look.changes:
+            typer.echo(f"draft of a correction, in the study as {look.vessel.key}-corrected; as a patch of its own:")
+            typer.echo(look.patch(named))
     names = ", ".join(model.name for model in draft.plan.foundations)
     typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.foundations)} foundations ({names}) -> {file}")
     typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
@@ -151,12 +157,15 @@ def study_rotate(
     frame = pd.concat(list(counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
     write_table(file, frame)
     typer.echo(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:")
-    columns, rows = ["A", "H", "least", "greatest", "H_90"], []
+    columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     for row in rotate.spread(frame).to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
-        rows.append([name, *(digits(row[column]) for column in columns), better])
-    show(table(["foundation", "A", "H", "least H", "greatest H", "H_90", "H below A"], rows))
+        inside = "-" if row["coverage"] != row["coverage"] else f"{row['coverage']:.0%}"
+        rows.append([name, *(digits(row[column]) for column in columns), inside, better])
+    band = f"in band of {plan.study.bands.level:.0%}"
+    heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
+    show(table(heads, rows))
     typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
     if found := rotate.turn_findings(frame, plan):
         typer.echo("findings over the turns, in brackets 95 % intervals:")
@@ -218,7 +227,7 @@ def study_compare(
     folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],
 ) -> None:
     """Show findings and errors of one study in several worlds: other manoeuvres, families and training."""
-    from shipid.study.compare import compare_errors, compare_findings, read_worlds
+    from shipid.study.compare import compare_bands, compare_errors, compare_findings, read_worlds
 
     worlds = read_worlds(folders)
     findings = compare_findings(worlds)
@@ -231,6 +240,22 @@ def study_compare(
     wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     show(table(columns, wide.reset_index().to_numpy().tolist()))
+    bands = compare_bands(worlds)
+    if len(bands):
+        level = worlds[0].plan.study.bands.level
+        typer.echo(
+            f"bands of {level:.0%}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
+        )
+        columns = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
+        rows = [
+            [
+                *(str(row[name]) for name in ("family", "method", "N_D")),
+                *(f"{row[n]:.2f} [{row[f'{n}_low']:.2f}, {row[f'{n}_high']:.2f}]" for n in ("coverage", "width")),
+                str(row["worlds"]),
+            ]
+            for row in bands.to_dict("records")
+        ]
+        show(table(columns, rows))
 
 
 def _before_work(

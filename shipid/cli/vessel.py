@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.terminal import show, table
+from shipid.cli.terminal import criterion_table, show, table
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
@@ -73,7 +73,20 @@ def vessel_new(
     block: Annotated[float, typer.Option(help="block coefficient")],
     out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
     speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
-    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth (two units)")] = "propeller-rudder",
+    rpm: Annotated[float | None, typer.Option(help="of the screw at that speed; default: a guess")] = None,
+    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth")] = "propeller-rudder",
+    shafts: Annotated[int | None, typer.Option(help="1 or 2; default: 1, of azimuth units 2")] = None,
+    propeller_diameter: Annotated[float | None, typer.Option(help="m; default: a guess")] = None,
+    rudder_area: Annotated[float | None, typer.Option(help="m^2, of each rudder; default: a guess")] = None,
+    rudder_span: Annotated[float | None, typer.Option(help="m, its height; default: a guess")] = None,
+    rudder_rate: Annotated[
+        float | None, typer.Option(help="deg/s of steering gear or azimuth units; default: by SOLAS and scale")
+    ] = None,
+    tunnel_thruster: Annotated[bool, typer.Option("--tunnel-thruster", help="there is one at the bow")] = False,
+    scale: Annotated[
+        float | None, typer.Option(help="of a model: ship length over its own; 1: a ship. Default: 160 m if below 10 m")
+    ] = None,
+    density: Annotated[float | None, typer.Option(help="kg/m^3 of the water; default: sea, fresh for a model")] = None,
     ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
     frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
     lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
@@ -84,9 +97,13 @@ def vessel_new(
         raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
     if out.exists():
         raise ShipidError("exists already: choose another name", file=out)
+    from shipid.simulation.measured import trials
     from shipid.vessel.template import Particulars, first_guess
 
-    given = Particulars(length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area)
+    given = Particulars(
+        length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area, rpm, shafts,
+        propeller_diameter, rudder_area, rudder_span, rudder_rate, tunnel_thruster, scale, density,
+    )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
     out.write_text(guessed.text, encoding="utf-8")
     typer.echo(f"{len(guessed.vessel.parameters)} parameters by formula, none of them measured -> {out}")
@@ -95,6 +112,12 @@ def vessel_new(
         typer.echo("course-stable by these formulae")
     else:
         typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / guessed.growth:.3g} s")
+    for remark in guessed.remarks:
+        typer.echo(remark)
+    judged, notes = trials(guessed.vessel, given.service)
+    show(criterion_table(judged, []))
+    for note in notes:
+        typer.echo(note)
 
 
 def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:

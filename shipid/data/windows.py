@@ -202,7 +202,7 @@ def cut_windows(
         if len(instants):
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
             values = sample(rows, grid)
-            north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
+            north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
             x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
             parts.append(
                 Windows(
@@ -247,23 +247,34 @@ def past_of(
     grid = np.concatenate([instants - step * np.arange(past, 0, -1)[:, None], instants[None]])  # (P + 1, S)
     grid = np.clip(grid, t[0], t[-1])
     values = sample(rows, grid)
-    north, east = _integral(rows, grid) if path == "velocity" else (values["north"], values["east"])
+    north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
     x, y = to_frame(north[:-1], east[:-1], north[-1], east[-1], values["psi"][-1])
     kept = {name: column[:-1] for name, column in values.items() if name not in ("flags", "north", "east")}
     return {**kept, "x": x, "y": y}
 
 
-def _integral(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
+def future_of(
+    rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: Literal["position", "velocity"]
+) -> Array:
+    """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
+    grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], rows["t"].to_numpy()[-1])
+    values = sample(rows, grid)
+    north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
+    x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
+    return np.stack([x, y], axis=-1)[1:]
+
+
+def travelled(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
     """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
     t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
     row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
 
-    def travelled(rate: Array) -> Array:
+    def along(rate: Array) -> Array:
         return np.asarray(
             cumulative_integral(t, rate)[row] + (instants - t[row]) * (rate[row] + np.interp(instants, t, rate)) / 2
         )
 
-    return travelled(u * np.cos(psi) - v * np.sin(psi)), travelled(u * np.sin(psi) + v * np.cos(psi))
+    return along(u * np.cos(psi) - v * np.sin(psi)), along(u * np.sin(psi) + v * np.cos(psi))
 
 
 def concatenate(parts: Sequence[Windows]) -> Windows:

@@ -137,11 +137,15 @@ class Fitted:
     trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
         (`complete` or `diverged`).
     seconds : time spent on this foundation, its share of what is done for several at once.
+    left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
+        window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where
+        the method has them only from further fits: `shipid.hybrid.refits`.
     """
 
     corrector: Corrector | None
     trials: list[dict[str, Any]]
     seconds: float
+    left_out: Array | None = None
 
 
 class Method(BaseModel, ABC):

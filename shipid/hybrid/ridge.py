@@ -30,6 +30,8 @@ from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
 
+SPARE = 4  # further trials whose errors without each run are kept
+
 
 @dataclass(frozen=True)
 class _Inputs:
@@ -60,22 +62,53 @@ class _Part:
     product: Tensor
 
 
+@dataclass(frozen=True)
+class _LeftOut:
+    """A trial for one foundation without each fold in turn, its ridge chosen by the other folds.
+
+    others : (F,) sums of squared errors [m^2] over the judged windows of all folds but that one.
+    errors : (2, S, r) of x and y on the basis; not numbers for windows that no fold judges.
+    """
+
+    others: Array
+    errors: Tensor
+
+
 class _Best:
     """The networks of the best trials of one model so far."""
 
     def __init__(self, most: int) -> None:
         self.most = most
         self.kept: list[tuple[float, dict[str, float], Network]] = []
+        self.left_out: list[tuple[float, _LeftOut]] = []  # of some more trials: without a fold, others may be the best
 
-    def consider(self, params: dict[str, float], value: float, network: Callable[[], Network]) -> None:
+    def consider(
+        self,
+        params: dict[str, float],
+        value: float,
+        network: Callable[[], Network],
+        left_out: Callable[[], _LeftOut],
+    ) -> None:
         """Solve the network if the trial is among the best."""
         if len(self.kept) < self.most or value < self.kept[-1][0]:
             self.kept = sorted([*self.kept, (value, params, network())], key=lambda kept: kept[0])[: self.most]
+        most = self.most + SPARE
+        if len(self.left_out) < most or value < self.left_out[-1][0]:
+            self.left_out = sorted([*self.left_out, (value, left_out())], key=lambda kept: kept[0])[:most]
 
-    def fitted(self, inputs: Inputs, rows: list[Row]) -> Fitted:
-        """Average the best networks."""
+    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array) -> Fitted:
+        """Average the best networks; `errors` are those on runs left out."""
         compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Fitted(compensator, rows, sum(row["seconds"] for row in rows))
+        return Fitted(compensator, rows, sum(row["seconds"] for row in rows), errors)
+
+    def without(self, folds: Sequence[Index]) -> Array:
+        """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
+        others = np.stack([one.others for _, one in self.left_out])  # (trials, F)
+        found = np.full_like(np.asarray(self.left_out[0][1].errors), np.nan)
+        best = np.argsort(others, axis=0, kind="stable")[: self.most]
+        for fold, rows in enumerate(folds):
+            found[:, rows] = np.mean([self.left_out[i][1].errors[:, rows].numpy() for i in best[:, fold]], axis=0)
+        return found
 
 
 @dataclass(frozen=True)
@@ -125,13 +158,15 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
             seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
             hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
             parts = _parts(seen, hidden, group.outputs, device)
-            errors = _left_out(parts, ridges, blocks, terms)
+            errors, by_fold, kept = _left_out(parts, ridges, blocks, terms)
             for k, key in enumerate(group.names):
                 ridge = ridges[errors[:, k].argmin()]
                 params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
-                best[key].consider(params, value, partial(_network, seen, hidden, parts, mine, ridge, basis))
+                network = partial(_network, seen, hidden, parts, mine, ridge, basis)
+                without = partial(_chosen_without, by_fold[:, :, k], kept[..., mine], blocks)
+                best[key].consider(params, value, network, without)
                 rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
             seconds = (time.process_time() - start) / len(group.names)
             for key in group.names:
@@ -142,10 +177,16 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     search.write()
     if not names and task.on_trial is not None:
         task.on_trial(method.trials, method.trials)
-    return {
-        key: best[key].fitted(inputs, search.rows[key]) if key in best else diverged(method, method.points())
-        for key in targets
-    }
+    found, folds = {}, [row.cpu().numpy() for block in blocks for row in block.rows]
+    for key in targets:
+        if key not in best:
+            found[key] = diverged(method, method.points())
+            continue
+        missed = np.tensordot(basis, best[key].without(folds), (1, 2)).transpose(0, 2, 1)
+        errors = np.full_like(targets[key], np.nan)
+        errors[:, windows] = targets[key][:, windows] - np.tensordot(basis, paths[key], 1) + missed
+        found[key] = best[key].fitted(inputs, search.rows[key], errors)
+    return found
 
 
 def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
@@ -192,15 +233,33 @@ def _faster(paths: Array, basis: Array) -> float:
     return float(np.square(paths - np.tensordot(basis @ basis.T, paths, 1)).sum())
 
 
-def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[tuple[Tensor, Tensor]]:
-    """What each fold leaves out, and which of it is judged: rows of the windows (folds, b), equal sizes together."""
+@dataclass(frozen=True)
+class _Block:
+    """Folds of equal size.
+
+    out : rows of the windows that each fold leaves out, (folds, b). judged : which of those are judged, (folds, j).
+    rows : the judged rows of the windows, (folds, j).
+    """
+
+    out: Tensor
+    judged: Tensor
+
+    @property
+    def rows(self) -> Tensor:
+        return self.out.take_along_dim(self.judged, dim=1)
+
+
+def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[_Block]:
+    """What each fold leaves out, and which of it is judged, equal sizes together."""
     pairs: dict[tuple[int, int], list[tuple[Index, Index]]] = {}
     for training, validation in folds:
         out = np.flatnonzero(~np.isin(windows, training))
         judged = np.flatnonzero(np.isin(windows[out], validation))
         pairs.setdefault((len(out), len(judged)), []).append((out, judged))
     stacked = [tuple(np.stack(parts) for parts in zip(*same, strict=True)) for same in pairs.values()]
-    return [(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device)) for out, judged in stacked]
+    return [
+        _Block(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device)) for out, judged in stacked
+    ]
 
 
 def _inputs(table: Mapping[str, Array], device: str, reflection: Array | None = None) -> _Inputs:
@@ -253,22 +312,45 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _left_out(
-    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[tuple[Tensor, Tensor]], terms: int
-) -> Array:
-    """Sums of squared errors (ridges, K) [m^2] over judged windows, each block without itself; `terms` is r."""
-    total = parts[0].targets.new_zeros(len(ridges), parts[0].targets.shape[1] // terms)
-    for part in parts:
-        for out, judged in blocks:
-            rows, targets = part.rotated[out], part.targets[out]  # (folds, b, M), (folds, b, K r)
+    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[_Block], terms: int
+) -> tuple[Array, Array, Tensor]:
+    """Errors over judged windows, each block without itself; `terms` is r.
+
+    Returns sums of squares (ridges, K) [m^2] over all folds, the same of each fold (ridges, F, K), and the errors
+    themselves in single precision, (ridges, 2, S, K r).
+    """
+    targets = parts[0].targets
+    total = targets.new_zeros(len(ridges), targets.shape[1] // terms)
+    by_fold = targets.new_zeros(len(ridges), sum(len(block.out) for block in blocks), targets.shape[1] // terms)
+    kept = torch.full((len(ridges), 2, *targets.shape), torch.nan, dtype=torch.float32, device=targets.device)
+    for side, part in enumerate(parts):
+        first = 0
+        for block in blocks:
+            rows, wanted = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
             without = _few_rows if rows.shape[1] <= rows.shape[2] else _many_rows
-            errors = without(part, rows, targets)
+            errors, judged_rows = without(part, rows, wanted), block.rows
             for i, ridge in enumerate(ridges):
                 error = errors(part.eigenvalues + ridge)
-                if judged.shape != out.shape:
-                    error = error.take_along_dim(judged[:, :, None], dim=1)
-                total[i] += error.square().sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
-    found: Array = total.cpu().numpy()
-    return found
+                if block.judged.shape != block.out.shape:
+                    error = error.take_along_dim(block.judged[:, :, None], dim=1)
+                squares = error.square()
+                total[i] += squares.sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
+                by_fold[i, first : first + len(error)] += squares.sum(dim=1).view(len(error), -1, terms).sum(dim=2)
+                kept[i, side, judged_rows] = error.float()
+            first += len(block.out)
+    return total.cpu().numpy(), by_fold.cpu().numpy(), kept
+
+
+def _chosen_without(by_fold: Array, kept: Tensor, blocks: Sequence[_Block]) -> _LeftOut:
+    """A trial without each fold in turn: by_fold (ridges, F) [m^2], kept (ridges, 2, S, r)."""
+    others = by_fold.sum(axis=1, keepdims=True) - by_fold
+    ridge = others.argmin(axis=0)  # (F,)
+    errors, fold = torch.full_like(kept[0], torch.nan), 0
+    for block in blocks:
+        for rows in block.rows:
+            errors[:, rows] = kept[ridge[fold]][:, rows]
+            fold += 1
+    return _LeftOut(others.min(axis=0), errors.cpu())
 
 
 def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:

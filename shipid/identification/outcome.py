@@ -18,9 +18,11 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
+from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
 from shipid.identification.collinearity import listed, short
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
 from shipid.identification.solve import Solution, identify
@@ -39,7 +41,6 @@ from shipid.vessel.perturb import patch_text
 
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
-LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 SIGNALS = ("u", "v", "r", "position")
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
@@ -65,7 +66,7 @@ class Identified:
     estimates : `path`, `name` (short), `with` (tied paths), `unit`, `base`, `value`, `error`, `low`, `high` [unit],
         `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
     ahead : length of a free run [s], 0 for whole runs. free : set (`fit`, `test`) -> free runs `before` and `after`.
-    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`; with a band also `low` and `high`.
     colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
     programme : manoeuvres to run next, ranked by `shipid.identification.design.rank`; None: not requested.
     """
@@ -191,6 +192,7 @@ def run_identification(
     ahead: float = 0.0,
     profiles: Sequence[str] = (),
     programme: bool = False,
+    band: float | None = None,
     progress: Progress | None = None,
 ) -> Identified:
     """Identify a vessel from recorded runs, and validate it by free runs, also of the runs held out.
@@ -200,6 +202,7 @@ def run_identification(
     runs, held_out : names or patterns, as `pick_runs` takes them.
     ahead : length of the free runs [s], 0 for whole runs.
     profiles : factors whose profile likelihood is computed. programme : whether to rank manoeuvres to run next.
+    band : level of the bands on the measures of standard manoeuvres, such as 0.9; None: none.
     progress : called with the iteration number and the objective; a true return value stops.
 
     Raises
@@ -207,6 +210,7 @@ def run_identification(
     DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
     ShipidError : the fit did not converge; the message says why.
     """
+    check_level(band)
     fitted, tested = pick_runs(dataset, runs, held_out)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
     with uninterrupted() as held:  # an interrupted library call raises an unrelated error
@@ -229,7 +233,14 @@ def run_identification(
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
         _go_on(held)
+        manoeuvres, refused = _manoeuvres(pair), ""
+        if band is not None:
+            manoeuvres, refused = _banded(manoeuvres, vessel, solution, judged, band)
+        _go_on(held)
         warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
+        warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
+        if refused:
+            warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
         return Identified(
             vessel=vessel,
             solution=solution,
@@ -240,7 +251,7 @@ def run_identification(
             estimates=_estimates(vessel, solution, judged),
             ahead=ahead,
             free=pairs,
-            manoeuvres=_manoeuvres(pair),
+            manoeuvres=manoeuvres,
             colours=_colours(solution),
             programme=_programme(pair[AFTER], dataset, fitted, solution, judged) if programme else None,
             profiles=curves,
@@ -326,6 +337,30 @@ def _manoeuvres(pair: Mapping[str, Vessel]) -> pd.DataFrame:
             note = "; ".join([*notes, *why])
             rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
     return pd.DataFrame(rows)
+
+
+def _banded(
+    manoeuvres: pd.DataFrame, vessel: Vessel, solution: Solution, judged: Statistics, level: float
+) -> tuple[pd.DataFrame, str]:
+    """The measures with the band of each, `low` and `high`; or as they are, and why there is no band."""
+    why = refusal(solution, judged, _spacing(solution))
+    if why:
+        return manoeuvres, why
+
+    def performed(kind: str, angles: Sequence[float]) -> Measure:
+        def measure(one: Vessel) -> dict[str, float]:
+            found = _measured(one, kind, angles)
+            names = [name.replace("_", " ") for name in COMPARED[kind]]
+            return {name: float(found[name]["value"]) for name in names if name in found}
+
+        return measure
+
+    titled = [
+        (f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}", performed(kind, angles)) for kind, angles in TRIED
+    ]
+    found = bands(vessel, solution, judged, titled, level)
+    ends = found[["manoeuvre", "measure", "low", "high"]]
+    return manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"]), ""
 
 
 def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, dict[str, Any]]:

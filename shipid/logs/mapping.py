@@ -43,7 +43,18 @@ INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
-Manoeuvre = Literal["zigzag", "turning", "speed run", "transit"]
+Manoeuvre = Literal[
+    "zigzag",
+    "turning",
+    "spiral",
+    "pull-out",
+    "stop",
+    "coasting",
+    "speed run",
+    "transit",
+    "random",
+    "manoeuvring at low speed",
+]
 
 
 class Source(Strict):

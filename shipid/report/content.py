@@ -56,6 +56,7 @@ class Snapshot:
     truth : (T + 1, 2) true x, y from the instant of prediction on [m].
     paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; physics has N_D = 0.
     wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
+    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m]; only where there is one.
     """
 
     run: str
@@ -65,6 +66,7 @@ class Snapshot:
     truth: Floats
     paths: Mapping[PathKey, Floats]
     wind: tuple[float, float] | None = None
+    bands: Mapping[PathKey, Floats] = field(default_factory=dict)
 
 
 def _empty(*columns: str) -> pd.DataFrame:

@@ -76,6 +76,35 @@ def error_map(content: ReportContent) -> Figure | None:
     )
 
 
+def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: str) -> Figure | None:
+    """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`."""
+    rows = _rows(content)
+    counts = sorted({int(size) for size in content.cells.N_D})
+    means = trained(content)
+    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+        return None
+    spots = [spot._replace(words=_plainly(spot)) for spot in _spots(content, means, rows)]
+    span = (float(means.H.min()), float(means.H.max()))
+    good = [spot for spot in spots if math.isfinite(spot.H)]
+    best, worst = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
+    said = f"From {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
+    return Figure(
+        id=id,
+        title=title,
+        takeaway=f"{said}N_D = {worst.size}).",
+        how=how,
+        alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
+        height=HEIGHT,
+        views={"": [Panel(_flat(rows, counts, spots, span, []))]},
+        scale=Scale(scale, *span, "--heat"),
+    )
+
+
+def _plainly(spot: Spot) -> str:
+    """Hover text of a quantity that is not H."""
+    return f"<b>{label(spot.model)}</b>, N_D = {spot.size}<br>{metres(spot.H)}"
+
+
 def _rows(content: ReportContent) -> pd.DataFrame:
     """Return the models of the cells by A: model, family, A [m], y (square root of A; models without A above)."""
     frame = families(content)
@@ -289,7 +318,7 @@ def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float],
     words = [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
     x = axis("models by A [m]", tickvals=shown.tolist(), ticktext=words, showgrid=False)
     top = 1.03 * max(span[1] + back * deep, back * (deep + 1))
-    y = axis("H [m] of the front row", range=[0, top], tickvals=_heights(span[1]))
+    y = axis("H, front row [m]", range=[0, top], tickvals=_heights(span[1]))
     some = np.unique(np.linspace(0, deep, min(len(counts), 5)).round().astype(int))
     places = [_oblique(last + 0.55, deep - i, 0.0, back) for i in some]
     notes = [

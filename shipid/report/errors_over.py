@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from shipid.report import tables
 from shipid.report.content import Floats, Indices, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
@@ -250,6 +251,6 @@ def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
 
 SECTION = Section(
     "Where the error grows",
-    draw=lambda content: (horizon(content), over_time(content)),
-    anchors=("horizon", "over-time"),
+    draw=lambda content: (horizon(content), tables.kinds(content), over_time(content)),
+    anchors=("horizon", "kinds", "over-time"),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,11 +98,11 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
 
 
 def _lines(
-    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style], log_axis: bool
+    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style], log_axis: bool
 ) -> go.Figure:
     sizes = sorted(content.cells.N_D.unique())
     traces = []
-    for name, style in reversed(looks.items()):  # what has no physics first: it must not cover the others
+    for name, style in reversed(list(looks.items())):  # what has no physics first: it must not cover the others
         mine = means[means.model == name].set_index("N_D")[statistic.cell]
         if mine.empty:
             continue
@@ -139,7 +140,7 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     parts = []
     for size in (means.N_D.min(), means.N_D.max()):
         here = means[means.N_D.eq(size)].set_index("model").H
-        known = [f"{name} has H = {metres(here[name])}" for name in (content.best, pure) if name in here.index]
+        known = [f"{name} has H = {metres(here[name])}" for name in (content.best, pure) if name and name in here.index]
         parts.append(
             f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
         )
@@ -176,7 +177,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
 
 
 def _dumbbells(
-    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: dict[str, Style], names: list[str]
+    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style], names: list[str]
 ) -> go.Figure:
     before = content.models.set_index("model")[statistic.model].reindex(names).astype(float)
     after = means.set_index("model")[statistic.cell].reindex(names)

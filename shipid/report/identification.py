@@ -13,24 +13,20 @@ import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import Finding, Floats, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, plane
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
-from shipid.report.palette import GRID, INK, MUTED, category
+from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
-POINTS = 600  # of one line: more than pixels are wide
 FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
-LOG, BEFORE, AFTER = "measured", "before", "after"
+BEFORE, AFTER = "before", "after"
 INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
 DASHES = {LOG: "solid", BEFORE: "dot", AFTER: "solid"}
-SIGNALS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
-    "r": ("yaw rate, r", "deg/s", float(np.rad2deg(1.0)))
-}
-"""Column -> what it is, the unit shown, and how many of those an SI unit is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,41 +268,7 @@ def free_runs(content: IdentificationContent) -> Figure:
 
 
 def _panels(rows: pd.DataFrame) -> list[Panel]:
-    start, parts = float(rows["t"].min()), {name: _joined(rows[rows["model"] == name]) for name in INKS}
-    panels = []
-    for column, (title, unit, factor) in SIGNALS.items():
-        traces = [
-            line(name, mine["t"].to_numpy() - start, factor * mine[column].to_numpy(), [name], unit, line=_ink(name))
-            for name, mine in parts.items()
-        ]
-        y = axis(f"{title} [{unit}]", nticks=6, zeroline=True, zerolinecolor=GRID)
-        panels.append(Panel(go.Figure(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
-    tracks = [
-        line(name, mine["east"].to_numpy(), mine["north"].to_numpy(), [name], line=_ink(name))
-        for name, mine in parts.items()
-    ]
-    shown = pd.concat([parts[LOG], parts[AFTER]])
-    bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
-    return [*panels, Panel(go.Figure(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
-
-
-def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the spans (low, high) of a map; one without width gets 1 on each side."""
-    return [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
-
-
-def _ink(name: str) -> dict[str, Any]:
-    return {"color": INKS[name], "width": 1.4 if name == LOG else 2, "dash": DASHES[name]}
-
-
-def _joined(mine: pd.DataFrame) -> pd.DataFrame:
-    """Join the pieces of a line, with a gap between them."""
-    every = max(1, len(mine) // POINTS)
-    parts = []
-    for _, piece in mine.groupby("piece", sort=False):
-        gap = piece.iloc[-1:].assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
-        parts += [piece.iloc[::every], gap]
-    return pd.concat(parts)
+    return panels(rows, {name: {"color": INKS[name], "dash": DASHES[name]} for name in INKS}, (LOG, AFTER))
 
 
 def errors(content: IdentificationContent) -> Table:
@@ -335,19 +297,21 @@ def manoeuvres(content: IdentificationContent) -> Table | None:
     if content.manoeuvres.empty:
         return None
     noted = bool(content.manoeuvres["note"].ne("").any())
+    banded = "low" in content.manoeuvres
     rows = [
         [
             text(row["manoeuvre"]),
             text(row["measure"]),
-            *(_short(row[name]) for name in (BEFORE, AFTER)),
+            *(_short(row[name]) for name in (BEFORE, AFTER, *(("low", "high") if banded else ()))),
             text(row["unit"]),
             *[Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] * noted,
         ]
         for row in content.manoeuvres.to_dict("records")
     ]
-    head = ["manoeuvre", "measure", BEFORE, AFTER, "unit", *["why missing"] * noted]
+    head = ["manoeuvre", "measure", BEFORE, AFTER, *["band from", "to"] * banded, "unit", *["why missing"] * noted]
     takeaway = "Simulated in calm deep water from a Froude number of 0.2."
-    numeric = [False, False, True, True, False, *[False] * noted]
+    takeaway += " The band is what the uncertainty of the estimates leaves open." if banded else ""
+    numeric = [False, False, True, True, *[True, True] * banded, False, *[False] * noted]
     return Table("manoeuvres", "Standard manoeuvres", takeaway, head, numeric, rows)
 
 

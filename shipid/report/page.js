@@ -137,7 +137,12 @@
       x: aside, y: ahead, mode: "lines", meta: windows.lines[line].keys, line: windows.lines[line].line,
       hovertemplate: `${escaped(windows.lines[line].name)}<extra></extra>`,
     }));
-    const data = [truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
+    const bands = shown.filter((path) => path.length > 5).map(([line, , , , , ahead, aside]) => ({
+      x: aside, y: ahead, mode: "lines", meta: [...windows.lines[line].keys, "band"], hoverinfo: "skip",
+      line: { color: windows.lines[line].line.color, width: 0.5 }, opacity: 0.15,
+      fill: "toself", fillcolor: windows.lines[line].line.color,
+    }));
+    const data = [...bands, truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
     const layout = { ...windows.layout };
     if (panel.spans) {
       layout.xaxis = { ...layout.xaxis, range: panel.spans[0] };

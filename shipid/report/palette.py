@@ -67,7 +67,7 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
-    result = {}
+    result: dict[str, Style] = {}
     for index, row in enumerate(frame.itertuples()):
         if row.family == DATA_DRIVEN:
             result[str(row.model)] = _without_physics(sum(style.colour == INK for style in result.values()))

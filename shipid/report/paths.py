@@ -131,8 +131,9 @@ def _compared(content: ReportContent) -> list[str]:
 def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
-    A path is `[line, size, x, y, end error]`; `line` is an index into `lines`, `size` into the N_D offered or -1
-    for a path that does not depend on N_D. Lengths are metres, angles radians.
+    A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
+    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
+    are metres, angles radians.
     """
     runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
     lines: dict[tuple[str, str], int] = {}
@@ -148,6 +149,8 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
                 paths.append([which, at, *_drawable(points, detail), _rounded(_end_error(window, points), 0.001)])
+                if (model, source, size) in window.bands:
+                    paths[-1] += _drawable(window.bands[model, source, size], detail)
             wind = None if window.wind is None else [round(value, 3) for value in window.wind]
             packed[run].append(
                 {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _drawable(window.truth, detail)}
@@ -231,6 +234,11 @@ def window_figure(
     for (model, source, count), points in window.paths.items():
         if source == "naive" or (model in drawn and (source != "cooperative" or count == size)):
             look = _line(content, model, source)
+            if (model, source, count) in window.bands:
+                outline, ink = window.bands[model, source, count], {"color": look["line"]["color"], "width": 0.5}
+                shade = {"fill": "toself", "fillcolor": look["line"]["color"], "opacity": 0.15}
+                keys = [*look["keys"], "band"]
+                traces.append(line(f"{look['name']}, band", *_aside(outline), keys, line=ink, **shade))
             traces.append(line(look["name"], *_aside(points), look["keys"], line=look["line"]))
     return go.Figure(traces, plane("y, to starboard [m]", "x, ahead [m]"))
 
@@ -257,6 +265,7 @@ def _chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
     """Legend of the windows; of some models, if they are given."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
     chips = [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
+    chips += [Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)
     others = {f"model:{name}" for name in exemplars(content) if name not in only} if only else set()
     return [chip for chip in chips if chip.key not in others]
 

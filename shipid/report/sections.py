@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from shipid.report import cells, error_map, errors_over, factors, logs, memory, methods, paths, search
+from shipid.report import bands, cells, error_map, errors_over, factors, logs, memory, methods, paths, search
 from shipid.report.section import Section
 
 SECTIONS: dict[str, Section] = {
     "results": error_map.SECTION,
     "errors": errors_over.SECTION,
+    "how-far-off": bands.SECTION,
     "methods": methods.SECTION,
     "the-past": memory.SECTION,
     "predictions": paths.SECTION,

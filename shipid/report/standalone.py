@@ -13,6 +13,7 @@ import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, choices
 from shipid.report import (
+    bands,
     checks,
     error_map,
     errors_over,
@@ -29,6 +30,8 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Scale, label
 FIGURES: dict[str, Callable[[Any], Figure | None]] = {
     "error_map": error_map.error_map,
     "gain": gain.gain,
+    "coverage": bands.coverage,
+    "width_map": bands.width_map,
     "error_over_horizon": errors_over.horizon,
     "error_over_time": errors_over.over_time,
     "factors": factors.factors,

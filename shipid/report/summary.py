@@ -24,7 +24,7 @@ def summary(content: ReportContent) -> str:
         f"Constant surge, sway and yaw rate: mean {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
         f"root mean square {metres(naive['rms'])}.",
     ]
-    for table in (tables.models(content), tables.cells(content)):
+    for table in filter(None, (tables.kinds(content), tables.models(content), tables.cells(content))):
         rows = [[cell.text for cell in row] for row in table.rows]
         parts += [f"## {table.title}", _plain(table.takeaway), _grid(table.columns, rows)]
     parts += ["## Provenance", _grid(["", ""], [[key, value] for key, value in content.provenance.items()])]

@@ -58,6 +58,8 @@ CELLS = {
     "H": ("H [m]", 2),
     "H_90": ("H_90 [m]", 2),
     "rms": ("rms [m]", 2),
+    "coverage": ("in band [1]", 2),
+    "width": ("radius of band [m]", 2),
     "status": ("status", None),
     "seconds": ("time [s]", 0),
     "trials": ("trials [1]", 0),
@@ -76,6 +78,15 @@ MODELS = {
     "status": ("status", None),
     "description": ("what it is", None),
 }
+KINDS = {
+    "kind": ("kind of run", None),
+    "runs": ("test runs", None),
+    "model": ("model", None),
+    "how": ("how", None),
+    "mean": ("over the horizon [m]", 2),
+    "end": ("at its end [m]", 2),
+}
+HOW = {"naive": "constant u, v, r", "physics": "physics alone", "cooperative": "with data"}
 REPAIRS = {
     "kind": ("repair", None),
     "column": ("column", None),
@@ -100,6 +111,24 @@ def _with_trials(cells: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     states = pd.crosstab(trials.cell, trials.state).reindex(columns=["complete", "stopped", "diverged"], fill_value=0)
     states = states.assign(trials=trials.groupby("cell").size()).drop(columns="complete")
     return cells.merge(states, how="left", left_on="cell", right_index=True)
+
+
+def kinds(content: ReportContent) -> Table | None:
+    """Error over the horizon and at its end, by kind of test run; None without rows."""
+    frame = content.frames.get("kinds")
+    if frame is None or frame.empty:
+        return None
+    pairs = zip(frame.source, frame.N_D, strict=True)
+    how = [HOW[source] + (f", {N_D} runs" if N_D else "") for source, N_D in pairs]
+    shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
+    learned = frame[frame.source.eq("cooperative")]
+    best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
+    said = [
+        f"{row['kind']}: {number(row['mean'])} m, at the end {number(row['end'])} m ({row['model']})"
+        for row in best.to_dict("records")
+    ]
+    takeaway = f"Least error with data: {'; '.join(said)}." if said else "No cell has a result."
+    return _table("kinds", "Errors by kind of run", takeaway, shown, KINDS)
 
 
 def models(content: ReportContent) -> Table:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.errors import ShipidError
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import record_of
@@ -22,6 +23,8 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
 
+TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigzag", (10, 10)), ("zigzag", (20, 20)))
+"""Standard manoeuvres [deg] that have criteria."""
 LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its steady levels are read from a record
 
 
@@ -63,6 +66,21 @@ def measure_standard(
     measures, length = MEASURES[chosen.kind](record), length_of(vessel)
     judged = criterion_rows(criteria(chosen.kind, measures, length))
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
+
+
+def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
+    """Criteria of IMO MSC.137(76) for a turn at 35 deg of helm and zigzags 10/10 and 20/20, one dict for each.
+
+    Also a sentence for each manoeuvre that this vessel cannot perform. `speed` [m/s] is that of the approach.
+    """
+    rows: list[dict[str, Any]] = []
+    notes = []
+    for name, angles in TRIALS:
+        try:
+            rows += measure_standard(vessel, name, angles, speed=speed).criteria
+        except ShipidError as error:
+            notes.append(f"{name} {'/'.join(f'{angle:g}' for angle in angles)}: {error.message}")
+    return rows, notes
 
 
 def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:

@@ -66,7 +66,8 @@ def standard(
     ----------
     name : `zigzag`, `turning`, `pull-out`, `spiral`, `reverse-spiral`, `stop`.
     angles : [deg] of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate [deg/s].
-    speed : approach speed [m/s]; default: Froude number 0.2. side : first turn, `starboard` or `port`.
+    speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
+    side : first turn, `starboard` or `port`.
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
         for a zigzag, 40 for a level of a spiral, 80 for a stop.
     step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
@@ -89,7 +90,7 @@ def standard(
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    asked = FROUDE * np.sqrt(GRAVITY * length) if speed is None else speed
+    asked = service_speed(vessel) if speed is None else speed
     n_rpm = shaft_speed(Controls.of(vessel), asked) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
@@ -103,6 +104,15 @@ def length_of(vessel: Vessel) -> float | None:
     """Length between perpendiculars [m]; None if the document does not give it."""
     length = vessel.document.get("particulars", {}).get("L_pp")
     return None if length is None else float(length)
+
+
+def service_speed(vessel: Vessel) -> float:
+    """Service speed U_0 of the document [m/s]; that of a Froude number of 0.2 if it gives none.
+
+    The vessel must have a length.
+    """
+    given = vessel.document["particulars"].get("U_0")
+    return float(FROUDE * np.sqrt(GRAVITY * vessel.document["particulars"]["L_pp"]) if given is None else given)
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:

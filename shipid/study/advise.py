@@ -265,12 +265,13 @@ def _count(value: float, found: Estimate) -> str:
 
 def _headline(case: Case) -> str:
     """What the model that validation prefers does at the largest amount of data."""
-    row = case.at(case.largest).set_index("model").loc[case.best]
+    rows = case.at(case.largest).set_index("model")
+    alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
     told = "" if case.smallest < case.largest else "best in validation; "
     text = (
-        f"With {runs(case.largest)}, {case.best} ({told}{metres(row['A'])} mean error on its own) "
+        f"With {runs(case.largest)}, {case.best} ({told}{metres(alone)} mean error on its own) "
         f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
-        f"below {metres(row['H_90'])}"
+        f"below {metres(worst)}"
     )
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
     return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pandas as pd
 
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
-from shipid.data.windows import Instants, from_frame, past_of
+from shipid.data.windows import Instants, from_frame, future_of, past_of
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
-from shipid.hybrid.physics import check_columns
+from shipid.hybrid.bands import Region, adapted, adaptive, factor
+from shipid.hybrid.physics import Physics, check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Estimates, observe
@@ -21,18 +23,39 @@ from shipid.study import seals
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file
 
+Array = np.ndarray
 
-def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Path) -> tuple[pd.DataFrame, float]:
+
+def predict_log(
+    folder: Path,
+    cell: str,
+    log: Path,
+    mapping: str | None,
+    out: Path,
+    *,
+    level: float | None = None,
+    kind: str | None = None,
+    rate: float | None = None,
+) -> tuple[pd.DataFrame, float]:
     """Write physics and cooperative paths in north-east for every instant of a log.
 
     Where the predictor takes known commands they are those that the log holds later, and an instant needs them for the
     whole horizon.
 
-    Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m],
-    outside) and the share of instants outside the training's limits. Pure data-driven cells have NaN for physics.
+    Parameters
+    ----------
+    level : share of whole paths that the columns of the band hold; None: no such columns. kind : of the manoeuvre.
+    rate : with one, the band adapts along each run at this rate, see `shipid.hybrid.bands.adapted`.
+
+    Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m], outside;
+    with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
+    the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
+    training's limits. Pure data-driven cells have NaN for physics.
     """
     check_table(out)
     predictor = Predictor.load(_known_cell(folder, cell))
+    if level is not None:
+        predictor.check_level(level, kind)
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
@@ -41,12 +64,22 @@ def predict_log(folder: Path, cell: str, log: Path, mapping: str | None, out: Pa
     estimates = None
     if predictor.vessel is not None and predictor.physics.observer is not None:
         estimates = observe(predictor.vessel, dataset, predictor.physics.observer)
-    parts = [_along(predictor, dataset, run, rows, estimates) for run, rows in pieces(dataset)]
+    band = None if level is None else Band(level, kind, rate)
+    parts = [_along(predictor, dataset, run, rows, estimates, band) for run, rows in pieces(dataset)]
     frame = pd.concat(parts, ignore_index=True)
     if frame.empty:
         raise DataError(_too_short(predictor), file=log)
     write_table(out, frame)
     return frame, float(frame["outside"].mean())
+
+
+@dataclass(frozen=True)
+class Band:
+    """What a band along a log is to be: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
+
+    level: float
+    kind: str | None = None
+    rate: float | None = None
 
 
 def _too_short(predictor: Predictor) -> str:
@@ -71,7 +104,12 @@ def _known_cell(folder: Path, cell: str) -> Path:
 
 
 def _along(
-    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, estimates: Estimates | None
+    predictor: Predictor,
+    dataset: Dataset,
+    run: str,
+    rows: pd.DataFrame,
+    estimates: Estimates | None,
+    band: Band | None = None,
 ) -> pd.DataFrame:
     """Predictions from every instant of one unbroken stretch that has the past and the plan that they need."""
     physics, t = predictor.physics, rows["t"].to_numpy()
@@ -110,5 +148,46 @@ def _along(
     for name, path in (("physics", alone), ("cooperative", predicted)):
         north, east = from_frame(path[..., 0], path[..., 1], *origin)
         result[f"{name}_north"], result[f"{name}_east"] = north.T.ravel(), east.T.ravel()
+    if band is not None:
+        region = predictor.band(predicted, instants, band.level, kind=band.kind)
+        if band.rate is not None:
+            assert predictor.bands is not None
+            judged = _later(rows, t[first:last], predicted, region, physics)
+            table = predictor.bands.table(band.kind)
+            factors = along_run(judged, columns["t"] + physics.horizon * physics.step, columns["t"], band, table)
+            region, result["band_factor"] = region.scaled(factors), np.repeat(factors, steps)
+        course = np.arctan2(region.ahead[..., 1], region.ahead[..., 0]) + columns["psi"]
+        result["band_along"], result["band_across"] = region.along.T.ravel(), region.across.T.ravel()
+        result["band_course"] = np.mod(course, 2 * np.pi).T.ravel()
     result["outside"] = np.repeat(predictor.outside(columns), steps)
     return pd.DataFrame(result)
+
+
+def _later(rows: pd.DataFrame, instants: Array, predicted: Array, region: Region, physics: Physics) -> Array:
+    """Greatest reach (S,) over the horizon of the paths that the log holds later; not a number where it ends before."""
+    t, horizon = rows["t"].to_numpy(), physics.horizon * physics.step
+    whole = instants + horizon <= t[-1] + clock_slack(t)
+    reach = np.full(len(instants), np.nan)
+    if whole.any():
+        future = future_of(rows, instants[whole], physics.horizon, physics.step, physics.path)
+        some = Region(region.ahead[:, whole], region.along[:, whole], region.across[:, whole])
+        reach[whole] = some.reach(future - predicted[:, whole]).max(axis=0)
+    return reach
+
+
+def along_run(reach: Array, known_at: Array, now: Array, band: Band, table: Array) -> Array:
+    """Factors (S,) of a band that adapts along a run: at each instant, by the paths that have ended until then.
+
+    Parameters
+    ----------
+    reach : (S,) greatest error of each path over its band as calibrated; not a number where it never ends in the log.
+    known_at, now : (S,) when each path ends, and the instants themselves [s], in order. table : radii of the band.
+    """
+    state, factors, waiting = adaptive(band.level, band.rate or 0.0), np.ones(len(now)), 0
+    for i, t in enumerate(now):
+        while waiting < i and known_at[waiting] <= t + 1e-9:
+            if np.isfinite(reach[waiting]):
+                state = adapted(state, bool(reach[waiting] > factors[waiting]))
+            waiting += 1
+        factors[i] = factor(state, table)
+    return factors

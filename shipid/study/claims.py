@@ -46,6 +46,10 @@ class Claims:
                 with suppress(OSError):
                     self._file(unit).unlink(missing_ok=True)
             self._mine.clear()
+        for file in self._folder.glob("*"):  # of runs that were killed when a unit was finished already
+            if self._is_abandoned(file):
+                with suppress(OSError):
+                    file.unlink(missing_ok=True)
         with suppress(OSError):
             self._folder.rmdir()  # fails while others have claims
 

@@ -77,3 +77,24 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
         parts.append(means.reset_index().assign(world=world))
     grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)["H"]
     return grouped.agg(mean="mean", low="min", high="max", worlds="size").reset_index()
+
+
+def compare_bands(worlds: Sequence[Results]) -> pd.DataFrame:
+    """Coverage and width [m] of the bands per family, method and N_D: means over members and seeds, then over worlds.
+
+    Columns: family, method, N_D, coverage, coverage_low, coverage_high, width, width_low, width_high, worlds (that have
+    a band); without rows where no cell has one.
+    """
+    parts = []
+    for results in worlds:
+        keys = ["family", "method", "N_D", "status", "coverage", "width"]
+        good = results.cells.reindex(columns=keys).astype({"coverage": float, "width": float})
+        good = good[(good["status"] == "ok") & good["coverage"].notna()]
+        parts.append(good.groupby(["family", "method", "N_D"], sort=False)[["coverage", "width"]].mean().reset_index())
+    grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)
+    named = {
+        f"{name}{suffix}": (name, how)
+        for name in ("coverage", "width")
+        for suffix, how in (("", "mean"), ("_low", "min"), ("_high", "max"))
+    }
+    return grouped.agg(**named, worlds=("width", "size")).reset_index()

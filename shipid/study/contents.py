@@ -13,7 +13,7 @@ from shipid.files import write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent
-from shipid.study import advise, memory, methods, store
+from shipid.study import advise, bands, memory, methods, store
 from shipid.study import results as parts
 from shipid.study.findings import findings
 from shipid.study.plan import Plan
@@ -26,8 +26,13 @@ ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "m
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
+    "kinds": parts.kinds_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
+    "coverage": bands.coverage_frame,
+    "coverage_groups": bands.groups_frame,
+    "coverage_runs": bands.worst_frame,
+    "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
@@ -38,7 +43,7 @@ def report_content(results: Results) -> ReportContent:
     return ReportContent(
         title=results.plan.study.question,
         name=results.plan.name,
-        answer=[Sentence(text, figure) for text, figure in advise.answer(results)],
+        answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=parts.naive_summary(results),

@@ -44,7 +44,8 @@ class ErrorTable:
     @property
     def weights(self) -> Array:
         """(R,) share of the windows in each manoeuvre."""
-        return self.counts / self.counts.sum()
+        weights: Array = self.counts / self.counts.sum()
+        return weights
 
     @cached_property
     def noise(self) -> Array:
@@ -52,7 +53,9 @@ class ErrorTable:
         by_seed = {model: values @ self.weights for model, values in self.H.items()}
         seeds = max((values.shape[1] for values in by_seed.values()), default=1)
         every = range(len(self.amounts))
-        return np.array([training_noise([values[k] for values in by_seed.values()]) for k in every]) / seeds**0.5
+        noise = np.array([training_noise([values[k] for values in by_seed.values()]) for k in every], dtype=float)
+        relative: Array = noise / seeds**0.5
+        return relative
 
     def by_run(self, model: str, place: int) -> Array:
         """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""

@@ -25,6 +25,7 @@ from shipid.study.plan import NO_MODEL, Claims, Plan
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     Finding,
+    Verdict,
     every,
     manoeuvres,
     measured,
@@ -92,7 +93,7 @@ def judged(rivals: Rivals) -> list[Finding]:
     before, after = (abs(table.mean(bad, at) - table.mean(good, at)) for at in (ALONE, place))
     narrower = gaps.mean[0] < gaps.mean[1]  # the one that counts: the gap of H has the sign of that of A, or not
     share, worst, found = _worst(rivals)
-    verdicts = {
+    verdicts: dict[str, Verdict] = {
         "R1": verdict(every(own.above), some(own.below)),
         "R2": verdict(every(about.above[:1]), some(about.below[:1])),
         "R3": verdict(every(gaps.above), some(gaps.below)),
@@ -134,7 +135,7 @@ def judged(rivals: Rivals) -> list[Finding]:
     ]
 
 
-def _worst(rivals: Rivals) -> tuple[float, str, str]:
+def _worst(rivals: Rivals) -> tuple[float, str, Verdict]:
     """Share of steps at which `none` has the largest mean error, who most often has it, and the verdict on R4."""
     weights = rivals.table.weights
     means = np.stack([error @ weights for error in rivals.steps.values()])

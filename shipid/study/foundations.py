@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
 from shipid.observer import Estimates
-from shipid.study.plan import Batch, Foundation, Plan
+from shipid.study.plan import Foundation, Plan
 from shipid.study.prepare import Prepared, estimates_of, paths_of
 
 if TYPE_CHECKING:
@@ -44,22 +44,27 @@ class Prediction:
         return summary(position_error(self.test_paths, test.future))
 
 
-def predictions(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> dict[str, Prediction]:
-    """Every foundation of a batch; those to be identified see the runs of the batch, and no moment of the test."""
-    mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
+def predictions(
+    plan: Plan, prepared: Prepared, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
+) -> dict[str, Prediction]:
+    """Every foundation for some runs of the pool; those to be identified see these runs, and no moment of the test.
+
+    wanted : names of foundations; None: all.
+    """
+    mask = np.isin(prepared.pool.run, runs)
     windows = prepared.pool.select(mask)
     result = {}
     data: Dataset | None = None
     known: dict[Any, Solution] = {}
     for one in prepared.foundations:
+        if wanted is not None and one.name not in wanted:
+            continue
         if one.identify is None:
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
             result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
             data = apart(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _identified(
-                plan, prepared, one, prepared.runs(plan, batch), data, windows, device, known
-            )
+            result[one.name] = _identified(plan, prepared, one, runs, data, windows, device, known)
     return result
 
 

@@ -8,7 +8,7 @@ import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,8 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import order_keys
-from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed
+from shipid.simulation.standard import GRAVITY, length_of, service_speed, shaft_speed
+from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import obtain, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
@@ -35,6 +36,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
 
+CORRECTED = "-corrected"  # ends the name of a family whose numbers the log corrects
 LEAST_RUNS = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
 MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
 LENGTHS_AHEAD = (
@@ -70,13 +72,15 @@ class Draft:
     """A study that has been checked to run.
 
     text : TOML with the reasons as comments.
-    warnings : what is wrong with the log, as far as it shows, one sentence each.
+    warnings : what is wrong with the log or the vessels, as far as it shows, one sentence each.
+    looks : how each vessel and the runs that do not test agree, by its name in the study.
     """
 
     text: str
     choices: tuple[Choice, ...]
     plan: Plan
     warnings: tuple[str, ...] = ()
+    looks: Mapping[str, Look] = field(default_factory=dict)
 
 
 def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
@@ -121,6 +125,14 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
     return chosen, why + short
 
 
+def proposed_horizon(vessel: Vessel, dataset: Dataset) -> tuple[float, float]:
+    """Horizon and step [s] that a new study of a vessel and its runs would have."""
+    seen = survey(dataset)
+    horizon, _ = horizon_of(length_of(vessel), seen.speed, seen.runs["duration"].tolist())
+    step = step_of(horizon, seen.step)
+    return max(round(horizon / step), 2) * step, step
+
+
 def step_of(horizon: float, log_step: float) -> float:
     """Step of the predictor [s]: a round number, a fifteenth of the horizon at most, but no shorter than the log's."""
     most = min(horizon / STEPS, LONGEST_STEP)
@@ -144,10 +156,14 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     runs = seen.runs.loc[usable]
     interval = max(step, seen.step, _round_up(float(runs["duration"].sum()) / MOST_WINDOWS))
     tests = typical_runs(runs)
+    true_path = _path(seen, dataset, horizon)
+    others = [name for name in usable if name not in tests]
+    how: dict[str, Any] = {"ahead": steps * step, "step": step, "path": true_path.value}
+    looks = {named: first_look(vessel, dataset, others, **how) for named, vessel in vessels.items()}
     fixed = [
         *_question(vessels, dataset, seen, horizon),
         Choice("data.dataset", _relative(str(data), out), _measured(vessels, dataset)),
-        _path(seen, dataset, horizon),
+        true_path,
         Choice("split.test", tests, _why_test(runs, tests)),
     ]
     ahead = [
@@ -155,7 +171,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
         Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
     ]
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
-    families = _families(vessels)
+    families = _families(vessels, looks)
     some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
     method = _method(length_of(first), step, float(runs["duration"].median()) - horizon)
     least = _planned([*fixed, *some, method], families[:1], out, vessels)
@@ -163,7 +179,9 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts), method]
     warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
-    return _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+    warnings += [look.sentence for look in looks.values() if look.wrong]
+    draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+    return replace(draft, looks=looks)
 
 
 def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
@@ -337,7 +355,8 @@ def _grid(amounts: list[int]) -> Iterator[Choice]:
 def _claims(families: Sequence[str]) -> Iterator[Choice]:
     """Which family each finding speaks of; none where there is nothing to compare."""
     if "inaccurate" in families:
-        yield Choice("claims.accurate", families[0], "asks for verdicts on the findings R1-R4 of experiment 2")
+        accurate = next((name for name in families if name.endswith(CORRECTED)), families[0])
+        yield Choice("claims.accurate", accurate, "asks for verdicts on the findings R1-R4 of experiment 2")
         yield Choice("claims.inaccurate", "inaccurate")
     elif {"moderate", "high"} <= set(families):
         yield Choice("claims.moderate", "moderate", "asks for verdicts on the findings S1-S7 of experiment 1")
@@ -345,8 +364,8 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
         yield Choice("claims.nominal", "nominal")
 
 
-def _families(vessels: Mapping[str, Vessel]) -> list[Any]:
-    """Every vessel as it is, and the first made inaccurate as in the paper's experiment 2."""
+def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[Any]:
+    """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2."""
     taken = {NO_MODEL, "inaccurate"}
     found: list[Any] = []
     for named, vessel in vessels.items():
@@ -356,6 +375,12 @@ def _families(vessels: Mapping[str, Vessel]) -> list[Any]:
             name += "-own"
         taken.add(name)
         found.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
+        look = looks.get(named)
+        if look is not None and look.changes:
+            groups = ", ".join(f"{change.group.name} x {change.factor:.3g}" for change in look.changes)
+            words = f"{vessel.name} with {groups}: from all runs that do not test, whatever N_D"
+            corrected = {"name": f"{name}{CORRECTED}", "description": words, "base": named}
+            found.append({**corrected, "perturb": [{"set": look.values}]})
     named, vessel = next(iter(vessels.items()))
     blocks = _inaccurate(vessel)
     words = f"{found[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
@@ -379,7 +404,7 @@ def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:
 def _softer(families: list[Any]) -> list[list[Any]]:
     """The families, then without removing, then without the inaccurate one."""
     *first, last = families
-    if "perturb" not in last:
+    if last["name"] != "inaccurate":
         return [families]
     scaled = [block for block in last["perturb"] if "factor" in block]
     milder = [[*first, {**last, "perturb": scaled}]] if scaled and scaled != last["perturb"] else []
@@ -395,7 +420,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
-    service = float(vessel.document["particulars"].get("U_0", FROUDE * np.sqrt(GRAVITY * length)))
+    service = service_speed(vessel)
     rpm = shaft_speed(Controls.of(vessel), service) / RPM
     speed = 0.75 * service
     horizon, why = horizon_of(length, speed, [np.inf])

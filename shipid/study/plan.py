@@ -119,6 +119,17 @@ class Grid(Strict):
     seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
 
 
+class BandsBlock(Strict):
+    """`[bands]`: how far off a prediction may be."""
+
+    level: Annotated[FiniteFloat, Field(gt=0, le=0.99, description="share of true paths that a band holds whole")] = 0.9
+    refits: Annotated[int, Field(ge=0)] = Field(
+        default=0,
+        description="further fits, each without a share of the runs, of methods and identified families that need them "
+        "for a band; 5 is enough, 0: no band for those",
+    )
+
+
 class Claims(Strict):
     """`[claims]`: the families, and the method, that findings speak of: R1-R4 at full scale, S1-S7 in simulation."""
 
@@ -203,6 +214,7 @@ class Study(Strict):
     method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
     published: Published | None = None
+    bands: BandsBlock = BandsBlock()
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     family: Annotated[list[Family], Field(min_length=1)]
     repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(

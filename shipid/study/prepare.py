@@ -27,6 +27,7 @@ from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.logs.segments import kind_of
 from shipid.metrics import Summary, position_error, summary
 from shipid.observer import Estimates, Observer, at_windows, observe
 from shipid.simulation.truth import simulate
@@ -50,6 +51,7 @@ class Prepared:
     estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
         depend on the batch.
     notes : what was assumed, redrawn or left out, in sentences.
+    kinds : kind of manoeuvre by run, where it is declared or can be seen.
     """
 
     data: Dataset
@@ -60,6 +62,7 @@ class Prepared:
     test_paths: Mapping[str, Array]
     notes: tuple[str, ...]
     estimates: Mapping[str, Estimates] = field(default_factory=dict)
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -200,6 +203,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
+        kinds=kinds_of_runs(dataset),
     )
 
 
@@ -271,6 +275,17 @@ def _roll_out(
         finished.setdefault(foundation.name, (foundation, zeros))
     foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
     return foundations, {one.name: finished[one.name][1] for one in foundations}
+
+
+def kinds_of_runs(dataset: Dataset) -> dict[str, str]:
+    """Kind of manoeuvre of every run: as its mapping declares it, else as its longest unbroken piece looks."""
+    longest: dict[str, pd.DataFrame] = {}
+    for run, rows in pieces(dataset):
+        if run not in longest or np.ptp(rows["t"]) > np.ptp(longest[run]["t"]):
+            longest[run] = rows
+    declared: Mapping[str, str] = dataset.metadata.get("manoeuvres", {})
+    found = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
+    return {run: kind for run, kind in found if kind}
 
 
 def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,9 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
-from shipid.errors import ResultError
+from shipid.errors import DataError, ResultError
 from shipid.files import read_json
+from shipid.hybrid.bands import Bands, Region
 from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
@@ -26,8 +27,10 @@ from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
+from shipid.study.survey import kinds_of
 from shipid.vessel.outline import ship_outline
 
+ALL_KINDS = "all"
 MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
@@ -37,7 +40,8 @@ INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of a
 class Results:
     """A run's folder, read: the plan, one row per cell, models, test windows, and errors (T, S) of every cell.
 
-    errors : cell -> position error (T, S) [m]; paths : cell -> predicted path (T, S, 2) [m] in the frame (11).
+    paths : cell -> predicted path (T, S, 2) [m] in the frame (11). bands : cell -> its bands, where it has any;
+    no_band : cell -> why it has none of the level of the study.
     """
 
     folder: Path
@@ -50,6 +54,8 @@ class Results:
     paths: Mapping[str, np.ndarray]
     dataset: Dataset
     provenance: Mapping[str, Any]
+    bands: Mapping[str, Bands] = field(default_factory=dict)
+    no_band: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         done = f"{len(self.cells)} of {self.plan.cells} cells"
@@ -79,6 +85,8 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
     paths = {}
+    bands: dict[str, Bands] = {}
+    no_band: dict[str, str] = {}
     known: dict[str, Estimates] = {}
     for row in cells.to_dict("records"):
         if row["status"] == "ok":
@@ -88,6 +96,12 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
                 plan, predictor.vessel, dataset, test, _observed(predictor, known_by_then(plan, dataset), known)
             )
             paths[row["cell"]] = predictor.predict(instants, alone)
+            if predictor.bands is not None:
+                bands[row["cell"]] = predictor.bands
+            try:
+                predictor.check_level(plan.study.bands.level)
+            except DataError as error:
+                no_band[row["cell"]] = error.message
     return Results(
         folder=folder,
         plan=plan,
@@ -99,6 +113,8 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         paths=paths,
         dataset=dataset,
         provenance=read_json(folder / store.PROVENANCE),
+        bands=bands,
+        no_band=no_band,
     )
 
 
@@ -150,6 +166,35 @@ def horizon_frame(results: Results) -> pd.DataFrame:
         error = position_error(results.paths[row["cell"]], results.test.future)
         parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
     return pd.concat(parts, ignore_index=True)
+
+
+def kinds_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon and at its end [m], by kind of test run: kind, runs, model, source, N_D, mean, end.
+
+    At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
+    """
+    known = kinds_of(results.dataset)
+    kinds = np.array([known.get(str(run), "") for run in results.test.run])
+    errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
+    for model, path in results.physics.items():
+        if model != NO_MODEL and np.isfinite(path).all():
+            errors[model, "physics", 0] = [position_error(path, results.test.future)]
+    largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
+    for row in results.rows:
+        if row["cell"] in results.paths and row["N_D"] == largest:
+            one = position_error(results.paths[row["cell"]], results.test.future)
+            errors.setdefault((row["model"], "cooperative", largest), []).append(one)
+    rows = []
+    for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
+        mask = (kinds == kind) | (kind == ALL_KINDS)
+        runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
+        for (model, source, N_D), found in errors.items():
+            mean = float(np.mean([error[:, mask].mean() for error in found]))
+            end = float(np.mean([error[-1, mask].mean() for error in found]))
+            rows.append(
+                {"kind": kind, "runs": runs, "model": model, "source": source, "N_D": N_D, "mean": mean, "end": end}
+            )
+    return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
 def _horizon(error: np.ndarray, ahead: np.ndarray, model: str, N_D: int, seed: int, source: str) -> pd.DataFrame:
@@ -225,6 +270,11 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
     found, naive, cells = [], constant_motion(test), _shown_cells(results)
+    level, edges = results.plan.study.bands.level, {}
+    for row in cells:
+        bands_of_cell = results.bands.get(row["cell"])
+        if bands_of_cell is not None and bands_of_cell.promises(level):
+            edges[row["cell"]] = bands_of_cell.region(results.paths[row["cell"]], test.columns, test.step, level)
     for run in shown_runs(results):
         indices = np.flatnonzero(test.run == run)
         most = min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
@@ -238,6 +288,11 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 if row["seed"] == seed:
                     paths[row["model"], "cooperative", row["N_D"]] = results.paths[row["cell"]][:, index]
             paths["", "naive", 0] = naive[:, index]
+            bands = {
+                (row["model"], "cooperative", row["N_D"]): border(edges[row["cell"]], results.paths[row["cell"]], index)
+                for row in cells
+                if row["seed"] == seed and row["cell"] in edges
+            }
             origin = np.zeros((1, 2))
             found.append(
                 {
@@ -248,9 +303,21 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                     "truth": np.concatenate([origin, test.future[:, index]]),
                     "paths": {key: np.concatenate([origin, path]) for key, path in paths.items()},
                     "wind": _wind(test, int(index)),
+                    "bands": bands,
                 }
             )
     return found
+
+
+def border(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
+    """Outline (n, 2) [m] of a band in the frame (11): port side, round the last region, and back along starboard."""
+    path, ahead = paths[:, index], region.ahead[:, index]
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    reach = region.across[:, index, None] * aside
+    round_ = np.linspace(-np.pi / 2, np.pi / 2, 13)[:, None]
+    end = path[-1] + region.along[-1, index] * np.cos(round_) * ahead[-1] + np.sin(round_) * reach[-1]
+    origin = np.zeros((1, 2))
+    return np.concatenate([origin, path - reach, end, (path + reach)[::-1], origin])
 
 
 def _final_heading(results: Results, run: str, t: float) -> float:

@@ -19,7 +19,10 @@ from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_batch
 from shipid.study.verdict import Finding
 
-KEYS = ["test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90", "naive", "status"]
+KEYS = [
+    *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
+    *("coverage", "width", "naive", "status"),
+]
 
 
 def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
@@ -41,7 +44,8 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
 def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu") -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
-    A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 and naive [m], status. No
+    A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
+    [1] and width [m] of the band, naive [m], status. No
     training window shares a moment with the test run.
     """
     for test in tests:
@@ -71,6 +75,7 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
             "H": part["H"].mean(),
         }
         row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
+        row |= {"coverage": part["coverage"].mean(), "width": part["width"].mean()}
         compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
         rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
     return pd.DataFrame(rows)
@@ -105,9 +110,6 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
 
 def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
     """Means over the seeds of every turn, foundation and method; cells that failed are left out."""
-    good = frame[frame["status"] == "ok"]
-    return (
-        good.groupby(["test", "foundation", "family", "method"], sort=False)[["A", "H", "H_90", "naive"]]
-        .mean()
-        .reset_index()
-    )
+    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
+    keys, numbers = ["test", "foundation", "family", "method"], ["A", "H", "H_90", "coverage", "width", "naive"]
+    return good.groupby(keys, sort=False)[numbers].mean().reset_index()

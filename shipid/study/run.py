@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.data.windows import Windows, covered
+from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.native import engine
 from shipid.errors import ShipidError
 from shipid.files import read_json, write_json
@@ -28,11 +28,11 @@ from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.training import check_device, use_threads
 from shipid.metrics import position_error, summary
-from shipid.predictor import Predictor, limits_of
+from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import Claims, pause
 from shipid.study.envelope import envelope
-from shipid.study.foundations import Prediction, predictions
+from shipid.study.foundations import Prediction, apart, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Way
 from shipid.study.prepare import (
     Prepared,
@@ -219,21 +219,80 @@ def run_batch(
     journal = Journal(trials) if trials is not None and trials.is_file() else None
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
-    known = predictions(plan, prepared, batch, device)
+    known = predictions(plan, prepared, runs, device)
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device, journal) for way in plan.methods}
+    left_out = refitted(plan, prepared, batch, windows, fitted, device)
     results: list[tuple[dict[str, Any], Predictor | None]] = []
     for name, way in plan.pairs:
         one, result = known[name], fitted[way.name][name]
         row = {"cell": batch.cell(name, way.name), **_names(one, way, prepared.test), **shared}
-        row |= {"seconds": result.seconds + one.seconds, "trials": result.trials}
+        errors, seconds = left_out.get((name, way.name), (None, 0.0))
+        row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
         if result.corrector is None:
             predictor, outcome = None, _failed(one.sentence or "no training converged")
         else:
             predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
+            if one.foundation.identify is None and result.left_out is not None:
+                errors = result.left_out  # fair: these numbers were not taken from these runs
+            bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
+            known_why = {} if bands is not None else {"no_band": reason}
+            predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
             outcome = _judged(plan, prepared, one, predictor, way)
         results.append(({**row, **outcome}, predictor))
     return results
+
+
+def refitted(
+    plan: Plan,
+    prepared: Prepared,
+    batch: Batch,
+    windows: Windows,
+    fitted: Mapping[str, Mapping[str, Fitted]],
+    device: str,
+) -> dict[tuple[str, str], tuple[Array, float]]:
+    """Errors (T, S, 2) [m] on the windows of a batch by cells fitted without their runs, and seconds that they took.
+
+    For the (foundation, method) pairs that have no such errors for nothing: methods that learn step by step, and
+    foundations identified from the runs of the batch. None of them unless the study has `bands.refits`.
+    """
+    identified = {one.name for one in prepared.foundations if one.identify is not None}
+    pairs = [
+        (name, way)
+        for name, way in plan.pairs
+        if fitted[way.name][name].corrector is not None
+        and (name in identified or fitted[way.name][name].left_out is None)
+    ]
+    refits = plan.study.bands.refits
+    if not refits or not pairs:
+        return {}
+    found = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
+    names = {name for name, _ in pairs}
+    data = apart(prepared.data, prepared.test)
+    place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+    for training, judged in refit_folds(windows, refits, batch.seed):
+        rest, part = windows.select(training), windows.select(judged)
+        inside = replace(
+            prepared,
+            data=data,
+            pool=rest,
+            test=part,
+            pool_paths={name: paths[:, place[training]] for name, paths in prepared.pool_paths.items()},
+            test_paths={name: paths[:, place[judged]] for name, paths in prepared.pool_paths.items()},
+        )
+        known = predictions(plan, inside, tuple(rest.spans), device, names)
+        for way in plan.methods:
+            mine = [name for name, other in pairs if other.name == way.name]
+            again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
+            for name in mine:
+                one, result, (errors, seconds) = known[name], again[name], found[name, way.name]
+                found[name, way.name] = errors, seconds + result.seconds + one.seconds
+                if result.corrector is None:
+                    continue
+                predictor = _predictor(plan, inside, one.foundation, way, batch, result.corrector, rest)
+                instants = instants_of(plan, predictor.vessel, inside.data, part, one.estimates)
+                errors[:, judged] = part.future - predictor.predict(instants, one.test_paths)
+    return found
 
 
 def _fitted(
@@ -283,7 +342,7 @@ def _names(one: Prediction, way: Way, test: Windows) -> dict[str, Any]:
 
 def _failed(sentence: str, status: str = "failed") -> dict[str, Any]:
     """The columns of a row without a result."""
-    blank = dict.fromkeys(("H", "H_90", "rms"), np.nan)
+    blank = dict.fromkeys(("H", "H_90", "rms", "coverage", "width"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
@@ -302,7 +361,17 @@ def _judged(plan: Plan, prepared: Prepared, one: Prediction, predictor: Predicto
         return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
+    errors |= _promise(plan, predictor, instants, paths, test)
     return {**errors, "status": "ok", "sentence": one.sentence, "hyperparameters": words}
+
+
+def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:
+    """Share of whole test paths inside the band of the study's level, and its mean radius [m]; NaN without a band."""
+    level = plan.study.bands.level
+    if predictor.bands is None or not predictor.bands.promises(level):
+        return {"coverage": np.nan, "width": np.nan}
+    region = predictor.band(paths, instants, level)
+    return {"coverage": float(region.holds(test.future - paths).mean()), "width": float(region.radius.mean())}
 
 
 def machine() -> dict[str, Any]:
@@ -342,7 +411,7 @@ def _predictor(
             "cell": batch.cell(foundation.name, way.name),
             "foundation": foundation.name,
             "method": way.name,
-            "runs": list(prepared.runs(plan, batch)),
+            "runs": list(windows.spans),
             "shipid": version("shipid"),
         },
     )

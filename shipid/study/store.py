@@ -36,7 +36,8 @@ from shipid.vessel.load import check_vessel
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
 DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
 PARTS = "parts"
-METRICS = ("A", "A_90", "A_rms", "H", "H_90", "rms", "seconds")
+UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
+METRICS = tuple(UNITS)
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
@@ -56,8 +57,31 @@ def open_folder(folder: Path, plan: Plan) -> None:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+    _mend(folder, plan)
     for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER):
         sweep(place)
+
+
+def _mend(folder: Path, plan: Plan) -> None:
+    """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
+    try:
+        changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
+    except DocumentError:
+        write_text(folder / STUDY, plan.text())
+        changed = False
+    try:
+        stored = read_json(folder / VESSELS)
+        digests = {name: documents.digest(entry["document"]) for name, entry in stored.items()}
+        changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
+    except (ResultError, TypeError, KeyError, AttributeError):
+        _write_vessels(folder, plan)
+    if changed:
+        raise ResultError("its study or vessels were changed by hand: choose another --out", file=folder)
+
+
+def _write_vessels(folder: Path, plan: Plan) -> None:
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
 
 
 def _make(folder: Path, plan: Plan) -> None:
@@ -83,8 +107,7 @@ def _describe(folder: Path, plan: Plan) -> None:
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     origin["changes"] = dict(plan.changes)
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
-    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
-    write_json(folder / VESSELS, vessels)
+    _write_vessels(folder, plan)
     write_text(folder / STUDY, plan.text())
 
 
@@ -195,7 +218,7 @@ def read_rows(folder: Path) -> pd.DataFrame:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     frame = pd.DataFrame(rows)
     for name in METRICS:
-        frame[name] = frame[name].astype(float)
+        frame[name] = frame[name].astype(float) if name in frame else np.nan
     return frame.sort_values(["N_D", "seed"], kind="stable").reset_index(drop=True)
 
 
@@ -204,7 +227,7 @@ def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     seals.remove(folder, "results")
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
-    table["unit"] = np.where(table["metric"] == "seconds", "s", "m")
+    table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))

@@ -9,10 +9,10 @@ import pandas as pd
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, cumulative_integral, pieces
-from shipid.logs.segments import kind_of
-from shipid.physics.signals import steers
+from shipid.logs.kinds import declared_kind
+from shipid.physics.signals import is_shaft, steers
+from shipid.study.kinds import seen_kind
 
-KINDS = ("zigzag", "turning")
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
 
@@ -20,9 +20,9 @@ OF_A_KIND = 3  # runs of a kind from which one may be set aside
 class Survey:
     """What the choices are made from.
 
-    runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind`, `speed` [m/s], `rate` [rad/s]
-        (RMS of r), `helm` [rad] (spread of the angles), `whole`, `sound` (passes its checks, `path` apart), `straying`
-        (fails `path`).
+    runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind` (see `kinds_of`), `speed`
+        [m/s], `rate` [rad/s] (RMS of r), `helm` [rad] (spread of the angles), `whole`, `sound` (passes its checks,
+        `path` apart), `straying` (fails `path`).
     step : usual time between rows [s].
     factor : positions over integrated velocities, the best complex factor; its angle is a turn.
     """
@@ -42,19 +42,19 @@ def survey(dataset: Dataset) -> Survey:
     stretches: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         stretches.setdefault(run, []).append(rows)
+    kinds = kinds_of(dataset)
     checks = check_dataset(dataset)
     failed = checks[~checks["ok"].astype(bool)]
     straying = set(failed.loc[failed["check"] == "path", "run"])
     unsound = set(failed.loc[failed["check"] != "path", "run"])
-    declared = dataset.metadata.get("manoeuvres", {})
     found = {}
     for run, parts in stretches.items():
-        longest = max(parts, key=lambda part: part["t"].iloc[-1] - part["t"].iloc[0])
+        longest = _longest(parts)
         t = longest["t"].to_numpy()
         angles = longest[[name for name in dataset.commands if steers(name)]]
         found[run] = {
             "duration": float(t[-1] - t[0]),
-            "kind": declared.get(run) or kind_of(longest),
+            "kind": kinds[run],
             "speed": float(np.hypot(longest["u"], longest["v"]).mean()),
             "rate": float(np.sqrt((longest["r"] ** 2).mean())),
             "helm": float(angles.std(ddof=0).mean()) if angles.shape[1] else 0.0,
@@ -65,6 +65,27 @@ def survey(dataset: Dataset) -> Survey:
     steps = np.concatenate([np.diff(part["t"]) for parts in stretches.values() for part in parts])
     step = float(np.median(steps)) if len(steps) else 1.0
     return Survey(pd.DataFrame(list(found.values()), index=list(found)), step, _factor(dataset))
+
+
+def kinds_of(dataset: Dataset) -> dict[str, str]:
+    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion."""
+    stretches: dict[str, list[pd.DataFrame]] = {}
+    for run, rows in pieces(dataset):
+        stretches.setdefault(run, []).append(rows)
+    declared = dataset.metadata.get("manoeuvres", {})
+    frame = dataset.frame
+    shafts = [name for name in dataset.commands if is_shaft(name)]
+    speeds = pd.Series(np.hypot(frame["u"].to_numpy(), frame["v"].to_numpy()))
+    speed = float(speeds.groupby(frame["run"].to_numpy()).mean().median())
+    shaft = float(frame[shafts].abs().max(axis=1).median()) if shafts else 0.0
+    return {
+        run: declared.get(run) or declared_kind(run) or seen_kind(_longest(parts), speed, shaft)
+        for run, parts in stretches.items()
+    }
+
+
+def _longest(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    return max(parts, key=lambda part: float(part["t"].iloc[-1] - part["t"].iloc[0]))
 
 
 def _factor(dataset: Dataset) -> complex:
@@ -111,11 +132,11 @@ def helm_sense(dataset: Dataset) -> dict[str, float]:
 
 
 def typical_runs(runs: pd.DataFrame) -> list[str]:
-    """Typical runs: from each kind that turns the ship and has three runs or more, the one in the middle.
+    """Typical runs: from each kind that has three runs or more, the one in the middle.
 
     In the middle: of speed, yaw rate and helm over the runs of the kind; neither broken, suspicious nor the longest.
     """
-    groups = [group for kind in KINDS if len(group := runs[runs["kind"] == kind]) >= OF_A_KIND]
+    groups = [group for kind in runs["kind"].unique() if len(group := runs[runs["kind"] == kind]) >= OF_A_KIND]
     return [_middle(group) for group in groups if len(groups) == 1 or len(runs) > 2 * OF_A_KIND] or [_middle(runs)]
 
 

@@ -49,10 +49,10 @@ def _estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]
     """Quantiles of resampled values, further out where manoeuvres are few (expanded percentiles; Hesterberg 2015)."""
     level = float(ndtr(stdtrit(runs - 1, LEVEL) * (runs / (runs - 1)) ** 0.5)) if runs >= FEWEST_RUNS else np.nan
     low, high = np.quantile(drawn, [level, 1 - level]) if runs >= FEWEST_RUNS else (np.nan, np.nan)
-    found = (
+    middle, least, greatest = (
         next((end for end in limits if np.isclose(end, number)), float(number)) for number in (value[0], low, high)
     )
-    return Estimate(*found, limits)
+    return Estimate(middle, least, greatest, limits)
 
 
 def _trained(drawn: Array, noise: Array) -> Array:

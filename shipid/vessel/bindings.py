@@ -9,7 +9,7 @@ from shipid.document import Document
 from shipid.physics import ACTUATORS, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.inertia import added_mass, rigid_body
-from shipid.vessel.schema import SHARED, Parameter, parameters, term_blocks, term_parameters
+from shipid.vessel.schema import SHARED, Parameter, actuators, parameters, term_blocks, term_parameters
 
 Binding = dict[str, str | list[str] | dict[str, str] | float]
 
@@ -47,10 +47,9 @@ def bindings(document: Document) -> dict[str, Binding]:
     result["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
     for path, key, block in term_blocks(document):
         result[path] = bind(path, block, term_parameters(TERMS[key]))
-        for command, actuator in (block.get("actuator") or {}).items():
-            if isinstance(actuator, Mapping):
-                where = f"{path}.actuator.{command}"
-                result[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
+        for command, actuator in actuators(block):
+            where = f"{path}.actuator.{command}"
+            result[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
     return result
 
 
@@ -59,9 +58,8 @@ def units(document: Document) -> dict[str, str]:
     known = {"inertia": parameters(rigid_body), "added_mass": parameters(added_mass)}
     for path, key, block in term_blocks(document):
         known[path] = term_parameters(TERMS[key])
-        for command, actuator in (block.get("actuator") or {}).items():
-            if isinstance(actuator, Mapping):
-                known[f"{path}.actuator.{command}"] = parameters(ACTUATORS[actuator["kind"]].advance)
+        for command, actuator in actuators(block):
+            known[f"{path}.actuator.{command}"] = parameters(ACTUATORS[actuator["kind"]].advance)
     rows: list[tuple[str, str]] = []
     for where, binding in bindings(document).items():
         declared = {parameter.name: parameter for parameter in known[where]}

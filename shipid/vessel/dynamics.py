@@ -19,7 +19,7 @@ from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.physics.signals import named, units
 from shipid.vessel.bindings import Binding, bindings
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import BEHIND, behind, signals, structural, term_blocks
+from shipid.vessel.schema import BEHIND, actuators, behind, signals, structural, term_blocks
 from shipid.vessel.schema import parameters as declared
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
@@ -334,9 +334,7 @@ def _actuators(
     actual = dict(orders)
     advanced = []
     for path, _, block in terms:
-        for command, actuator in (block.get("actuator") or {}).items():
-            if not isinstance(actuator, Mapping):
-                continue
+        for command, actuator in actuators(block):
             name = f"{path.rsplit('.', 1)[-1]}.{command}"
             member = ACTUATORS[actuator["kind"]]
             memory[name] = SX.sym(name)

@@ -195,10 +195,17 @@ def term_model(key: str) -> type[Block]:
     return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 
+def actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Command and block of every actuator of a term that is not off."""
+    for command, actuator in (block.get("actuator") or {}).items():
+        if isinstance(actuator, Mapping) and not actuator.get("off", False):
+            yield command, actuator
+
+
 def _actuator_union() -> Any:
     return _union(
         [
-            block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...))
+            block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...), off=(bool, False))
             for kind, memory in ACTUATORS.items()
         ]
     )

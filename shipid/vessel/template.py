@@ -1,6 +1,8 @@
 """First estimate of a vessel from its main particulars, by regression formulae; each value names its formula.
 
-The result is a normal vessel document. Replace its values when better ones are known.
+What is known of screw, rudder and steering gear is taken as it is; the rest is guessed for the size, so that the thrust
+at the service shaft speed equals the resistance at the design speed. Times of a model are those of the ship over the
+square root of the scale (Froude). The result is a normal vessel document; better values may replace its own.
 """
 
 from __future__ import annotations
@@ -18,10 +20,31 @@ from shipid.errors import ShipidError, choices
 from shipid.physics.signals import is_shaft, neutral
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
+from shipid.vessel.regressions import (
+    AREA_RATIO,
+    BLADES,
+    PITCHES,
+    correlation_allowance,
+    form_factor,
+    friction,
+    thrust_polynomial,
+    wave_resistance,
+    wetted_surface,
+)
 
-RHO, RHO_AIR, NU, G = 1025.0, 1.225, 1.19e-6, 9.81  # sea water at 15 deg C, air; SI
+RHO_SEA, RHO_FRESH, RHO_AIR, G = 1025.0, 1000.0, 1.225, 9.81  # sea and fresh water at 15 deg C, air; SI
+NU = 1.19e-6  # m^2/s, sea water at 15 deg C
 LEAST_YAW = 0.005  # of Clarke's N_rdot: a tenth of what ships have
 PROPULSORS = ("propeller-rudder", "azimuth")
+MODEL, TYPICAL = 10.0, 160.0  # m: a shorter ship is taken for a model of one as long as the second number
+STEERING = 65 / 28  # deg/s: 35 deg on one side to 30 on the other in 28 s, SOLAS II-1/29
+AZIMUTHING = 12.0  # deg/s: two turns a minute
+PITCH = 0.8  # P / D of a screw of which neither diameter nor shaft speed is known
+DIAMETERS = (0.35, 1.0)  # of the draught
+AZIMUTH_DIAMETER, SCALES = 0.6, (0.3, 2.5)  # of the draught; of k_T
+FULL = 0.75  # block coefficient of bulk carriers and tankers, whose screws are small for the draught
+J_MOST, FASTEST = 1.5, 1e3  # largest J of a propeller's polynomial, as in the document; rev/s
+LARGEST_SCREW, STRONG_PITCH = 10.5, 1.2  # m; P / D from which a larger screw is the likelier guess
 
 # Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, 339-351: C_Dt, C_Dl of bow and stern, delta, kappa
 WIND = {
@@ -38,9 +61,17 @@ WIND = {
 
 @dataclass(frozen=True)
 class Particulars:
-    """What is known of a vessel: lengths [m], block coefficient [-], service speed [m/s], wind areas [m^2].
+    """What is known of a vessel; None takes a guess, for all but the four main particulars.
 
-    length is that between perpendiculars; speed, areas : None takes a guess.
+    length, beam, draught : [m], length between perpendiculars. block : block coefficient [-].
+    speed : service speed [m/s]. rpm : shaft speed of the screw at that speed [rpm].
+    propulsor : `propeller-rudder` or `azimuth`. shafts : 1 or 2 of them; default 1, of azimuth units 2.
+    propeller_diameter : [m]. rudder_area, rudder_span : of each rudder [m^2, m].
+    rudder_rate : of the steering gear, of azimuth units how fast they turn [deg/s].
+    tunnel_thruster : whether a tunnel thruster is at the bow.
+    scale : length of the ship over that of this model, 1 for the ship. Default: 1 from 10 m on, else 160 m / length.
+    density : of the water [kg/m^3]; default: sea water, fresh water for a model.
+    frontal_area, lateral_area : to the wind [m^2].
     """
 
     length: float
@@ -52,6 +83,15 @@ class Particulars:
     ship_type: str = "cargo"
     frontal_area: float | None = None
     lateral_area: float | None = None
+    rpm: float | None = None
+    shafts: int | None = None
+    propeller_diameter: float | None = None
+    rudder_area: float | None = None
+    rudder_span: float | None = None
+    rudder_rate: float | None = None
+    tunnel_thruster: bool = False
+    scale: float | None = None
+    density: float | None = None
 
     @property
     def service(self) -> float:
@@ -62,6 +102,31 @@ class Particulars:
     def volume(self) -> float:
         """Displaced volume [m^3]."""
         return self.block * self.length * self.beam * self.draught
+
+    @property
+    def units(self) -> int:
+        """Number of screws."""
+        return self.shafts or (2 if self.propulsor == "azimuth" else 1)
+
+    @property
+    def reduction(self) -> float:
+        """Length of the ship over that of this model; 1 for a ship."""
+        if self.scale is not None:
+            return self.scale
+        return 1.0 if self.length >= MODEL else TYPICAL / self.length
+
+    @property
+    def rho(self) -> float:
+        """Density of the water [kg/m^3]."""
+        return self.density or (RHO_SEA if self.reduction == 1.0 else RHO_FRESH)
+
+    @property
+    def faster(self) -> tuple[float, str]:
+        """How much faster than on the ship everything on the model is, and in words: sqrt(scale), Froude."""
+        if self.reduction == 1.0:
+            return 1.0, ""
+        why = "given" if self.scale is not None else f"taken for a model of a ship of {TYPICAL:g} m"
+        return math.sqrt(self.reduction), f" times sqrt(scale), scale {self.reduction:.3g} {why}"
 
 
 @dataclass(frozen=True)
@@ -81,6 +146,7 @@ class FirstGuess:
     """A template filled in.
 
     text : TOML.  vessel : the same, checked.  n : shaft speed [rev/s] that holds the service speed.
+    remarks : what the numbers given imply and a reader should know, one sentence each.
     growth : the largest growth rate [1/s] of a small yaw at that speed, helm amidships; negative: course-stable.
     """
 
@@ -88,6 +154,7 @@ class FirstGuess:
     vessel: Vessel
     n: float
     growth: float
+    remarks: tuple[str, ...] = ()
 
 
 def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
@@ -105,7 +172,19 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
         f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
-    return FirstGuess("\n".join([*head, body]), vessel, n, growth)
+    return FirstGuess("\n".join([*head, body]), vessel, n, growth, tuple(_remarks(given)))
+
+
+def _remarks(given: Particulars) -> Iterator[str]:
+    """What the guess took for granted, where that matters most."""
+    if given.scale is None and given.reduction != 1.0:
+        yield (
+            f"{given.length:g} m is taken for a model at a scale of {given.reduction:.3g}: --scale says it, "
+            "and sets how fast rudder or azimuth turns"
+        )
+    if given.rpm is None:
+        unknown = "its shaft speed" if given.propeller_diameter else "its diameter and shaft speed"
+        yield f"of the screw {unknown} is a guess: --rpm is that at {given.service:.3g} m/s"
 
 
 def _check(given: Particulars) -> None:
@@ -130,6 +209,23 @@ def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
     yield "length / beam", given.length / given.beam, 3.0, 9.0
     yield "beam / draught", given.beam / given.draught, 1.8, 6.0
     yield "speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(G * given.length)
+    yield "shafts", given.units, 1, 2
+    for what, value, low, high in (
+        ("scale", given.scale, 1.0, 400.0),
+        ("density [kg/m^3]", given.density, 950.0, 1050.0),
+        ("rpm", given.rpm, 1.0, 20000.0),
+        ("propeller diameter [m]", given.propeller_diameter, 0.1 * given.draught, 1.2 * given.draught),
+        (
+            "rudder area [m^2]",
+            given.rudder_area,
+            2e-3 * given.length * given.draught,
+            0.1 * given.length * given.draught,
+        ),
+        ("rudder span [m]", given.rudder_span, 0.1 * given.draught, 1.2 * given.draught),
+        ("rudder rate [deg/s]", given.rudder_rate, 0.1, 500.0),
+    ):
+        if value is not None:
+            yield what, value, low, high
     for what, area in (("frontal", given.frontal_area), ("lateral", given.lateral_area)):
         if area is not None:
             yield f"{what} area [m^2]", area, 1e-3, 4e4
@@ -137,7 +233,7 @@ def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
 
 def inertia(given: Particulars) -> Values:
     """Mass and yaw inertia."""
-    m = RHO * given.volume
+    m = given.rho * given.volume
     return {
         "m": Value(m, "kg", "rho C_b L B T"),
         "I_z": Value(m * (0.25 * given.length) ** 2, "kg m^2", "m (0.25 L)^2, a usual radius of gyration"),
@@ -148,7 +244,7 @@ def inertia(given: Particulars) -> Values:
 def added_mass(given: Particulars) -> Values:
     """Clarke et al. (1983); surge by Soeding, in Brix (1993)."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
-    prime = -math.pi * (T / L) ** 2 * RHO / 2 * L**3
+    prime = -math.pi * (T / L) ** 2 * given.rho / 2 * L**3
     clarke = "Clarke et al. (1983)"
     return {
         "X_udot": Value(-_surge_mass(given), "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
@@ -165,14 +261,14 @@ def _yaw_inertia(given: Particulars) -> float:
 
 
 def _surge_mass(given: Particulars) -> float:
-    return RHO * given.volume / (math.pi * math.sqrt(given.length**3 / given.volume) - 14)
+    return given.rho * given.volume / (math.pi * math.sqrt(given.length**3 / given.volume) - 14)
 
 
 def hull(given: Particulars) -> Values:
     """Derivatives in the primes of [hull.mmg]: linear by Clarke et al. (1983), the others by Kijima et al. (1990)."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     s, full, slender = -math.pi * T / L, C_b * B / L, (1 - C_b) * T / B
-    m_x, m_y = (-added_mass(given)[name].number / (RHO / 2 * L**2 * T) for name in ("X_udot", "Y_vdot"))
+    m_x, m_y = (-added_mass(given)[name].number / (given.rho / 2 * L**2 * T) for name in ("X_udot", "Y_vdot"))
     clarke, kijima = "Clarke et al. (1983), x L / T", "Kijima et al. (1990)"
     masumoto = "Yoshimura and Masumoto (2012)"
     return {
@@ -199,13 +295,27 @@ def hull(given: Particulars) -> Values:
 
 
 def _resistance(given: Particulars) -> Value:
-    """(1 + k) C_F S / (L T): ITTC-57, form factor of Watanabe, wetted surface of Mumford; no waves."""
-    L, B, T, C_b = given.length, given.beam, given.draught, given.block
-    C_F = 0.075 / (math.log10(given.service * L / NU) - 2) ** 2
-    k = max(-0.095 + 25.6 * C_b / ((L / B) ** 2 * math.sqrt(B / T)), 0.0)
-    S = 1.025 * L * (C_b * B + 1.7 * T)
-    note = f"(1 + k) C_F S / (L T): ITTC-57, k = {k:.2f} (Watanabe), S = {S:.4g} m^2 (Mumford); without waves"
-    return Value((1 + k) * C_F * S / (L * T), "-", note)
+    """[(1 + k) C_F + C_A] S / (L T): ITTC-57, form factor of Watanabe, wetted surface of Mumford; without waves."""
+    sizes = given.length, given.beam, given.draught, given.block
+    C_F, k, S = friction(given.service, given.length, NU), form_factor(*sizes), wetted_surface(*sizes)
+    C_A = correlation_allowance(given.length) if given.reduction == 1.0 else 0.0
+    rough = f", C_A = {C_A:.2g} (Holtrop and Mennen 1982)" if C_A else ""
+    note = f"((1 + k) C_F + C_A) S / (L T): ITTC-57, k = {k:.2f} (Watanabe), S = {S:.4g} m^2 (Mumford){rough}"
+    return Value(((1 + k) * C_F + C_A) * S / (given.length * given.draught), "-", note)
+
+
+def waves(given: Particulars) -> Values:
+    """Wave resistance as a sixth power of the speed, through that of Holtrop and Mennen (1982) at the service speed."""
+    sizes = given.length, given.beam, given.draught, given.block
+    R_W = wave_resistance(*sizes, given.service) * given.rho * G * given.volume
+    note = f"wave resistance {R_W:.3g} N at {given.service:.3g} m/s (Holtrop and Mennen 1982), as u^6"
+    return {"R_4": Value(R_W / given.service**6, "kg m^-5 s^4", note)}
+
+
+def total_resistance(given: Particulars) -> float:
+    """Resistance [N] at the service speed, as the document has it."""
+    U, calm = given.service, given.rho / 2 * given.length * given.draught
+    return calm * _resistance(given).number * U**2 + waves(given)["R_4"].number * U**6
 
 
 def wind(given: Particulars) -> Values:
@@ -228,49 +338,137 @@ def wind(given: Particulars) -> Values:
     }
 
 
-def waves() -> Values:
-    """Wave resistance: 0 by default; to be identified from trials at speed."""
-    note = "wave resistance grows with about the sixth power of speed: 0 until it is measured or identified"
-    return {"R_4": Value(0.0, "kg m^-5 s^4", note)}
+@dataclass(frozen=True)
+class Screw:
+    """A screw that drives the ship at its service speed.
+
+    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was found.
+    """
+
+    D: float
+    n: float
+    pitch: float
+    K_T: tuple[float, float, float]
+    notes: Mapping[str, str]
 
 
-def _wake(given: Particulars) -> float:
-    return 0.5 * given.block - 0.05
+def _wake(given: Particulars) -> tuple[float, str]:
+    """Wake fraction of Taylor."""
+    if given.units == 2:
+        return max(0.55 * given.block - 0.20, 0.0), "0.55 C_b - 0.20, Taylor, two screws"
+    return 0.5 * given.block - 0.05, "0.5 C_b - 0.05, Taylor"
 
 
-def propeller(given: Particulars) -> Values:
-    """One screw behind the hull."""
-    L, T = given.length, given.draught
-    w_P0 = _wake(given)
-    opens = read(bundled("models")["kvlcc2-l7"])["thruster"]["propeller"]["K_T"]
-    note = "open water of KVLCC2's screw, P / D = 0.72: a guess"
+def _deduction(given: Particulars, D: float) -> tuple[float, str]:
+    """Thrust deduction."""
+    if given.units == 2:
+        t = 0.325 * given.block - 0.1885 * D / math.sqrt(given.beam * given.draught)
+        return max(t, 0.05), "0.325 C_b - 0.1885 D_p / sqrt(B T), Holtrop and Mennen (1982), two screws"
+    return 0.6 * _wake(given)[0], "0.6 w_P0: a rule of thumb"
+
+
+def screw(given: Particulars) -> Screw:
+    """Screw whose thrust at the service speed is the resistance; ShipidError where none of the series does that.
+
+    What is given of diameter and shaft speed is kept. Of the others the pitch gives way first, then the diameter.
+    """
+    share = 0.5 if given.block > FULL else 0.65 if given.units == 1 else 0.55
+    usual = min(share * given.draught, LARGEST_SCREW)
+    D = given.propeller_diameter or usual
+    words = "given" if given.propeller_diameter else f"{share:g} T, at most {LARGEST_SCREW:g} m: a guess"
+    if given.rpm is None:
+        n = _shaft_of(given, D, PITCH)
+        return Screw(D, n, PITCH, thrust_polynomial(PITCH), {"D_p": words, "K_T": f"P / D = {PITCH:g}: a guess"})
+    n = given.rpm / 60
+    if given.propeller_diameter is None and not _drives(given, D, n, (PITCHES[0], STRONG_PITCH)):
+        least, most = (share * given.draught for share in DIAMETERS)
+        wanted = _bisect(lambda size: _surplus(given, size, n, PITCH), least, most)
+        if least < wanted < most:
+            D, words = wanted, f"drives {given.service:.3g} m/s at {60 * n:.4g} rpm with P / D = {PITCH:g}"
+    if not _drives(given, D, n, PITCHES):
+        low, high = sorted(60 * _shaft_of(given, D, pitch) for pitch in PITCHES)
+        raise ShipidError(
+            f"no screw of {D:.3g} m drives this ship at {given.service:.3g} m/s with {60 * n:.4g} rpm: {low:.3g} to "
+            f"{high:.3g} rpm could. Is it the engine's speed, not the screw's? Is --speed another one?",
+            path="--rpm",
+        )
+    pitch = _bisect(lambda ratio: _surplus(given, D, n, ratio), *PITCHES)
+    balance = f"P / D = {pitch:.3g} balances the resistance at {given.service:.3g} m/s and {60 * n:.4g} rpm"
+    return Screw(D, n, pitch, thrust_polynomial(pitch), {"D_p": words, "K_T": balance})
+
+
+def _drives(given: Particulars, D: float, n: float, pitches: tuple[float, float]) -> bool:
+    """Whether a pitch ratio between two gives a screw the thrust that the ship needs."""
+    weak, strong = (_surplus(given, D, n, pitch) for pitch in pitches)
+    return weak <= 0 <= strong
+
+
+def _shaft_of(given: Particulars, D: float, pitch: float) -> float:
+    """Shaft speed [rev/s] at which a screw drives the ship at its service speed."""
+    return _bisect(lambda n: _surplus(given, D, n, pitch), 0.0, FASTEST)
+
+
+def _surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
+    """Thrust less resistance [N] at the service speed with screws of diameter D [m] at n [rev/s]."""
+    k_0, k_1, k_2 = thrust_polynomial(pitch)
+    J = min((1 - _wake(given)[0]) * given.service / (max(n, 1e-3) * D), J_MOST)
+    thrust = given.rho * n**2 * D**4 * (k_0 + J * (k_1 + J * k_2))
+    return given.units * (1 - _deduction(given, D)[0]) * thrust - total_resistance(given)
+
+
+def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
+    """Root of a function that is negative at low and positive at high; the upper end if it never is."""
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if function(middle) < 0 else (low, middle)
+    return high
+
+
+def propeller(given: Particulars, side: int = 0) -> Values:
+    """One screw behind the hull; side -1 is that to port of two."""
+    L, B, T = given.length, given.beam, given.draught
+    found, (w_P0, wake), drift = screw(given), _wake(given), "KVLCC2, mean of both sides"
+    t_P, deduction = _deduction(given, found.D)
+    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {found.notes['K_T']}"
     return {
         "x": Value(-0.48 * L, "m", "-0.48 L"),
+        **({"y": Value(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
         "z": Value(0.65 * T, "m", "0.65 T below the waterline: a guess"),
-        "D_p": Value(min(0.7 * T, 10.0), "m", "0.7 T, at most 10 m: a guess"),
-        "t_P": Value(0.6 * w_P0, "-", "0.6 w_P0: a rule of thumb"),
-        "w_P0": Value(w_P0, "-", "0.5 C_b - 0.05, Taylor"),
+        "D_p": Value(found.D, "m", found.notes["D_p"]),
+        "k_astern": Value(0.7, "-", "thrust astern over ahead of a fixed screw: a guess"),
+        "t_P": Value(t_P, "-", deduction),
+        "w_P0": Value(w_P0, "-", wake),
         "C_1": Value(2.0, "-", "KVLCC2, Yasukawa and Yoshimura (2015)"),
-        "C_2_plus": Value(1.35, "-", "KVLCC2, mean of both sides"),
-        "C_2_minus": Value(1.35, "-", "KVLCC2, mean of both sides"),
-        **{f'K_T."{name}"': Value(number, "-", note) for name, number in opens.items()},
+        "C_2_plus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
+        "C_2_minus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
+        **{f'K_T."{name}"': Value(k, "-", series) for name, k in zip(("1", "J", "JJ"), found.K_T, strict=True)},
     }
 
 
-def rudder(given: Particulars) -> Values:
-    """One rudder behind that screw."""
+def rudder(given: Particulars, side: int = 0) -> Values:
+    """One rudder behind a screw; side -1 is that to port of two."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
-    A_R = L * T / 100 * (1 + 25 * (B / L) ** 2)
-    H_R = min(math.sqrt(1.6 * A_R), 0.9 * T)
+    share, words = (1.0, "") if given.units == 1 else (0.6, ", 0.6 of it each")
+    area = share * L * T / 100 * (1 + 25 * (B / L) ** 2)
+    A_R = given.rudder_area or area
+    H_R = given.rudder_span or min(math.sqrt(1.6 * A_R), 0.9 * T)
     aspect = H_R**2 / A_R
-    epsilon = 2.26 - 1.82 * (1 - _wake(given))
+    epsilon = 2.26 - 1.82 * (1 - _wake(given)[0])
     masumoto = "Yoshimura and Masumoto (2012)"
     gamma_R = Value(2.06 * C_b * B / L + 0.14, "-", f"2.06 C_b B / L + 0.14, {masumoto}")
+    rate, gear = given.rudder_rate or STEERING * given.faster[0], "given"
+    if given.rudder_rate is None:
+        gear = f"35 to -30 deg in 28 s, SOLAS II-1/29{given.faster[1]}"
     return {
         "x": Value(-0.5 * L, "m", "aft perpendicular"),
+        **({"y": Value(side * 0.22 * B, "m", "behind its screw")} if side else {}),
         "z": Value(T - 0.55 * H_R, "m", "middle of its height: a guess"),
-        "A_R": Value(A_R, "m^2", "L T / 100 (1 + 25 (B / L)^2), Det Norske Veritas' least"),
-        "H_R": Value(H_R, "m", "aspect ratio 1.6, at most 0.9 T: a guess"),
+        "A_R": Value(
+            A_R,
+            "m^2",
+            "given" if given.rudder_area else f"L T / 100 (1 + 25 (B / L)^2), Det Norske Veritas' least{words}",
+        ),
+        "H_R": Value(H_R, "m", "given" if given.rudder_span else "aspect ratio 1.6, at most 0.9 T: a guess"),
         "f_alpha": Value(6.13 * aspect / (aspect + 2.25), "-", "6.13 a / (a + 2.25), a = H_R^2 / A_R, Fujii"),
         "epsilon": Value(epsilon, "-", f"2.26 - 1.82 (1 - w_P0), {masumoto}"),
         "kappa": Value(0.55 / epsilon, "-", f"0.55 / epsilon, {masumoto}"),
@@ -280,19 +478,25 @@ def rudder(given: Particulars) -> Values:
         "t_R": Value(0.39, "-", masumoto),
         "a_H": Value(0.627 * C_b - 0.153, "-", "0.627 C_b - 0.153, Quadvlieg (2013)"),
         "x_H": Value(-0.45 * L, "m", "-0.45 L, Aoki et al. (2006)"),
-        "actuator.delta.T": Value(1.0, "s", "a guess"),
-        "actuator.delta.rate": Value(math.radians(65 / 28), "rad/s", "35 to -30 deg in 28 s, SOLAS II-1/29"),
+        "actuator.delta.T": Value(1.0 / given.faster[0], "s", f"1 s of a ship: a guess{_over(given)}"),
+        "actuator.delta.rate": Value(math.radians(rate), "rad/s", gear),
     }
 
 
+def _over(given: Particulars) -> str:
+    return given.faster[1].replace(" times ", " over ", 1)
+
+
 def azimuth(given: Particulars, side: int) -> Values:
-    """One of two azimuth units at the stern; side -1 is port."""
+    """One azimuth unit at the stern; of two, side -1 is that to port; 0 is one in the middle."""
     unit = get(read(bundled("models")["gunnerus-28.9"]), "thruster.port")
+    D, k_T, size, strength = _azimuth_size(given, unit)
     placed = {
         "x": Value(-0.46 * given.length, "m", "-0.46 L: a guess"),
-        "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess"),
+        "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess" if side else "in the middle"),
         "z": Value(0.75 * given.draught, "m", "0.75 T: a guess"),
-        "D_p": Value(0.7 * given.draught, "m", "0.7 T: a guess"),
+        "D_p": Value(D, "m", size),
+        "k_T": Value(k_T, "-", strength),
     }
     copied: Values = {}
     for name, number in unit.items():
@@ -300,14 +504,59 @@ def azimuth(given: Particulars, side: int) -> Values:
             copied[name] = Value(number, "-", "unit of R/V Gunnerus")
         elif isinstance(number, Mapping):
             copied |= {f'{name}."{key}"': Value(v, "-", "unit of R/V Gunnerus") for key, v in number.items()}
+    rate, gear = given.rudder_rate or AZIMUTHING * given.faster[0], "given"
+    if given.rudder_rate is None:
+        gear = f"two turns a minute: a guess{given.faster[1]}"
     return (
         placed
         | copied
         | {
-            "actuator.alpha.T": Value(0.5, "s", "a guess"),
-            "actuator.alpha.rate": Value(0.2, "rad/s", "two turns a minute: a guess"),
+            "actuator.alpha.T": Value(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over(given)}"),
+            "actuator.alpha.rate": Value(math.radians(rate), "rad/s", gear),
         }
     )
+
+
+def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, float, str, str]:
+    """Diameter [m] and k_T of a unit whose thrust at the given shaft speed is the resistance, and how they were found.
+
+    A diameter that is not given follows from the shaft speed first, then k_T.
+    """
+    known, usual = given.propeller_diameter, AZIMUTH_DIAMETER * given.draught
+    D, size = (known, "given") if known else (usual, f"{AZIMUTH_DIAMETER:g} T: a guess")
+    if given.rpm is None:
+        return D, 1.0, size, "unit of R/V Gunnerus"
+    n = given.rpm / 60
+
+    def thrust(diameter: float) -> float:
+        J = min(given.service / (n * diameter), unit["J_max"])
+        K_x = sum(number * J ** name.count("J") for name, number in unit["K_x"].items() if set(name) <= {"1", "J"})
+        return float(given.units * given.rho * n**2 * diameter**4 * K_x)
+
+    needed, balanced = total_resistance(given), f"{given.service:.3g} m/s and {given.rpm:.4g} rpm"
+    if known is None:
+        D = _bisect(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
+        size = f"balances the resistance at {balanced}"
+    scale = needed / thrust(D) if thrust(D) > 0 else math.inf
+    if not SCALES[0] <= scale <= SCALES[1]:
+        raise ShipidError(
+            f"azimuth units of {D:.3g} m at {given.rpm:.4g} rpm would need {scale:.2g} times the usual thrust to "
+            f"drive this ship at {given.service:.3g} m/s: is it the engine's speed, not the screw's?",
+            path="--rpm",
+        )
+    return D, scale, size, f"balances the resistance at {balanced}"
+
+
+def tunnel(given: Particulars) -> Values:
+    """A tunnel thruster at the bow: F_2 n|n|, the thrust of a screw of 0.35 T with K_T 0.3."""
+    D = min(0.35 * given.draught, 3.0)
+    return {
+        "x": Value(0.4 * given.length, "m", "0.4 L: a guess"),
+        "z": Value(0.6 * given.draught, "m", "0.6 T: a guess"),
+        "F_1": Value(0.0, "N s", "thrust goes with n|n|"),
+        "F_2": Value(0.3 * given.rho * D**4, "N s^2", f"0.3 rho D^4, D = {D:.3g} m, 0.35 T up to 3 m: a guess"),
+        "F_3": Value(0.0, "N s^3", "thrust goes with n|n|"),
+    }
 
 
 def _blocks(given: Particulars, name: str) -> Iterator[str]:
@@ -324,20 +573,32 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
     yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
     yield from _block("particulars", main)
-    yield from _block("constants", {"rho": Value(RHO, "kg m^-3", "sea"), "rho_a": Value(RHO_AIR, "kg m^-3", "air")})
+    water = "given" if given.density else "sea" if given.rho == RHO_SEA else "fresh water of a tank"
+    densities = {"rho": Value(given.rho, "kg m^-3", water), "rho_a": Value(RHO_AIR, "kg m^-3", "air")}
+    yield from _block("constants", densities)
     yield from _block("inertia", inertia(given))
     yield from _block("added_mass", added_mass(given), coriolis="mmg")
     yield from _block("hull.mmg", hull(given))
-    yield from _block("hull.resistance", waves())
+    yield from _block("hull.resistance", waves(given))
     yield from _block("wind", wind(given), kind="blendermann")
-    if given.propulsor == "azimuth":
-        for side, unit in ((-1, "port"), (1, "starboard")):
-            words = {"kind": "azimuth", "actuator.alpha.kind": "first_order"}
-            yield from _block(f"thruster.{unit}", azimuth(given, side), **words)
-    else:
-        yield from _block("thruster.propeller", propeller(given), kind="propeller")
-        words = {"kind": "rudder", "behind": "propeller", "actuator.delta.kind": "first_order"}
-        yield from _block("thruster.rudder", rudder(given), **words)
+    yield from _thrusters(given)
+    if given.tunnel_thruster:
+        yield from _block("thruster.bow", tunnel(given), kind="tunnel")
+
+
+def _thrusters(given: Particulars) -> Iterator[str]:
+    """What drives and steers the ship: names as in logs, `port` and `starboard` where there are two."""
+    sides = ((-1, "port"), (1, "starboard")) if given.units == 2 else ((0, ""),)
+    steered = "alpha" if given.propulsor == "azimuth" else "delta"
+    for side, name in sides:
+        if given.propulsor == "azimuth":
+            words = {"kind": "azimuth", f"actuator.{steered}.kind": "first_order"}
+            yield from _block(f"thruster.{name or 'azimuth'}", azimuth(given, side), **words)
+            continue
+        behind = name or "propeller"
+        yield from _block(f"thruster.{behind}", propeller(given, side), kind="propeller")
+        words = {"kind": "rudder", "behind": behind, f"actuator.{steered}.kind": "first_order"}
+        yield from _block(f"thruster.{name and f'{name}_'}rudder", rudder(given, side), **words)
 
 
 def _block(path: str, values: Values, **words: str) -> Iterator[str]:

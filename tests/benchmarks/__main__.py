@@ -34,6 +34,8 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
 ASKED = {
     "coverage": 1,
     "observer": 1,
+    "strangers": 1,
+    "bands": 1,
     "verdicts": 1,
     "guess": 1,
 }  # the same, of what is no matter of time and takes minutes: only where named
@@ -49,7 +51,7 @@ def main() -> int:
         "groups", nargs="*", metavar="group", help=f"of {', '.join(GROUPS)}; default: all that are timed"
     )
     parser.add_argument("--record", action="store_true", help="accept the ratios measured now")
-    parser.add_argument("--replicates", type=int, default=200, help="of the groups coverage and verdicts")
+    parser.add_argument("--replicates", type=int, default=200, help="of the groups coverage, bands and verdicts")
     parser.add_argument("--logs", type=int, default=400, help="of the group guess")
     asked = parser.parse_args()
     unknown = [name for name in asked.groups if name not in GROUPS]
@@ -58,6 +60,7 @@ def main() -> int:
     recorded = read_recorded()
     options = {
         "coverage": {"replicates": asked.replicates},
+        "bands": {"replicates": asked.replicates},
         "verdicts": {"tables": asked.replicates},
         "guess": {"logs": asked.logs},
     }

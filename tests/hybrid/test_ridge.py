@@ -7,7 +7,7 @@ import torch
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.ridge import _blocks, _decompose, _left_out, _Part, _reflection, smooth_basis
+from shipid.hybrid.ridge import _Best, _blocks, _decompose, _left_out, _LeftOut, _Part, _reflection, smooth_basis
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -99,8 +99,45 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
     parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
-    found = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)[0]
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    found, by_fold, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-8)
+    np.testing.assert_allclose(by_fold[0].sum(axis=0), expected, rtol=1e-8)
+    judged = np.unique(np.concatenate([part for _, part in folds]))
+    squares = np.square(errors[0][:, judged].double().numpy()).reshape(2, len(judged), 3, 2)
+    np.testing.assert_allclose(squares.sum(axis=(0, 1, 3)), expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("mirror", [0.0, 1.0])
+def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror):
+    """One trial, one ridge: nothing is chosen, so a fit without the run must give the same errors on it."""
+    plain = recipe(trials=1, averaged=1, ridge=0.1, mirror=mirror)
+    fitted = tune(columns, TWINS, targets, FOLDS, plain, seed=0)["rough"]
+    (network,) = fitted.corrector.networks
+    table = columns | wind(columns)
+    (weight, offset), _ = network.layers
+    hidden = np.tanh(network.normaliser.apply(table) @ weight + offset)
+    parts = np.split(hidden, 2, axis=1) if mirror else None
+    for axis in (0, 1):
+        seen = hidden / hidden.shape[1] ** 0.5
+        if parts is not None:
+            sign = 1 if axis == 0 else -1
+            seen = (parts[0] + sign * parts[1]) / (2 * parts[0].shape[1]) ** 0.5
+        for training, judged in FOLDS:
+            made = targets["rough"][:, training, axis].T @ network.basis
+            gram = seen[training].T @ seen[training] + 0.1 * np.eye(seen.shape[1])
+            predicted = network.basis @ (seen[judged] @ np.linalg.solve(gram, seen[training].T @ made)).T
+            expected = targets["rough"][:, judged, axis] - predicted
+            np.testing.assert_allclose(fitted.left_out[:, judged, axis], expected, atol=1e-5)
+
+
+def test_a_run_has_no_part_in_the_choice_of_what_judges_it():
+    """Two trials, two folds: the first is best for fold 0 and the second for fold 1, so each judges the other fold."""
+    search, rows = _Best(most=1), [np.array([0, 1]), np.array([2, 3])]
+    for number, by_fold in enumerate([[1.0, 5.0], [4.0, 2.0]]):
+        errors = torch.full((2, 4, 3), float(number))
+        others = sum(by_fold) - np.array(by_fold)
+        search.consider({}, sum(by_fold), lambda: None, lambda o=others, e=errors: _LeftOut(o, e))
+    np.testing.assert_array_equal(search.without(rows)[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
 
 def refitted(network, mirror, ridge, columns, paths, folds):

@@ -36,6 +36,17 @@ def test_a_claim_of_a_process_that_is_gone_is_taken_over(tmp_path: Path) -> None
         assert other.take("a")
 
 
+def test_a_claim_that_was_left_on_a_finished_unit_is_removed(tmp_path: Path) -> None:
+    process = os.fork()
+    if not process:
+        Claims(tmp_path).take("a")
+        os._exit(0)
+    os.waitpid(process, 0)
+    with Claims(tmp_path) as other:
+        assert other.take("b")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_claim_of_another_machine_is_taken_over_when_it_is_late(tmp_path: Path) -> None:
     (tmp_path / "claims").mkdir()
     claim = tmp_path / "claims" / "a"

@@ -46,7 +46,7 @@ def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) ->
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    found = predictions(plan, prepared, plan.batches[0], "cpu")
+    found = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
     assert list(found) == ["wrong", "fitted", "none"]
     assert found["wrong"].accuracy(prepared.test)["mean"] > 0.01
     assert found["fitted"].accuracy(prepared.test)["mean"] < 1e-4
@@ -66,7 +66,10 @@ def test_other_runs_teach_nothing(recorded: Recorded) -> None:
     frame = dataset.frame.copy()
     frame.loc[~frame["run"].isin(seen), "u"] += 0.3
     other = prepare(plan, Dataset(frame, dataset.metadata))
-    pair = [predictions(plan, each, batch, "cpu")["fitted"].foundation.variant for each in (prepared, other)]
+    pair = [
+        predictions(plan, each, each.runs(plan, batch), "cpu")["fitted"].foundation.variant
+        for each in (prepared, other)
+    ]
     assert pair[0] == pair[1]
 
 
@@ -96,7 +99,7 @@ def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monke
         return SimpleNamespace(status="failed", sentence="", seconds=0.0, values={})
 
     monkeypatch.setattr(solve, "identify", identify)
-    predictions(plan, prepared, plan.batches[0], "cpu")
+    predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
     ((data, runs),) = given
     assert runs == prepared.runs(plan, plan.batches[0])
     ((first, last),) = prepared.test.spans.values()
@@ -166,7 +169,7 @@ def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
     prepared = prepare(plan, dataset)
     found = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
     monkeypatch.setattr(solve, "identify", lambda *_: found)
-    both = predictions(plan, prepared, plan.batches[0], "cpu")["fitted"]
+    both = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")["fitted"]
     assert np.isnan(both.paths).all()
     assert both.sentence.startswith("identification: ")
 

@@ -13,8 +13,9 @@ import pytest
 from shipid.errors import ShipidError
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
-from shipid.vessel.template import WIND, Particulars, added_mass, first_guess, hull
+from shipid.vessel.template import WIND, Particulars, added_mass, first_guess, hull, screw
 
 MARINER = Particulars(160.93, 23.17, 7.47, 0.597, 7.7175)
 KVLCC2 = Particulars(320.0, 58.0, 20.8, 0.810, 7.97, ship_type="tanker")
@@ -98,6 +99,62 @@ def test_a_written_first_guess_loads(tmp_path: Path) -> None:
     file.write_text(found.text)
     assert load_vessel(str(file)).digest == found.vessel.digest
     assert load_vessel(str(file)).name == 'a "quoted" ship'
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        Particulars(7.0, 1.27, 0.46, 0.81, 1.179, rpm=627, propeller_diameter=0.216, scale=45.7),
+        Particulars(120.0, 18.0, 6.5, 0.65, 7.0, rpm=140, shafts=2),
+        Particulars(4.0, 0.7, 0.25, 0.6, 1.2, rpm=700),
+        Particulars(40.0, 9.0, 3.0, 0.6, 5.0, "azimuth", rpm=230),
+        Particulars(30.0, 6.5, 2.4, 0.55, 4.5, "azimuth", shafts=1, rpm=300, tunnel_thruster=True),
+    ],
+)
+def test_thrust_at_the_service_rpm_balances_the_resistance(given: Particulars) -> None:
+    found = first_guess(given, "ship", "ship.toml")
+    assert 60 * found.n == pytest.approx(given.rpm, rel=0.04)  # the air's drag is not in the balance
+
+
+def test_the_screw_of_kvlcc2_follows_from_speed_rpm_and_diameter() -> None:
+    """P / D = 0.721 as built; and the steering gear of the model, 15.8 deg/s, from the scale."""
+    given = Particulars(7.0, 1.27, 0.46, 0.81, 1.179, rpm=627, propeller_diameter=0.216, scale=45.7)
+    assert screw(given).pitch == pytest.approx(0.721, abs=0.04)
+    rate = first_guess(given, "k", "k.toml").vessel.parameters["thruster.rudder.actuator.delta.rate"]
+    assert np.degrees(rate) == pytest.approx(15.8, rel=0.02)
+
+
+def test_times_of_a_model_are_those_of_the_ship_over_root_scale() -> None:
+    ship, model = Particulars(160.0, 24.0, 9.0, 0.7), Particulars(4.0, 0.6, 0.225, 0.7, scale=40.0)
+    numbers = [first_guess(given, "s", "s.toml").vessel.parameters for given in (ship, model)]
+    for name, power in (("rate", 0.5), ("T", -0.5)):
+        full, small = (values[f"thruster.rudder.actuator.delta.{name}"] for values in numbers)
+        assert small / full == pytest.approx(40.0**power, rel=1e-4)
+    assert numbers[1]["constants.rho"] == 1000.0
+    unsaid = first_guess(replace(model, scale=None), "s", "s.toml")
+    assert unsaid.vessel.parameters == numbers[1]  # 160 m is what a model without a scale is taken for
+    assert any("--scale" in remark for remark in unsaid.remarks)
+
+
+def test_what_is_known_is_taken() -> None:
+    given = replace(MARINER, rpm=110, rudder_area=30.0, rudder_span=7.0, rudder_rate=5.0, propeller_diameter=5.5)
+    parameters = first_guess(given, "m", "m.toml").vessel.parameters
+    assert parameters["thruster.rudder.A_R"] == 30.0
+    assert parameters["thruster.rudder.H_R"] == 7.0
+    assert parameters["thruster.propeller.D_p"] == 5.5
+    assert parameters["thruster.rudder.actuator.delta.rate"] == pytest.approx(np.radians(5.0), rel=1e-5)
+
+
+def test_two_shafts_have_two_screws_and_two_rudders() -> None:
+    names = dynamics(first_guess(replace(MARINER, shafts=2), "m", "m.toml").vessel).commands
+    assert set(names) == {"port.n", "starboard.n", "port_rudder.delta", "starboard_rudder.delta"}
+
+
+@pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
+def test_the_engines_rpm_is_refused(propulsor: str) -> None:
+    with pytest.raises(ShipidError, match="s it the engine's speed") as caught:
+        first_guess(replace(MARINER, rpm=1800, propulsor=propulsor), "m", "m.toml")
+    assert "\n" not in str(caught.value)
 
 
 def test_given_areas_and_type_are_taken() -> None:

@@ -121,8 +121,8 @@ def _head(guess: Guess) -> Iterator[str]:
     yield "\n[clock]"
     yield from _lines(guess.sniffed.clock)
     scattered = guess.sniffed.scattered
-    source = guess.columns[0].source
-    steps = np.diff(guess.sniffed.t[np.isfinite(guess.sniffed.columns[source])] if scattered else guess.sniffed.t)
+    first = guess.columns[0].source
+    steps = np.diff(guess.sniffed.t[np.isfinite(guess.sniffed.columns[first])] if scattered else guess.sniffed.t)
     usual = float(np.median(steps))
     if scattered:
         yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"

@@ -1,0 +1,56 @@
+"""`shipid export`: a predictor or a vessel as files for others. `shipid aboard`: play a log as if at sea."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def export(
+    what: Annotated[
+        str, typer.Argument(help="a cell, FOLDER/cells/NAME.npz, or a vessel: a document or a bundled name")
+    ],
+    to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
+    out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
+    single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
+    integrator: Annotated[str, typer.Option(help="of a vessel's step: rk4 or euler")] = "rk4",
+    name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
+) -> None:
+    """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
+    from shipid.errors import DocumentError, choices
+    from shipid.export.write import export_predictor, export_vessel
+    from shipid.predictor import Predictor
+    from shipid.vessel.load import load_vessel
+
+    if what.endswith(".npz"):
+        written = export_predictor(Predictor.load(what), to, out, single=single, name=name)
+    else:
+        if integrator not in ("euler", "rk4"):
+            raise DocumentError(f"no such rule: {choices(integrator, ('euler', 'rk4'))}", path="--integrator")
+        vessel = load_vessel(what)
+        written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
+    for file in written:
+        typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
+
+
+def aboard(
+    log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
+    predictor: Annotated[Path, typer.Option("--predictor", help="a cell, FOLDER/cells/NAME.npz")],
+    mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
+    every: Annotated[
+        float | None, typer.Option(help="seconds between predictions; default the predictor's step")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="table of every point: .parquet or .csv")] = None,
+) -> None:
+    """Play a log as if at sea: every instant uses the past alone. Show what an officer would have seen."""
+    from shipid.study.aboard import play, summary, write
+
+    played = play(predictor, log, mapping, every)
+    if out is not None:
+        write(played, out)
+    for line in summary(played):
+        typer.echo(line)
+    if out is not None:
+        typer.echo(f"{len(played.points)} points -> {out}")

@@ -1,0 +1,74 @@
+"""`shipid replay`: recorded runs on a vessel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shipid.cli.options import command_line, stem
+from shipid.cli.terminal import digits, show, table
+from shipid.errors import ShipidError
+
+
+def replay(
+    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    runs: Annotated[
+        list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
+    ] = None,
+    ahead: Annotated[float, typer.Option(help="s of each simulation; 0: whole runs")] = 0.0,
+    step: Annotated[float, typer.Option(help="s, of the integration")] = 0.1,
+    out: Annotated[Path | None, typer.Option(help="page to write; default: <vessel>-replay.html")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV or Parquet file of both motions to write")] = None,
+) -> None:
+    """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
+    from math import degrees
+
+    from shipid.data.dataset import read_dataset
+    from shipid.files import check_table, write_table
+    from shipid.identification.free_run import free_runs
+    from shipid.identification.outcome import pick_runs
+    from shipid.identification.settings import Identify
+    from shipid.report.replay import REPLAYED, ReplayContent, write_replay
+    from shipid.version import __version__
+    from shipid.vessel.load import load_vessel
+
+    file = out or Path(f"{stem(vessel)}-replay.html")
+    if file.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=file)
+    if not step > 0:
+        raise ShipidError(f"{step:g} s must be positive", path="--step")
+    if csv is not None:
+        check_table(csv)
+    ship, log = load_vessel(vessel), read_dataset(dataset)
+    chosen, _ = pick_runs(log, runs or ())
+    settings = Identify(parameters=[next(iter(ship.parameters))], step=step)
+    found = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
+    rows = [
+        [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
+        if row["position"] == row["position"]
+        else [row["run"], "diverges", "", "", ""]
+        for row in found.errors.to_dict("records")
+    ]
+    typer.echo(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
+    show(table(["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], rows))
+    if csv is not None:
+        write_table(csv, found.series)
+        typer.echo(f"motions -> {csv}")
+    content = ReplayContent(
+        title=f"{ship.name}: recorded runs, replayed",
+        name=ship.key,
+        series=found.series,
+        errors=found.errors.drop(columns="model"),
+        ahead=ahead,
+        provenance={
+            "Vessel": f"{ship.name}, digest {ship.digest}",
+            "Dataset": f"{dataset}, digest {log.digest}",
+            "Simulation": f"rk4, steps of {step:g} s",
+            "shipid": __version__,
+        },
+        command=command_line(),
+    )
+    typer.echo(f"page -> {write_replay(content, file)}")

@@ -1,0 +1,899 @@
+"""C99 from blocks: one source, one header and an example, with libm as the only dependency."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from shipid.engine.integrate import Method
+from shipid.errors import ShipidError
+from shipid.export.blocks import Block, Formula, Precision, c_functions
+from shipid.export.equations import Equations
+from shipid.export.model import Model
+from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
+from shipid.physics.signals import SIGNALS, signal_of
+from shipid.version import __version__
+from shipid.vessel.load import Vessel
+
+Array = np.ndarray
+ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
+GAP = 3.0  # steps: after a longer pause a recorder begins anew
+SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
+WORDS = frozenset(
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "main",
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is written: name of a file -> its text; `name` begins every public name in C."""
+
+    name: str
+    texts: dict[str, str]
+
+
+def c_name(text: str) -> str:
+    """A name for C from any text: letters, digits and _, with a letter first."""
+    name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
+    return f"m_{name}" if name[0].isdigit() or name in WORDS else name
+
+
+def strings(values: Sequence[str]) -> str:
+    """C strings, one a line."""
+    escaped = (json.dumps(value).replace("?", "\\?") for value in values)
+    return ",\n    ".join(escaped) or "0"
+
+
+def comment(lines: Sequence[str]) -> str:
+    """A C comment."""
+    kept = [line.replace("*/", "* /").replace("/*", "/ *") for line in lines]
+    return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
+
+
+def _head(name: str, precision: Precision) -> str:
+    suffix = "name ## f" if precision.single else "name"
+    return f"""#include "{name}.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef {name}_real real;
+#define M(name) {suffix}
+"""
+
+
+def _array(kind: str, name: str, size: int, body: str) -> str:
+    return f"const {kind} {name}[{max(1, size)}] = {{{body or '0'}}};"
+
+
+def _names_of(prefix: str, group: str, names: Sequence[str], unit: Mapping[str, str]) -> tuple[str, str]:
+    """Declarations and definitions of the names and units of a group."""
+    count = max(1, len(names))
+    declared, defined = [], []
+    for what, texts in (("names", list(names)), ("units", [unit[name] for name in names])):
+        declared.append(f"extern const char *const {prefix}_{group}_{what}[{count}];")
+        defined.append(f"const char *const {prefix}_{group}_{what}[{count}] = {{\n    {strings(texts)}}};")
+    return "\n".join(declared), "\n".join(defined)
+
+
+def provenance_lines(what: Mapping[str, Any]) -> list[str]:
+    """Plain lines of what is known of an origin, for a comment."""
+    found = []
+    for key, value in what.items():
+        text = json.dumps(value, default=str, ensure_ascii=True)
+        found.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
+    return found
+
+
+# ---------------------------------------------------------------------------------------------------------- vessel
+
+
+def vessel_files(vessel: Vessel, name: str, method: Method, precision: Precision) -> Files:
+    """A vessel alone: its rates and its step, for simulation in C."""
+    parts = VesselParts(vessel, name, method, precision)
+    return Files(name, {f"{name}.h": parts.header(), f"{name}.c": parts.source(), "main.c": parts.example()})
+
+
+@dataclass(frozen=True)
+class VesselParts:
+    """Text of the C of a vessel."""
+
+    vessel: Vessel
+    name: str
+    method: Method
+    precision: Precision
+
+    @property
+    def equations(self) -> Equations:
+        """Blocks of the vessel."""
+        return Equations(self.vessel)
+
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """Names of the entries of each argument."""
+        model = self.equations.model
+        axes = ("X", "Y", "Z", "K", "M", "N")
+        return {
+            "carry": (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory)),
+            "commands": model.commands,
+            "environment": model.environment,
+            "loads": tuple(axes[axis] for axis in self.vessel.axes),
+            "parameters": model.parameters,
+        }
+
+    def unit(self, group: str, name: str) -> str:
+        """SI unit of an entry."""
+        if group == "parameters":
+            return self.vessel.units[name]
+        if group == "loads":
+            return "N" if name in "XYZ" else "N m"
+        last = signal_of(name)
+        extra = {"down": "m", "w": "m/s", "p": "rad/s", "q": "rad/s"}
+        return extra.get(last) or (SIGNALS[last].unit if last in SIGNALS else "-")
+
+    def _tables(self) -> tuple[str, str]:
+        declared, defined = [], []
+        for group, names in self.groups().items():
+            one, other = _names_of(self.name, group, names, {name: self.unit(group, name) for name in names})
+            declared.append(one)
+            defined.append(other)
+        values = self.precision.table(np.array(list(self.vessel.parameters.values())))
+        count = len(self.vessel.parameters)
+        declared.append(f"extern const {self.name}_real {self.name}_defaults[{max(1, count)}];")
+        defined.append(_array(f"{self.name}_real", f"{self.name}_defaults", count, values))
+        return "\n".join(declared), "\n".join(defined)
+
+    def header(self) -> str:
+        """The header: names, units, order, limits, functions."""
+        name, groups, guard = self.name, self.groups(), f"{self.name.upper()}_H"
+        numbers = {f"NUM_{group.upper()}": len(names) for group, names in groups.items()}
+        constants = ",\n    ".join(f"{name}_{key} = {value}" for key, value in numbers.items())
+        declared, _ = self._tables()
+        real = "float" if self.precision.single else "double"
+        return f"""{
+            comment(
+                [
+                    f"{self.vessel.name}: equations of motion in C99, written by shipid {__version__}.",
+                    f"Vessel document digest {self.vessel.digest}.",
+                    "",
+                    "SI units, radians, revolutions per second. The state is north, east, heading over ground, velocities in body",
+                    "axes; then the hidden states of terms and the positions of actuators that lag behind their orders. Names and",
+                    "units of every entry, in order, are in the tables below. Directions of wind and current are towards.",
+                    "Not in this file: waves that a simulated truth draws, a screening of inputs, a helmsman.",
+                    "No memory is allocated and nothing is kept between calls.",
+                ]
+            )
+        }
+#ifndef {guard}
+#define {guard}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+typedef {real} {name}_real;
+
+enum {{
+    {constants}
+}};
+
+/* Results of {name}_step: 0, or a sum of these. The carry is as it was unless the result is 0. */
+enum {{
+    {name}_NOT_FINITE = 1, /* an input is not a finite number */
+    {name}_TIME = 2,       /* the step is not above 0 */
+    {name}_DIVERGED = 4    /* the state after the step is not finite, or a velocity is above {SPEED_LIMIT:g} */
+}};
+
+{declared}
+
+/* Actuators of a carry take the positions that the commands order. */
+void {name}_begin({name}_real *carry, const {name}_real *commands);
+
+/* d(state)/dt of {
+            name
+        }_NUM_CARRY less the actuators. loads: forces and moments that are added, such as waves or a tug. */
+void {name}_rates(const {name}_real *carry, const {name}_real *commands, const {name}_real *environment,
+                  const {name}_real *loads, const {name}_real *parameters, {name}_real *rates);
+
+/* One step of {
+            "explicit Euler" if self.method == "euler" else "classical Runge-Kutta (RK4)"
+        } over dt seconds; actuators move exactly. Any dt above 0; up to a tenth of the
+ * ship's shortest time constant is accurate. parameters: {name}_defaults, or a changed copy of it. */
+int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_real *environment,
+                const {name}_real *loads, const {name}_real *parameters, {name}_real dt);
+
+#ifdef __cplusplus
+}}
+#endif
+#endif
+"""
+
+    def source(self) -> str:
+        """The source."""
+        name, equations, groups = self.name, self.equations, self.groups()
+        model, n = equations.model, equations.num_carry
+        step = equations.step(self.method)
+        begun = equations.begun()
+        blocks: list[Block] = [equations.rates, step, *([begun] if model.memory else [])]
+        text, call = c_functions(blocks, self.precision)
+        sizes_ = {group: len(names) for group, names in groups.items()}
+        arguments = {
+            "carry": "carry",
+            "commands": "commands",
+            "environment": "environment",
+            "tau_extra": "loads",
+            "parameters": "parameters",
+            "dt": "&dt",
+            "state": "carry",
+            "memory": f"carry + {equations.num_states}",
+        }
+
+        def given(block: Block, *out: str) -> str:
+            return ", ".join([*(arguments[key] for key, size in block.inputs if size), *out])
+
+        checks = "\n".join(
+            f"    for (i = 0; i < {size}; ++i) if (!isfinite({group}[i])) return {name}_NOT_FINITE;"
+            for group, size in sizes_.items()
+            if size
+        )
+        speeds = range(model.num_dof, 2 * model.num_dof)
+        idle = [key for key in ("commands", "environment", "parameters") if not sizes_[key]]
+        voids = "".join(f"    (void){key};\n" for key in idle)
+        begin = (
+            f"    {call[id(begun)]}(commands, carry + {equations.num_states});"
+            if model.memory
+            else "    (void)carry;\n    (void)commands;"
+        )
+        return f"""{comment([f"{self.vessel.name}, written by shipid {__version__}; see {name}.h."])}
+{_head(name, self.precision)}
+{self._tables()[1]}
+
+{text}
+void {name}_begin({name}_real *carry, const {name}_real *commands)
+{{
+{begin}
+}}
+
+void {name}_rates(const {name}_real *carry, const {name}_real *commands, const {name}_real *environment,
+                  const {name}_real *loads, const {name}_real *parameters, {name}_real *rates)
+{{
+{voids}    {call[id(equations.rates)]}({given(equations.rates, "rates")});
+}}
+
+int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_real *environment,
+                const {name}_real *loads, const {name}_real *parameters, {name}_real dt)
+{{
+    real after[{n}];
+    int i;
+{voids}{checks}
+    if (!isfinite(dt)) return {name}_NOT_FINITE;
+    if (!(dt > 0)) return {name}_TIME;
+    {call[id(step)]}({given(step, "after")});
+    for (i = 0; i < {n}; ++i) if (!isfinite(after[i])) return {name}_DIVERGED;
+    for (i = {speeds.start}; i < {speeds.stop}; ++i) if (!(M(fabs)(after[i]) <= {SPEED_LIMIT:g})) return {name}_DIVERGED;
+    memcpy(carry, after, sizeof after);
+    return 0;
+}}
+"""
+
+    def example(self) -> str:
+        """An example: a minute with the helm over."""
+        name, groups = self.name, self.groups()
+        orders = []
+        for command in groups["commands"]:
+            row = SIGNALS[signal_of(command)]
+            orders.append(
+                repr(float(np.deg2rad(10) if row.turns else row.usual[0] + 0.5 * (row.usual[1] - row.usual[0])))
+            )
+        speed = groups["carry"].index("u")
+        return f"""/* A minute of {self.name} with the helm over. cc -std=c99 main.c {name}.c -lm */
+#include <stdio.h>
+
+#include "{name}.h"
+
+int main(void)
+{{
+    {name}_real carry[{name}_NUM_CARRY] = {{0}};
+    const {name}_real commands[{max(1, len(orders))}] = {{{", ".join(orders) or "0"}}};
+    const {name}_real environment[{max(1, len(groups["environment"]))}] = {{0}};
+    const {name}_real loads[{name}_NUM_LOADS] = {{0}};
+    int i, status = 0;
+    carry[{speed}] = 1; /* {groups["carry"][speed]} */
+    {name}_begin(carry, commands);
+    for (i = 0; i < 600 && status == 0; ++i)
+        status = {name}_step(carry, commands, environment, loads, {name}_defaults, 0.1{"f" if self.precision.single else ""});
+    for (i = 0; i < {name}_NUM_CARRY; ++i)
+        printf("%s %.6g %s\\n", {name}_carry_names[i], (double)carry[i], {name}_carry_units[i]);
+    return status;
+}}
+"""
+
+
+# -------------------------------------------------------------------------------------------------------- predictor
+
+
+def predictor_files(model: Model, name: str, precision: Precision) -> Files:
+    """A predictor: physics, method, memory, observer and alarm as one C source."""
+    parts = PredictorParts(model, name, precision)
+    return Files(name, {f"{name}.h": parts.header(), f"{name}.c": parts.source(), "main.c": parts.example()})
+
+
+@dataclass(frozen=True)
+class PredictorParts:
+    """Text of the C of a predictor."""
+
+    model: Model
+    name: str
+    precision: Precision
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Entries of a row of the recorder: position, then what else is measured."""
+        return ("north", "east", *(name for name in self.model.layout.now if name not in ("north", "east")))
+
+    @property
+    def capacity(self) -> int:
+        """Rows that a recorder keeps."""
+        return ROWS_A_STEP * self.model.layout.num_past + 4
+
+    @property
+    def filters(self) -> Bank | None:
+        """The filters of the observer, where there is one."""
+        physics = self.model.physics
+        if physics.observer is None or physics.vessel is None:
+            return None
+        return bank(physics.vessel, physics.observer)
+
+    def sizes(self) -> dict[str, int]:
+        """Constants of the header."""
+        names = self.model.layout
+        return {
+            "HORIZON": names.horizon,
+            "NUM_ROW": len(self.row),
+            "NUM_NOW": len(names.now),
+            "NUM_REACHED": len(names.reached),
+            "PAST": names.num_past,
+            "NUM_PAST": len(names.past),
+            "NUM_PLANNED": len(names.planned),
+            "NUM_ESTIMATES": len(names.estimates),
+            "NUM_PARAMETERS": len(names.parameters),
+        }
+
+    def _groups(self) -> dict[str, tuple[str, ...]]:
+        names = self.model.layout
+        return {
+            "row": self.row,
+            "now": names.now,
+            "reached": names.reached,
+            "past": names.past,
+            "planned": names.planned,
+            "estimates": names.estimates,
+            "parameters": names.parameters,
+        }
+
+    def _limits(self) -> Array:
+        """(NUM_ROW, 2) limits; what has none is unlimited."""
+        return np.array([self.model.limits.get(name, (-np.inf, np.inf)) for name in self.row])
+
+    def tables(self) -> tuple[str, str]:
+        """Declarations and definitions of names, units, limits and defaults."""
+        declared, defined, name = [], [], self.name
+        for group, names in self._groups().items():
+            one, other = _names_of(name, group, names, {key: self.model.unit(key) for key in names})
+            declared.append(one)
+            defined.append(other)
+        values = {"defaults": self.model.parameters, "limits": self._limits()}
+        for key, array in values.items():
+            declared.append(f"extern const {name}_real {name}_{key}[{max(1, array.size)}];")
+            defined.append(_array(f"{name}_real", f"{name}_{key}", array.size, self.precision.table(array)))
+        return "\n".join(declared), "\n".join(defined)
+
+    def header(self) -> str:
+        """The header: names, units, order, limits, functions."""
+        name, model, names = self.name, self.model, self.model.layout
+        physics, predictor = model.physics, model.predictor
+        guard = f"{name.upper()}_H"
+        constants = ",\n    ".join(f"{name}_{key} = {value}" for key, value in self.sizes().items())
+        declared, _ = self.tables()
+        real = "float" if self.precision.single else "double"
+        what = "no physics" if physics.vessel is None else physics.vessel.name
+        limits = [f"{key} {low:.6g} to {high:.6g} {model.unit(key)}" for key, (low, high) in model.limits.items()]
+        filters = self.filters
+        states = "" if filters is None else f"    {name}_real filters[{_size(filters) * filters.num_filters}];\n"
+        return f"""{
+            comment(
+                [
+                    f"Predictor of a trajectory in C99, written by shipid {__version__}: {what}, method {predictor.method}.",
+                    f"{names.horizon} steps of {physics.step:g} s ({physics.integrator}); commands are {predictor.commands} over the horizon.",
+                    *(
+                        []
+                        if physics.observer is None
+                        else ["An observer filters the motion and estimates slow forces and current."]
+                    ),
+                    "",
+                    "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
+                    "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
+                    "Limits of the alarm: " + ("; ".join(limits) or "none: every instant counts as outside") + ".",
+                    "",
+                    "Not in this file: a screening of inputs, a fusion of sensors, a repair of logs. Fixes that were interpolated",
+                    "look ahead; give what is known at the time"
+                    + (f" ({', '.join(predictor.causal)})." if predictor.causal else "."),
+                    "No memory is allocated; everything that is kept is in the struct, so that many may run side by side.",
+                    "",
+                    *provenance_lines(predictor.provenance),
+                ]
+            )
+        }
+#ifndef {guard}
+#define {guard}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+typedef {real} {name}_real;
+
+enum {{
+    {constants}
+}};
+
+/* Results: 0, or a sum of these. */
+enum {{
+    {name}_NOT_FINITE = 1, /* an input is not a finite number: the row is not kept, the path is NAN */
+    {name}_OUTSIDE = 2,    /* the alarm: the instant is outside of what training has seen; the path is given */
+    {name}_DIVERGED = 4,   /* the path is not finite */
+    {name}_NO_PAST = 8,    /* the past is shorter than {names.num_past} steps, or there is no row: the path is NAN */
+    {name}_TIME = 16       /* time does not go on: the row is not kept */
+}};
+
+{declared}
+
+/* What is kept of the past. Make one, call {name}_init, and change `parameters` where the ship differs. */
+typedef struct {{
+    {name}_real parameters[{max(1, len(names.parameters))}];
+    double t[{self.capacity}];
+    {name}_real rows[{self.capacity}][{len(self.row) + 4}];
+    int first, count;
+    {name}_real reached[{max(1, len(names.reached))}];
+{states}    {name}_real estimates[{max(1, len(names.estimates))}];
+}} {name};
+
+void {name}_init({name} *self);
+
+/* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
+ * {GAP * physics.step:g} s the past begins anew. Angles may wrap. Rows closer than {
+            physics.step / ROWS_A_STEP:g} s replace each other in the past. */
+int {name}_record({name} *self, double t, const {name}_real *row);
+
+/* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, or a null
+ * pointer: commands stay as they are. */
+int {name}_predict(const {name} *self, const {name}_real *planned, {name}_real *path);
+
+/* The same as a pure function, without a recorder. reached: positions of actuators, or a null pointer: at their orders.
+ * past: {name}_PAST rows, the oldest first; x, y in the frame of the instant. planned: as above. estimates: of an
+ * observer. parameters: {name}_defaults, or a changed copy. Arrays without entries may be null pointers. */
+int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}_real *past, const {name}_real *planned,
+                const {name}_real *estimates, const {name}_real *parameters, {name}_real *path);
+
+#ifdef __cplusplus
+}}
+#endif
+#endif
+"""
+
+    def source(self) -> str:
+        """The source."""
+        model, name, names = self.model, self.name, self.model.layout
+        blocks: list[Block] = [model.graph]
+        advance = _advance(model.vessel) if names.reached else None
+        filters = self.filters
+        filtering = None if filters is None else _filter(filters)
+        blocks += [block for block in (advance, filtering) if block is not None]
+        text, call = c_functions(blocks, self.precision)
+        return f"""{comment([f"Predictor, written by shipid {__version__}; see {name}.h."])}
+{_head(name, self.precision)}
+{self.tables()[1]}
+
+{text}
+{self._path(call)}
+{"" if filters is None or filtering is None else _observing(filters, call[id(filtering)], self.row, self.precision)}
+{self._recorder(None if advance is None else call[id(advance)])}"""
+
+    def _path(self, call: Mapping[int, str]) -> str:
+        """The pure function."""
+        name, names, model = self.name, self.model.layout, self.model
+        sizes_ = names.sizes
+        commands = [names.now.index(key) for key in names.planned]
+        reached = [names.now.index(key) for key in names.reached]
+        first = [names.planned.index(key) for key in names.reached] if names.planned else []
+        lines = ["int i, status = 0;"]
+        if names.planned:
+            lines += [f"real held[{sizes_['planned']}];", f"static const int order[] = {{{_whole(commands)}}};"]
+        if names.reached:
+            source = first if names.planned else reached
+            lines += [f"real begun[{len(reached)}];", f"static const int actuator[] = {{{_whole(source)}}};"]
+        lines += [f"(void){key};" for key, size in sizes_.items() if not size]
+        nan = f"for (i = 0; i < {2 * names.horizon}; ++i) path[i] = NAN;"
+        lines.append(nan)
+        for key in ("now", "past", "estimates", "parameters"):
+            if sizes_[key]:
+                lines.append(f"for (i = 0; i < {sizes_[key]}; ++i) if (!isfinite({key}[i])) return {name}_NOT_FINITE;")
+        if names.planned:
+            lines.append(
+                f"if (!planned) {{ for (i = 0; i < {sizes_['planned']}; ++i) "
+                f"held[i] = now[order[i % {len(commands)}]]; planned = held; }}"
+            )
+            lines.append(
+                f"for (i = 0; i < {sizes_['planned']}; ++i) if (!isfinite(planned[i])) return {name}_NOT_FINITE;"
+            )
+        if names.reached:
+            source_ = "planned" if names.planned else "now"
+            lines.append(
+                f"if (!reached) {{ for (i = 0; i < {len(reached)}; ++i) begun[i] = {source_}[actuator[i]]; reached = begun; }}"
+            )
+            lines.append(f"for (i = 0; i < {len(reached)}; ++i) if (!isfinite(reached[i])) return {name}_NOT_FINITE;")
+        if model.predictor.limits:
+            places = [(names.now.index(key), self.row.index(key)) for key in model.limits]
+            for place, row in places:
+                lines.append(
+                    f"if (!(now[{place}] >= {name}_limits[{2 * row}] && now[{place}] <= {name}_limits[{2 * row + 1}])) "
+                    f"status = {name}_OUTSIDE;"
+                )
+        else:
+            lines.append(f"status = {name}_OUTSIDE;")
+        given = [key for key, size in model.graph.inputs if size]
+        lines.append(f"{call[id(model.graph)]}({', '.join([*given, 'path'])});")
+        lines.append(
+            f"for (i = 0; i < {2 * names.horizon}; ++i) if (!isfinite(path[i])) return status | {name}_DIVERGED;"
+        )
+        lines.append("return status;")
+        body = "\n".join(f"    {line}" for line in lines)
+        return f"""int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}_real *past, const {name}_real *planned,
+                const {name}_real *estimates, const {name}_real *parameters, {name}_real *path)
+{{
+{body}
+}}
+"""
+
+    def _recorder(self, advance: str | None) -> str:
+        """init, record and predict."""
+        name, names, model, row = self.name, self.model.layout, self.model, self.row
+        n, cap, step = len(row), self.capacity, model.physics.step
+        angles = [i for i, key in enumerate(row) if "." not in key and key in SIGNALS and SIGNALS[key].angle]
+        orders = [i for i, key in enumerate(row) if "." in key]
+        u, v, psi = (row.index(key) for key in ("u", "v", "psi"))
+        reached = [row.index(key) for key in names.reached]
+        velocity = model.physics.path == "velocity"
+        filters = self.filters
+        north, east = (n, n + 1) if velocity else (0, 1)
+        real = f"{name}_real"
+        unwrap = "\n".join(
+            f"        kept[{i}] += (real)(6.283185307179586476925 * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / 6.283185307179586476925));"
+            for i in angles
+        )
+        lines = [
+            f"""void {name}_init({name} *self)
+{{
+    memset(self, 0, sizeof *self);
+    memcpy(self->parameters, {name}_defaults, sizeof self->parameters);
+}}
+"""
+        ]
+        actuators = ""
+        if advance is not None:
+            model_ = Equations(_must(model.vessel)).model
+            orders_ = ", ".join(f"last[{row.index(key)}]" for key in model_.commands)
+            actuators = f"""        {{
+            const real dt = (real)(t - self->t[newest]);
+            const real given[{len(model_.commands)}] = {{{orders_}}};
+            real after[{len(reached)}];
+            {advance}(self->reached, given, self->parameters, &dt, after);
+            memcpy(self->reached, after, sizeof after);
+        }}
+"""
+        first_actuators = "\n".join(f"        self->reached[{k}] = row[{i}];" for k, i in enumerate(reached))
+        begin_filters = "        begin_filters(self->filters, row, self->estimates);\n" if filters is not None else ""
+        go_filters = (
+            "        go_filters(self->filters, last, kept, (real)(t - self->t[newest]), self->parameters, self->estimates);\n"
+            if filters is not None
+            else ""
+        )
+        lines.append(f"""int {name}_record({name} *self, double t, const {real} *row)
+{{
+    int i, newest = (self->first + self->count - 1) % {cap};
+    real kept[{n + 4}];
+    if (!isfinite(t)) return {name}_NOT_FINITE;
+    for (i = 0; i < {n}; ++i) if (!isfinite(row[i])) return {name}_NOT_FINITE;
+    if (self->count && !(t > self->t[newest])) return {name}_TIME;
+    if (self->count && t - self->t[newest] > {GAP * step!r}) self->count = 0;
+    memcpy(kept, row, {n} * sizeof *kept);
+    if (self->count) {{
+        const real *last = self->rows[newest];
+        const real half = (real)((t - self->t[newest]) / 2);
+        (void)last;
+{unwrap}
+        kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
+        kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
+        kept[{n}] = last[{n}] + half * (last[{n + 2}] + kept[{n + 2}]);
+        kept[{n + 1}] = last[{n + 1}] + half * (last[{n + 3}] + kept[{n + 3}]);
+{actuators}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / ROWS_A_STEP * (1 - 1e-6)!r})
+            --self->count; /* the newest row came so soon that this one replaces it */
+    }} else {{
+        self->first = 0;
+        kept[{n}] = kept[{n + 1}] = 0;
+        kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
+        kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
+{first_actuators}
+{begin_filters}    }}
+    if (self->count == {cap}) {{
+        self->first = (self->first + 1) % {cap};
+        --self->count;
+    }}
+    newest = (self->first + self->count++) % {cap};
+    self->t[newest] = t;
+    memcpy(self->rows[newest], kept, sizeof kept);
+    return 0;
+}}
+""")
+        sizes_ = names.sizes
+        past_lines = self._past(orders, north, east, velocity) if names.num_past else ""
+        taken = [row.index(key) for key in names.now]
+        lines.append(f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
+{{
+    const int newest = (self->first + self->count - 1) % {cap};
+    static const int taken[{len(taken)}] = {{{_whole(taken)}}};
+    real now[{len(taken)}], past[{max(1, sizes_["past"])}];
+    int i;
+    for (i = 0; i < {2 * names.horizon}; ++i) path[i] = NAN;
+    if (!self->count) return {name}_NO_PAST;
+    for (i = 0; i < {len(taken)}; ++i) now[i] = self->rows[newest][taken[i]];
+{past_lines or "    past[0] = 0;"}
+    return {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
+}}
+""")
+        return "\n".join(lines)
+
+    def _past(self, orders: Sequence[int], north: int, east: int, velocity: bool) -> str:
+        """Rows of the past by interpolation, commands by the last row before."""
+        name, names, row, step = self.name, self.model.layout, self.row, self.model.physics.step
+        n, cap = len(row), self.capacity
+        places = [row.index(key) for key in names.past if key not in ("x", "y")]
+        held = [int(place in orders) for place in places]
+        psi = row.index("psi")
+        if velocity:  # the trapezoid of linear rates, exact between rows
+            position = f"""            const real later_n = before[{n + 2}] + (real)share * (after[{n + 2}] - before[{n + 2}]);
+            const real later_e = before[{n + 3}] + (real)share * (after[{n + 3}] - before[{n + 3}]);
+            const real north = before[{n}] + (real)((at - t0) / 2) * (before[{n + 2}] + later_n) - newest_row[{n}];
+            const real east = before[{n + 1}] + (real)((at - t0) / 2) * (before[{n + 3}] + later_e) - newest_row[{n + 1}];"""
+        else:
+            position = f"""            const real north = before[{north}] + (real)share * (after[{north}] - before[{north}]) - newest_row[{north}];
+            const real east = before[{east}] + (real)share * (after[{east}] - before[{east}]) - newest_row[{east}];"""
+        width = len(names.past)
+        return f"""    {{
+        static const int place[{len(places)}] = {{{_whole(places)}}};
+        static const int holds[{len(places)}] = {{{_whole(held)}}};
+        const real *newest_row = self->rows[newest];
+        const real c = M(cos)(newest_row[{psi}]), s = M(sin)(newest_row[{psi}]);
+        const double slack = {1e-3 * step / ROWS_A_STEP!r}, t = self->t[newest];
+        int k, j = 0;
+        if (t - {names.num_past * step!r} < self->t[self->first] - slack) return {name}_NO_PAST;
+        for (k = 0; k < {names.num_past}; ++k) {{
+            double at = t - {step!r} * ({names.num_past} - k), t0, t1, share;
+            const real *before, *after;
+            real *entry = past + k * {width};
+            if (at < self->t[self->first]) at = self->t[self->first];
+            while (j + 1 < self->count && self->t[(self->first + j + 1) % {cap}] <= at + slack) ++j;
+            before = self->rows[(self->first + j) % {cap}];
+            t0 = self->t[(self->first + j) % {cap}];
+            after = j + 1 < self->count ? self->rows[(self->first + j + 1) % {cap}] : before;
+            t1 = j + 1 < self->count ? self->t[(self->first + j + 1) % {cap}] : t0 + 1;
+            if (at < t0) at = t0;
+            share = (at - t0) / (t1 - t0);
+            for (i = 0; i < {len(places)}; ++i)
+                entry[i] = holds[i] ? before[place[i]] : before[place[i]] + (real)share * (after[place[i]] - before[place[i]]);
+            {{
+{position}
+            entry[{width - 2}] = c * north + s * east;
+            entry[{width - 1}] = c * east - s * north;
+            }}
+        }}
+    }}"""
+
+    def example(self) -> str:
+        """An example: the same row again and again, then a path."""
+        name, row, names = self.name, self.row, self.model.layout
+        values = []
+        for key in row:
+            low, high = self.model.limits.get(key, (0.0, 0.0))
+            values.append(
+                repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else "")
+            )
+        rows = names.num_past + 1
+        return f"""/* A ship that does the same for a while, and where she goes. cc -std=c99 main.c {name}.c -lm */
+#include <stdio.h>
+
+#include "{name}.h"
+
+int main(void)
+{{
+    static {name} ship;
+    /* {", ".join(row)} */
+    {name}_real row[{name}_NUM_ROW] = {{{", ".join(values)}}};
+    {name}_real path[2 * {name}_HORIZON];
+    int i, status;
+    {name}_init(&ship);
+    for (i = 0; i < {rows}; ++i) {{
+        {name}_record(&ship, {self.model.physics.step!r} * i, row);
+        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* north, as if she sailed that way */
+    }}
+    status = {name}_predict(&ship, 0, path);
+    printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");
+    for (i = 0; i < {name}_HORIZON; ++i)
+        printf("%g s: %.2f m ahead, %.2f m to starboard\\n", {self.model.physics.step!r} * (i + 1), (double)path[2 * i], (double)path[2 * i + 1]);
+    return status & ~{name}_OUTSIDE;
+}}
+"""
+
+
+def _must(vessel: Vessel | None) -> Vessel:
+    if vessel is None:
+        raise ShipidError("there is no vessel")
+    return vessel
+
+
+def _whole(values: Sequence[int]) -> str:
+    return ", ".join(str(int(value)) for value in values) or "0"
+
+
+def _advance(vessel: Vessel | None) -> Formula:
+    """(memory, commands, parameters, dt) -> memory after dt; state and weather do not count for actuators."""
+    model = Equations(_must(vessel)).model
+    memory, commands = SX.sym("memory", len(model.memory)), SX.sym("commands", len(model.commands))
+    parameters, dt = SX.sym("parameters", len(model.parameters)), SX.sym("dt")
+    still = SX.zeros(len(model.state) + len(model.hidden)), SX.zeros(len(model.environment))
+    result = ca.densify(SX(model.advance(still[0], memory, commands, still[1], parameters, dt)))
+    given = [memory, commands, parameters, dt]
+    names = ["memory", "commands", "parameters", "dt"]
+    return Formula(ca.Function("actuators", given, [result], names, ["out"], {"cse": True}))
+
+
+def _size(filters: Bank) -> int:
+    return sum(sizes(filters.model))
+
+
+def _filter(filters: Bank) -> Formula:
+    """(state, commands, environment, parameters, measured, numbers, dt) -> state after, estimate, innovation, spread."""
+    one = filter_function(filters.model)
+    symbols = {one.name_in(i): SX.sym(one.name_in(i), one.numel_in(i)) for i in range(one.n_in())}
+    results = one(*(SX(ca.DM(filters.noise)) if name == "noise" else symbol for name, symbol in symbols.items()))
+    kept = {name: symbol for name, symbol in symbols.items() if name != "noise"}
+    result = ca.densify(ca.vertcat(*results[:2]))
+    return Formula(ca.Function("filter", list(kept.values()), [result], list(kept), ["out"], {"cse": True}))
+
+
+def _observing(filters: Bank, filtering: str, row: Sequence[str], precision: Precision) -> str:
+    """C of the bank of filters: the first state, and a step with the mixture of `observer_function`."""
+    n, count, model, settings = _size(filters), filters.num_filters, filters.model, filters.settings
+    num_states, nm, nc = len(STATES), len(model.memory), len(model.commands)
+    measured = [row.index(name) if name in settings.measured else -1 for name in MEASURED]
+    memory = [row.index(name) for name in model.memory]
+    commands = [row.index(name) for name in model.commands]
+    weather = [row.index(name) if name in row else -1 for name in model.environment]
+    wide = np.array([1e3, 1e3, np.pi, 5.0, 1.0, 0.1])
+    missing = ~np.isin(MEASURED, settings.measured)
+    deviations = filters.first.copy()
+    deviations[:, :6] = np.where(missing, wide, np.hypot(2 * filters.noise, filters.first[:, LOW:]))
+    places = np.cumsum([0, *sizes(model)])
+    table = precision.table
+    arguments = [f"states + k * {n}"]
+    arguments += ["commands"] if nc else []
+    arguments += ["environment"] if weather else []
+    arguments += ["parameters"] if model.parameters else []
+    arguments += ["measured", f"numbers + k * {filters.numbers.shape[1]}", "&dt", "found"]
+    return f"""static void begin_filters(real *states, const real *row, real *estimates)
+{{
+    static const int measured[6] = {{{_whole(measured)}}};
+    static const int memory[{max(1, nm)}] = {{{_whole(memory)}}};
+    static const int commands[{max(1, nc)}] = {{{_whole(commands)}}};
+    static const real variances[{count * num_states}] = {{{table(deviations**2)}}};
+    int i, k;
+    memset(states, 0, {n * count} * sizeof *states);
+    (void)memory;
+    for (k = 0; k < {count}; ++k) {{
+        real *state = states + k * {n};
+        for (i = 0; i < 6; ++i) state[i] = measured[i] < 0 ? 0 : row[measured[i]];
+        for (i = 0; i < {num_states}; ++i) state[{num_states} + i * {num_states + 1}] = variances[k * {num_states} + i];
+        for (i = 0; i < {nm}; ++i) state[{places[2]} + i] = row[memory[i]];
+        for (i = 0; i < {nc}; ++i) state[{places[4]} + i] = row[commands[i]];
+    }}
+    for (i = 0; i < {LOW}; ++i) estimates[i] = i < 6 ? states[i] : 0;
+}}
+
+static void go_filters(real *states, const real *last, const real *row, real dt, const real *parameters, real *estimates)
+{{
+    static const int measured_at[6] = {{{_whole(measured)}}};
+    static const int commands_at[{max(1, nc)}] = {{{_whole(commands)}}};
+    static const int environment_at[{max(1, len(weather))}] = {{{_whole(weather)}}};
+    static const real numbers[{filters.numbers.size}] = {{{table(filters.numbers)}}};
+    const real most = {precision.number(DIVERGED)};
+    real measured[6], commands[{max(1, nc)}], environment[{max(1, len(weather))}];
+    real likelihood[{count}], weight[{count}], each[{count}][{LOW}], likely[{n}], best = -INFINITY, sum = 0, ties = 0;
+    int sound[{count}], i, k;
+    for (i = 0; i < 6; ++i) measured[i] = measured_at[i] < 0 ? NAN : row[measured_at[i]];
+    for (i = 0; i < {nc}; ++i) commands[i] = last[commands_at[i]];
+    for (i = 0; i < {len(weather)}; ++i) environment[i] = environment_at[i] < 0 ? 0 : last[environment_at[i]];
+    (void)environment_at;
+    (void)environment;
+    (void)commands;
+    (void)parameters;
+    for (k = 0; k < {count}; ++k) {{
+        real found[{n + LOW}];
+        {filtering}({", ".join(arguments)});
+        sound[k] = 1;
+        for (i = 0; i < {n}; ++i) {{
+            if (!(M(fabs)(found[i]) < most)) sound[k] = 0;
+            states[k * {n} + i] = M(fmin)(M(fmax)(found[i], -most), most);
+        }}
+        for (i = 0; i < {LOW}; ++i) each[k][i] = M(fmin)(M(fmax)(found[{n} + i], -most), most);
+        likelihood[k] = sound[k] ? states[k * {n} + {n - 1}] : -most;
+        if (likelihood[k] > best) best = likelihood[k];
+    }}
+    memset(likely, 0, sizeof likely);
+    for (k = 0; k < {count}; ++k) {{
+        weight[k] = M(exp)(likelihood[k] - best);
+        sum += weight[k];
+        if (likelihood[k] == best) ties += 1;
+    }}
+    for (k = 0; k < {count}; ++k)
+        if (likelihood[k] == best)
+            for (i = 0; i < {n}; ++i) likely[i] += states[k * {n} + i] / ties;
+    for (i = 0; i < {LOW}; ++i) {{
+        estimates[i] = 0;
+        for (k = 0; k < {count}; ++k) estimates[i] += each[k][i] * (weight[k] / sum);
+    }}
+    for (k = 0; k < {count}; ++k)
+        if (!sound[k]) memcpy(states + k * {n}, likely, sizeof likely);
+}}
+"""

@@ -1,0 +1,70 @@
+"""CasADi files: a predictor or a vessel as a `casadi.Function`, with a list of names beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+from casadi import MX
+
+from shipid.engine.integrate import Method
+from shipid.export.blocks import Precision
+from shipid.export.c import VesselParts
+from shipid.export.model import Model
+from shipid.files import whole, write_json
+from shipid.version import __version__
+from shipid.vessel.load import Vessel
+
+
+def vessel_function(vessel: Vessel, name: str, method: Method) -> tuple[ca.Function, dict[str, Any]]:
+    """(carry, commands, environment, loads, parameters, dt) -> carry after dt, and the names of the entries."""
+    parts = VesselParts(vessel, name, method, Precision())
+    step, groups = parts.equations.step(method).function, parts.groups()
+    order = ("carry", "commands", "environment", "loads", "parameters")
+    inputs = {key: MX.sym(key, len(groups[key])) for key in order} | {"dt": MX.sym("dt")}
+    after = step(*(inputs["loads" if key == "tau_extra" else key] for key in step.name_in()))
+    function = ca.Function(name, list(inputs.values()), [after], list(inputs), ["after"])
+    described = {key: [{"name": entry, "unit": parts.unit(key, entry)} for entry in groups[key]] for key in order}
+    return function, {
+        "what": f"one step of {vessel.name} by {method}",
+        "inputs": {**described, "dt": [{"name": "dt", "unit": "s"}]},
+        "outputs": {"after": described["carry"]},
+        "defaults": {"parameters": list(vessel.parameters.values())},
+    }
+
+
+def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, Any]]:
+    """(now, reached, past, planned, estimates, parameters) -> path (2, T), and the names of the entries.
+
+    path : x and y [m] in body axes at the instant, a column for each step. ShipidError for a forest.
+    """
+    names, function = model.layout, model.graph.function
+    inputs = {key: MX.sym(key, size) for key, size in names.sizes.items()}
+    path = ca.reshape(function(*inputs.values()), 2, names.horizon)
+    outputs = {"path": [{"name": axis, "unit": "m"} for axis in "xy"]}
+    rows: Mapping[str, int] = {"past": names.num_past, "planned": names.horizon}
+    listed = {key: [{"name": entry, "unit": model.unit(entry)} for entry in getattr(names, key)] for key in names.sizes}
+    return ca.Function(name, list(inputs.values()), [path], list(inputs), ["path"]), {
+        "what": f"path after 1 ... {names.horizon} steps of {model.physics.step:g} s, method {model.predictor.method}",
+        "inputs": listed,
+        "rows": rows,
+        "outputs": outputs,
+        "defaults": {"parameters": model.parameters.tolist()},
+        "limits": model.limits,
+        "provenance": dict(model.predictor.provenance),
+    }
+
+
+def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) -> list[Path]:
+    """Write `file` (for `casadi.Function.load`) and `file.json` with the names of inputs and outputs."""
+    with whole(file) as temporary:
+        function.save(str(temporary))
+    beside = file.with_name(file.name + ".json")
+    write_json(
+        beside,
+        {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},
+    )
+    return [file, beside]

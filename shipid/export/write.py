@@ -1,0 +1,102 @@
+"""Write a predictor or a vessel as files for others."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Literal, get_args
+
+from shipid.engine.integrate import Method
+from shipid.errors import DocumentError, ShipidError, choices
+from shipid.export.blocks import Precision
+from shipid.export.c import Files, c_name, predictor_files, vessel_files
+from shipid.export.casadi import predictor_function, vessel_function, write_function
+from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
+from shipid.export.model import Exportable, model
+from shipid.export.onnx import write_onnx
+from shipid.files import write_text
+from shipid.vessel.load import Vessel
+
+Target = Literal["c", "fmu", "casadi", "onnx"]
+TARGETS: tuple[str, ...] = get_args(Target)
+
+
+def export_predictor(
+    predictor: Exportable, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
+) -> list[Path]:
+    """Write a predictor for a target; the files that were written.
+
+    Parameters
+    ----------
+    to : `c` (a folder with NAME.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, and its names as JSON) or
+        `onnx` (the networks alone).
+    out : the folder for `c`, else the file.
+    single : numbers in single precision (`c` and `onnx`).
+    name : begins every public name in C, and is the model identifier of an FMU; default the stem of `out`.
+
+    Raises
+    ------
+    ShipidError : the target does not exist, cannot take the method, or the compiler fails.
+    """
+    target, file = _checked(to, out, single)
+    kept = model(predictor)
+    title = c_name(name or file.stem)
+    if target == "c":
+        return _folder(predictor_files(kept, title, Precision(single)), file)
+    if target == "fmu":
+        return _fmu(predictor_unit(kept, title), file)
+    if target == "casadi":
+        return write_function(*predictor_function(kept, title), file)
+    return [write_onnx(kept, title, file, single=single)]
+
+
+def export_vessel(
+    vessel: Vessel,
+    to: str,
+    out: str | os.PathLike[str],
+    *,
+    integrator: Method = "rk4",
+    single: bool = False,
+    name: str | None = None,
+) -> list[Path]:
+    """Write a vessel alone, its step, for simulation: to `c`, `fmu` or `casadi`; see `export_predictor`."""
+    target, file = _checked(to, out, single)
+    title = c_name(name or file.stem)
+    if target == "onnx":
+        raise DocumentError("a vessel has no networks for ONNX: export it to c, fmu or casadi", path="--to")
+    if target == "c":
+        return _folder(vessel_files(vessel, title, integrator, Precision(single)), file)
+    if target == "fmu":
+        return _fmu(vessel_unit(vessel, title, integrator), file)
+    return write_function(*vessel_function(vessel, title, integrator), file)
+
+
+def _checked(to: str, out: str | os.PathLike[str], single: bool) -> tuple[str, Path]:
+    if to not in TARGETS:
+        raise DocumentError(f"no such target: {choices(to, TARGETS)}", path="--to")
+    if single and to not in ("c", "onnx"):
+        raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
+    file = Path(out)
+    if to == "c" and file.exists() and not file.is_dir():
+        raise DocumentError("is a file: the target c takes a folder", file=file, path="--out")
+    if to == "fmu" and file.suffix != ".fmu":
+        raise DocumentError("an FMU is a file that ends in .fmu", file=file, path="--out")
+    if to != "c" and file.is_dir():
+        raise DocumentError(f"is a folder: the target {to} takes a file", file=file, path="--out")
+    return to, file
+
+
+def _folder(files: Files, folder: Path) -> list[Path]:
+    written = []
+    for name, text in files.texts.items():
+        write_text(folder / name, text)
+        written.append(folder / name)
+    return written
+
+
+def _fmu(unit: Packed, file: Path) -> list[Path]:
+    try:
+        write_fmu(unit, file)
+    except ShipidError as error:
+        raise ShipidError(error.message, file=file) from None
+    return [file]

@@ -1,0 +1,311 @@
+"""Bands: a region around every step of a predicted path that holds the whole path, or each step, with a probability.
+
+The region at step k is an ellipse around the predicted position, along and across the predicted track, or a circle. Its
+half axes are `radius(level) * scale[k] * growth`: the scale says how errors grow over the horizon, the growth how much
+harder this prediction is than others, by the predicted path and by the distance from the windows of training. The
+radius is calibrated on runs that the models behind the errors did not see: `shipid.hybrid.calibration`.
+
+Everything here is arrays and formulas, so that a band can be exported with its predictor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import DataError, ResultError, choices
+
+Array = NDArray[np.float64]
+LEVELS = np.arange(1, 100) / 100
+"""Levels that the tables of a band hold; between them it interpolates."""
+FEWEST = 3  # runs: one is left out, and two are needed to see how much runs differ
+TRAITS = ("length", "turn", "change", "slip", "distance")
+"""What the growth of a band depends on, see `traits`."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """Regions around predicted paths, in the frame (11) of the instants.
+
+    Parameters
+    ----------
+    ahead : unit vector (T, S, 2) of the predicted track.
+    along, across : half axes (T, S) [m] of the ellipse along the track and across it.
+    """
+
+    ahead: Array
+    along: Array
+    across: Array
+
+    @property
+    def radius(self) -> Array:
+        """Radius (T, S) [m] of the circle with the area of the region: the width of a band in one number."""
+        radius: Array = np.sqrt(self.along * self.across)
+        return radius
+
+    def reach(self, errors: Array) -> Array:
+        """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region."""
+        along, across = turned(errors, self.ahead)
+        reach: Array = np.hypot(along / self.along, across / self.across)
+        return reach
+
+    def holds(self, errors: Array) -> NDArray[np.bool_]:
+        """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
+        inside: NDArray[np.bool_] = np.all(self.reach(errors) <= 1, axis=0)
+        return inside
+
+    def scaled(self, factor: float | Array) -> Region:
+        """Return the region with its half axes times a factor, or one (S,) for each instant."""
+        return Region(self.ahead, self.along * factor, self.across * factor)
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Calibrated bands of a predictor.
+
+    Parameters
+    ----------
+    runs : number of runs that calibrated it.
+    along, across : scale (T,) [m] of the errors along the predicted track and across it; equal for a circle.
+    whole : (99,) radius for each of `LEVELS` that holds whole paths.
+    steps : (99, T) the same for each step alone.
+    names : columns in which the distance from training is measured. centres : (m, d) points of the training windows.
+    spread : (d,) what counts as distance 1 in each column.
+    far : the greatest distance that calibration has seen: beyond it the band grows in proportion.
+    middle, deviation, low, high : (5,) mean, standard deviation, least and greatest value of each of `TRAITS`.
+    slopes : (5,) growth per standard deviation of each trait, as the logarithm.
+    length : mean length [m] of the predicted paths of calibration.
+    kinds : kinds of manoeuvre of the runs of calibration -> number of runs, where they were known.
+    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind.
+    """
+
+    runs: int
+    along: Array
+    across: Array
+    whole: Array
+    steps: Array
+    names: tuple[str, ...]
+    centres: Array
+    spread: Array
+    far: float
+    middle: Array
+    deviation: Array
+    low: Array
+    high: Array
+    slopes: Array
+    length: float
+    kinds: Mapping[str, int]
+    by_kind: Array
+
+    def region(
+        self,
+        paths: Array,
+        columns: Mapping[str, Array],
+        step: float,
+        level: float,
+        *,
+        pointwise: bool = False,
+        kind: str | None = None,
+    ) -> Region:
+        """Return the region around paths (T, S, 2) [m] in the frame (11).
+
+        Parameters
+        ----------
+        columns : measured columns at the instants, name -> (S,). step : of the path [s].
+        level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of positions at each step.
+        kind : kind of manoeuvre of the run, if it is known: the share then holds for runs of this kind, and not only
+            for all kinds together as they were mixed in calibration.
+
+        Raises
+        ------
+        DataError : the level is not between 0 and 0.99, or there were too few runs for it, or of the kind.
+        """
+        self.check(level, kind)
+        if kind is not None and pointwise:
+            raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
+        radius = at_level(self.steps if pointwise else self.table(kind), level)
+        size = self.growth(paths, columns, step)
+        ahead = track(paths)
+        return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
+
+    def table(self, kind: str | None = None) -> Array:
+        """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind if one is given."""
+        return self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
+
+    def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
+        """How much wider (S,) the band of each prediction is than that of an average one [1]."""
+        away = distance(columns, self.names, self.centres, self.spread)
+        seen = np.clip(traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high)
+        size: Array = np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
+        return size
+
+    def check(self, level: float, kind: str | None = None) -> None:
+        """Raise DataError, one sentence, where no band of this level can be promised."""
+        if not 0 < level <= LEVELS[-1]:
+            raise DataError(f"{level:g} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
+        if kind is not None and kind not in self.kinds:
+            raise DataError(f"no run of the kind {kind!r} calibrated this band: {choices(kind, self.kinds)}")
+        if not self.promises(level, kind):
+            raise DataError(too_few(level, self.runs if kind is None else self.kinds[kind], kind))
+
+    def promises(self, level: float, kind: str | None = None) -> bool:
+        """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
+        runs = self.runs if kind is None else self.kinds.get(kind, 0)
+        return 0 < level <= LEVELS[-1] and runs >= needed(level)
+
+    def header(self) -> dict[str, Any]:
+        """Return all that is not an array."""
+        plain = {"runs": self.runs, "names": list(self.names), "far": self.far, "length": self.length}
+        return {**plain, "kinds": dict(self.kinds)}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in self.header()}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild what `header` and `arrays` gave; ResultError where a part is missing."""
+        names = [one.name for one in fields(cls) if one.name not in ("runs", "names", "far", "length", "kinds")]
+        missing = next((name for name in names if name not in arrays), None)
+        if missing is not None:
+            raise ResultError(f"damaged: the band lacks {missing!r}")
+        return cls(
+            runs=int(header["runs"]),
+            names=tuple(header["names"]),
+            far=float(header["far"]),
+            length=float(header["length"]),
+            kinds={str(kind): int(count) for kind, count in header["kinds"].items()},
+            **{name: np.asarray(arrays[name], dtype=float) for name in names},
+        )
+
+
+def needed(level: float) -> int:
+    """Fewest runs that a level needs: 4 for 0.8, 9 for 0.9, 19 for 0.95.
+
+    Of G runs and a new one, each is the worst with the same probability, so no band from G runs promises more than
+    G / (G + 1).
+    """
+    return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
+
+
+def too_few(level: float, runs: int, kind: str | None = None) -> str:
+    """One sentence where there are too few runs for a level, or too few of a kind of manoeuvre."""
+    of = "" if kind is None else f" of the kind {kind!r}"
+    return f"a band of {100 * level:g} % needs {needed(level)} runs or more{of} to calibrate it: there are {runs}"
+
+
+def at_level(table: Array, level: float) -> Array:
+    """Radius for a level from a table (99, ...) for `LEVELS`; below the first level it goes to 0."""
+    place = level * 100 - 1
+    if place < 0:
+        lowest: Array = np.asarray(table[0] * (place + 1))
+        return lowest
+    lower = min(int(place + 1e-9), len(table) - 1)
+    share = max(place - lower, 0.0)
+    upper = min(lower + 1, len(table) - 1)
+    radius: Array = np.asarray(table[lower] + share * (table[upper] - table[lower]))
+    return radius
+
+
+def track(paths: Array) -> Array:
+    """Unit vectors (T, S, 2) along paths (T, S, 2) that start at the origin; ahead where a path does not move."""
+    first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
+    chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
+    size = np.hypot(chords[..., 0], chords[..., 1])
+    moves = size > 1e-12 * max(float(np.max(size, initial=0.0)), 1e-300)
+    ahead: Array = np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0])
+    return ahead
+
+
+def turned(errors: Array, ahead: Array) -> tuple[Array, Array]:
+    """Errors (..., 2) along the unit vectors `ahead` and across them, to starboard."""
+    along = errors[..., 0] * ahead[..., 0] + errors[..., 1] * ahead[..., 1]
+    return along, errors[..., 1] * ahead[..., 0] - errors[..., 0] * ahead[..., 1]
+
+
+def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
+    """What makes a prediction easy or hard, (S, 5), one column for each of `TRAITS`; no trait has a unit.
+
+    length : logarithm of the length of the predicted path, by three chords, over that of an average one.
+    turn : by how much the predicted track turns between the chords [rad]. change : by how much faster or slower it
+    turns later [rad]. slip : how far the turn is from what the present yaw rate would give [rad].
+    distance : logarithm of 1 + the distance from the windows of training.
+    """
+    horizon = len(paths)
+    marks = np.array([-(-horizon * part // 3) - 1 for part in (1, 2, 3)])
+    points = np.concatenate([np.zeros_like(paths[:1]), paths[marks]])
+    chords = np.diff(points, axis=0)
+    size = np.hypot(chords[..., 0], chords[..., 1])
+    cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
+    angles = np.arctan2(cross, (chords[:-1] * chords[1:]).sum(axis=-1))
+    first, second = angles
+    held = columns["r"] * step * horizon * 2 / 3
+    return np.column_stack(
+        [
+            np.log(size.sum(axis=0) / length + 0.02),
+            np.abs(first + second),
+            np.abs(second - first),
+            np.minimum(np.abs(first + second - held), np.pi),
+            np.log1p(away),
+        ]
+    )
+
+
+def distance(columns: Mapping[str, Array], names: tuple[str, ...], centres: Array, spread: Array) -> Array:
+    """Distance (S,) [1] of instants from the nearest of some points of training, root mean square over columns."""
+    return nearest(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
+
+
+def nearest(points: Array, centres: Array) -> Array:
+    """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,)."""
+    middle = centres.mean(axis=0)
+    points, centres = points - middle, centres - middle  # else large coordinates would cost digits
+    squares = (points**2).sum(axis=1) + ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).min(axis=0)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / points.shape[1])
+    return found
+
+
+class Adaptive(NamedTuple):
+    """State of a band that adapts along a run: the share of paths that it now aims to miss, and the one wanted.
+
+    miss : may leave 0 to 1: below 0 the band grows until it holds, above 1 it is empty. wanted : 1 - level.
+    rate : how fast it adapts, per instant judged.
+    """
+
+    miss: float
+    wanted: float
+    rate: float
+
+
+def adaptive(level: float, rate: float = 0.02) -> Adaptive:
+    """Return the state at the start of a run: the band is as calibrated."""
+    return Adaptive(1 - level, 1 - level, rate)
+
+
+def adapted(state: Adaptive, missed: bool) -> Adaptive:
+    """Return the state after one more path could be judged: adaptive conformal inference.
+
+    Each miss widens the band, each hit narrows it a little, so that the long-run share of misses goes to that wanted,
+    whatever drifts: |share - wanted| <= const / (rate n) after n paths. Source: Gibbs and Candes (2021), eq. (2).
+
+    missed : whether the path, predicted a horizon ago, left the band that was then given for it.
+    """
+    return state._replace(miss=state.miss + state.rate * (state.wanted - float(missed)))
+
+
+def factor(state: Adaptive, whole: Array) -> float:
+    """Return how much wider than calibrated the band is now, from the table `whole` (99,) of its `Bands`.
+
+    Beyond the levels of the table it grows by e for each 0.05 that misses are to fall further, without a bound.
+    """
+    usual = float(at_level(whole, min(1 - state.wanted, LEVELS[-1])))
+    level = 1 - state.miss
+    if level <= 0 or usual == 0:
+        return 0.0 if level <= 0 else 1.0
+    inside = float(at_level(whole, min(level, float(LEVELS[-1]))))
+    return inside / usual * math.exp(max(level - float(LEVELS[-1]), 0.0) / 0.05)

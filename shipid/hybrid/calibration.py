@@ -1,0 +1,260 @@
+"""Calibration: from errors on runs that a model did not see, to bands that hold their share of paths of a new run.
+
+Windows of one run are alike, runs are exchangeable. So everything here counts runs: each weighs the same, and every
+quantity that a score is divided by comes from the other runs. The radius is set by leaving out every run in turn: the
+rank of a window among the windows of the other runs says which quantile of theirs would have held it, and the radius is
+the quantile of all windows that would have held the wanted share of the windows of runs left out.
+
+Sources: Lee, Barber and Willett, "Distribution-free inference with hierarchical data" (arXiv 2306.06342); Dunn,
+Wasserman and Ramdas, "Distribution-free prediction sets for two-layer hierarchical models" (arXiv 1809.07441); Barber,
+Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annals of Statistics 2021).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, nearest, track, traits, turned
+
+Array = NDArray[np.float64]
+FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
+CENTRES = 128  # points of training that the distance is measured from, about
+WINDOWS = 60  # of a run that calibrate, at most
+TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
+PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """Windows (S,) sorted into G runs.
+
+    place : index of the run of each window. weight : of each window, (S,), the same sum for each run, 1 in all.
+    """
+
+    place: NDArray[np.int64]
+    weight: Array
+    count: int
+
+    def means(self, values: Array) -> Array:
+        """Means (G, ...) over the windows of each run, of values (S, ...)."""
+        sums = np.zeros((self.count, *values.shape[1:]))
+        np.add.at(sums, self.place, values)
+        sizes = np.bincount(self.place, minlength=self.count)
+        return sums / sizes.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def calibrated(
+    left_out: Array,
+    future: Array,
+    run: NDArray[np.str_],
+    columns: Mapping[str, Array],
+    names: Sequence[str],
+    step: float,
+    kinds: Mapping[str, str] | None = None,
+) -> Bands | None:
+    """Calibrate bands; None where fewer than three runs have errors.
+
+    Parameters
+    ----------
+    left_out : errors (T, S, 2) [m], true less predicted, of models that saw the run of the window neither in training
+        nor in any choice. Windows with values that are not finite are left out.
+    future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
+    columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
+    step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
+    """
+    chosen = _spread_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
+    runs = _runs(run[chosen])
+    if runs.count < FEWEST:
+        return None
+    errors = left_out[:, chosen]
+    paths = future[:, chosen] - errors
+    columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
+    centres, spread, away = _from_training(runs, np.stack([columns[name] for name in names], axis=1))
+    far = max(float(away.max()), 1e-9)
+    thirds = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
+    chords = np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[thirds]]), axis=0)
+    length = max(float(np.hypot(chords[..., 0], chords[..., 1]).sum(axis=0) @ runs.weight), 1e-9)
+    seen = traits(paths, columns, step, away, length)
+    middle = runs.weight @ seen
+    deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)
+    deviation = np.where(deviation > 1e-9, deviation, 1.0)
+    normal = (seen - middle) / deviation
+    apart = np.stack([np.abs(part) for part in turned(errors, track(paths))], axis=-1)  # (T, S, 2)
+    best = None
+    for circle in (True, False):
+        fitted = _fitted(runs, apart, normal, circle)
+        whole = radii(fitted.scores.max(axis=0), runs.place)
+        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_middle_level(runs.count)]
+        if best is None or size < TIGHTER * best[0]:
+            best = size, fitted, whole
+    assert best is not None
+    _, fitted, whole = best
+    of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
+    known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind and (of == kind).sum() >= FEWEST}
+    reach, of = fitted.scores.max(axis=0), of[runs.place]
+    by_kind = [radii(reach[of == kind], np.unique(runs.place[of == kind], return_inverse=True)[1]) for kind in known]
+    return Bands(
+        runs=runs.count,
+        along=fitted.scale[:, 0],
+        across=fitted.scale[:, 1],
+        whole=whole,
+        steps=np.stack([radii(row, runs.place) for row in fitted.scores], axis=1),
+        names=tuple(names),
+        centres=centres,
+        spread=spread,
+        far=far,
+        middle=middle,
+        deviation=deviation,
+        low=seen.min(axis=0),
+        high=seen.max(axis=0),
+        slopes=fitted.slopes,
+        length=length,
+        kinds=known,
+        by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
+    )
+
+
+def radii(scores: Array, place: NDArray[np.int64]) -> Array:
+    """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
+
+    place : index of the run of each window, 0 .. G - 1. The result depends on the scores by run alone, and not on the
+    order of the runs.
+    """
+    runs = _runs(place)
+    count, ranks = runs.count, _ranks(scores, runs)
+    order = np.argsort(ranks, kind="stable")
+    at = np.cumsum(runs.weight[order]) - runs.weight[order] / 2
+    wanted = np.interp(LEVELS, at, ranks[order])
+    # Where windows of a run are nearly one window, the new run may also fall between two others: (G + 1) level.
+    wanted = np.clip(wanted + _alike(ranks, runs) ** 2 * (LEVELS - 0.5) / (count - 1), 0.0, 1.0)
+    order = np.argsort(scores, kind="stable")
+    weights = runs.weight[order]
+    at = np.cumsum(weights) - weights / 2
+    at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
+    found: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
+    return found
+
+
+def _ranks(scores: Array, runs: _Runs) -> Array:
+    """Share (S,) of the windows of the other runs, each run weighing the same, that have a lower score."""
+    order = np.argsort(scores, kind="stable")
+    below = np.empty(len(scores))
+    below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
+    by_run = np.lexsort((scores, runs.place))
+    sizes = np.bincount(runs.place, minlength=runs.count)
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    mine = np.empty(len(scores))
+    mine[by_run] = (np.arange(len(scores)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
+    shares: Array = np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0)
+    return shares
+
+
+def _alike(ranks: Array, runs: _Runs) -> float:
+    """How alike the windows of one run are, 0 to 1: share of the variance of their ranks that lies between runs."""
+    means = runs.means(ranks)
+    within = float(runs.weight @ (ranks - means[runs.place]) ** 2)
+    sizes = np.bincount(runs.place, minlength=runs.count)
+    within *= float(np.mean(sizes / np.maximum(sizes - 1, 1)))
+    between = float(means.var(ddof=1)) - within * float(np.mean(1 / sizes))
+    total = max(between, 0.0) + within
+    return 1.0 if sizes.max() == 1 else max(between, 0.0) / total if total > 0 else 1.0
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Scale (T, 2) [m] along and across, slopes (5,) of the growth, and scores (T, S) by the other runs alone."""
+
+    scale: Array
+    slopes: Array
+    scores: Array
+
+
+def _fitted(runs: _Runs, apart: Array, normal: Array, circle: bool) -> _Fit:
+    """Scale and growth from all runs, and scores of each run by those of the others."""
+    if circle:
+        apart = np.broadcast_to(np.hypot(apart[..., :1], apart[..., 1:]) / np.sqrt(2.0), apart.shape)
+    means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
+    total = means.sum(axis=0)
+    scale = _floored(total / runs.count)
+    others = _floored((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
+    plain = np.hypot(apart[..., 0] / others[..., 0], apart[..., 1] / others[..., 1])
+    slopes, without = _slopes(runs, normal, plain.max(axis=0))
+    return _Fit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+
+
+def _floored(scale: Array) -> Array:
+    """Scales (..., T, 2) [m] that are nowhere below a share of the greatest, nor zero."""
+    most = scale.max(axis=-2, keepdims=True)
+    return np.asarray(np.maximum(scale, np.maximum(FLOOR * most, 1e-9)), dtype=float)
+
+
+def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
+    """Slopes (5,) of the logarithm of scores (S,) over traits, from all runs, and without each run, (G, 5).
+
+    Ridge regression in which every run counts as one sample. The distance from training makes no band narrower.
+    """
+    typical = max(float(np.median(scores)), 1e-300)
+    target = np.log(np.maximum(scores, 1e-3 * typical))
+    full = np.column_stack([np.ones(len(normal)), normal])
+    products = runs.means(full[:, :, None] * full[:, None, :])
+    rights = runs.means(full * target[:, None])
+    noise = max(float(runs.weight @ (target - runs.weight @ target) ** 2), 1e-12)
+    penalty = np.diag([0.0, *[noise / PRIOR**2] * len(TRAITS)])
+
+    def solved(product: Array, right: Array) -> Array:
+        normal_equations = product + penalty + 1e-9 * np.eye(len(right))
+        slopes: Array = np.asarray(np.linalg.solve(normal_equations, right), dtype=float)
+        if slopes[-1] >= 0:
+            return slopes[1:]
+        slopes[:-1], slopes[-1] = np.linalg.solve(normal_equations[:-1, :-1], right[:-1]), 0.0
+        return slopes[1:]
+
+    product, right = products.sum(axis=0), rights.sum(axis=0)
+    without = [solved(product - products[i], right - rights[i]) for i in range(runs.count)]
+    return solved(product, right), np.stack(without)
+
+
+def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
+    """Centres (m, d) of training windows (S, d), spread (d,) of each column, and distances (S,) from other runs."""
+    deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
+    spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
+    each = max(-(-CENTRES // runs.count), 1)
+    chosen = np.concatenate([_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
+    centres = points[chosen]
+    away = np.empty(len(points))
+    for one in range(runs.count):
+        mine, others = runs.place == one, runs.place[chosen] != one
+        away[mine] = nearest(points[mine] / spread, centres[others] / spread)
+    return centres, spread, away
+
+
+def _evenly(indices: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """At most `count` of some indices, evenly spread."""
+    if len(indices) <= count:
+        return indices
+    chosen: NDArray[np.int64] = indices[np.round((np.arange(count) + 0.5) / count * len(indices) - 0.5).astype(int)]
+    return chosen
+
+
+def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Indices of sound windows, at most `WINDOWS` of each run, in order."""
+    rows = np.flatnonzero(sound)
+    if not len(rows):
+        return rows
+    parts = [_evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows])]
+    return np.sort(np.concatenate(parts))
+
+
+def _runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _Runs:
+    known, place = np.unique(names, return_inverse=True)
+    sizes = np.bincount(place, minlength=len(known))
+    return _Runs(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
+
+
+def _middle_level(count: int) -> int:
+    """Index in `LEVELS` of 0.9, or of the highest level that so many runs can promise."""
+    return int(min(round(90 * 1.0), int(100 * count / (count + 1)))) - 1

@@ -1,0 +1,128 @@
+"""Bands on standard manoeuvres of an identified vessel: what the uncertainty of its numbers leaves open.
+
+The covariance of the factors is split into its principal axes. The vessel performs each manoeuvre with its factors one
+standard deviation to either side along each axis. Half the difference of a measure is its linear part by that axis,
+the mean of both sides less the estimate its bend. A normal error has the variance of the linear part squared and twice
+the bend squared, and shifts the mean by the bend; the axes add up. A band reaches Student's quantile of so many
+standard deviations to both sides of the measure of the estimate, and further by the shift on its side.
+
+A band says what noise in the trials leaves open. It does not hold what the structure of the equations cannot follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from shipid.errors import DataError, ShipidError
+from shipid.identification.collinearity import listed, short
+from shipid.identification.settings import unknowns
+from shipid.identification.solve import Solution
+from shipid.identification.statistics import Statistics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+Measure = Callable[[Vessel], Mapping[str, float]]
+LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
+SMALL = 1e-4  # share of the variance of a measure's greatest axis: axes of the covariance below it are left out
+
+
+def check_level(level: float | None) -> None:
+    """Raise DataError for a level that is not between 0 and 1."""
+    if level is not None and not 0 < level < 1:
+        raise DataError(f"{level:g} is no level of a band: give a share between 0 and 1, such as 0.9")
+
+
+def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str:
+    """Sentence where the horizon is short against what the residuals remember; empty where it is not.
+
+    Free starts of short segments then take in a part of the process noise, and pull the factors by what no interval
+    shows: `docs/identification-coverage.md`.
+
+    spacing : time between residuals of one signal [s].
+    """
+    horizon = solution.settings.horizon
+    longest = max((one.memory * spacing for one in judged.whiteness.values() if not one.white), default=0.0)
+    if not 0 < horizon < LONG * longest:
+        return ""
+    return (
+        f"the horizon of {horizon:g} s is short against residuals that are correlated over {longest:.2g} s: estimates "
+        "may be biased beyond any interval; fit whole runs (horizon 0)"
+    )
+
+
+def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
+    """Why no band can be promised, in one sentence; empty where one can."""
+    why = short_horizon(solution, judged, spacing)
+    if why:
+        return why
+    best = judged.covariances.get(judged.chosen)
+    if best is None or not best.trusted:
+        return f"the standard errors are not to be trusted: {best.reason if best else 'no factor is free'}"
+    open_ = [path for path, error in zip(solution.paths, judged.errors, strict=True) if np.isinf(error)]
+    if open_:
+        return f"the data do not determine {listed(short(open_))}: give priors, or fix some"
+    return ""
+
+
+def bands(
+    vessel: Vessel,
+    solution: Solution,
+    judged: Statistics,
+    measures: Sequence[tuple[str, Measure]],
+    level: float = 0.9,
+) -> pd.DataFrame:
+    """Band of every measure of some manoeuvres: `manoeuvre`, `measure`, `value`, `deviation`, `low`, `high`, `note`.
+
+    Parameters
+    ----------
+    vessel : the base, whose factors the solution holds.
+    measures : title of a manoeuvre, and what performs it: vessel -> measure -> value. ShipidError where it cannot.
+    level : share of such bands that hold the truth.
+
+    Raises
+    ------
+    DataError : the level is not between 0 and 1.
+    """
+    check_level(level)
+    free = np.flatnonzero(~(solution.at_bound | solution.held))
+    best = judged.covariances[judged.chosen]
+    axes = principal(best.matrix)
+    quantile = float(stats.t.ppf(0.5 + level / 2, np.median(best.freedom)))
+    at, unknown = vessel.with_values(solution.values), unknowns(vessel, solution.settings)
+    sides = []
+    for axis in axes.T:
+        for sign in (1.0, -1.0):
+            factors = solution.factors.copy()
+            factors[free] += sign * axis
+            sides.append(factors)
+    rows: list[dict[str, Any]] = []
+    for title, measure in measures:
+        try:
+            centre = measure(at)
+            around = [measure(vessel.with_values(unknown.values(factors))) for factors in sides]
+        except ShipidError as error:  # it cannot perform it, or the vessel refuses the numbers
+            rows.append({"manoeuvre": title, "measure": "", "note": error.message})
+            continue
+        for name, value in centre.items():
+            ends = np.array([one.get(name, np.nan) for one in around]).reshape(-1, 2)
+            slopes, bends = (ends[:, 0] - ends[:, 1]) / 2, ends.mean(axis=1) - value
+            deviation, shift = float(np.sqrt((slopes**2 + 2 * bends**2).sum())), float(bends.sum())
+            wide, note = quantile * deviation, "" if np.isfinite(deviation) else "not reached on both sides of an axis"
+            low, high = value - wide + min(shift, 0.0), value + wide + max(shift, 0.0)
+            numbers = {"value": value, "deviation": deviation, "low": low, "high": high}
+            rows.append({"manoeuvre": title, "measure": name, **numbers, "note": note})
+    return pd.DataFrame(rows, columns=["manoeuvre", "measure", "value", "deviation", "low", "high", "note"])
+
+
+def principal(covariance: Array) -> Array:
+    """Principal axes (n, k) of a covariance (n, n), each as long as its standard deviation; tiny ones are left out."""
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
+    kept = values > SMALL**2 * max(float(values.max(initial=0.0)), 1e-300)
+    axes: Array = vectors[:, kept] * np.sqrt(values[kept])
+    return axes

@@ -1,0 +1,108 @@
+"""What numbers a ship can have: physical ranges by kind of number, in terms that a naval architect knows.
+
+Sources: added mass and radii of gyration, Clarke et al. (1983), Brix (1993); propulsion factors, Carlton (2018);
+rudder factors, Yasukawa and Yoshimura (2015), Quadvlieg (2013). Ranges are those of the ships in them, made wider.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from shipid.vessel.load import Vessel
+
+NEAR = 0.02  # of the range: nearer to an end is at it
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of number: `ratio` of a value and the vessel's other numbers, which lies between low and high for ships.
+
+    pattern : regular expression of the dotted paths. words : what the ratio is. A ratio of None is not judged.
+    """
+
+    pattern: str
+    words: str
+    low: float
+    high: float
+    ratio: Callable[[float, Mapping[str, float], float | None], float | None]
+
+
+def _itself(value: float, _: Mapping[str, float], __: float | None) -> float:
+    return value
+
+
+def _over(path: str, sign: float = -1.0) -> Callable[[float, Mapping[str, float], float | None], float | None]:
+    """Value over another number of the vessel."""
+
+    def ratio(value: float, numbers: Mapping[str, float], _: float | None) -> float | None:
+        return sign * value / numbers[path] if numbers.get(path) else None
+
+    return ratio
+
+
+def _over_length(value: float, _: Mapping[str, float], length: float | None) -> float | None:
+    return value / length if length else None
+
+
+def _gyration(value: float, numbers: Mapping[str, float], length: float | None) -> float | None:
+    m, x_G = numbers.get("inertia.m"), numbers.get("inertia.x_G", 0.0)
+    if not m or not length:
+        return None
+    return math.sqrt(max(value / m - x_G**2, 0.0)) / length
+
+
+_HULL = r"hull\.(?:derivatives|prime_derivatives|mmg)\."
+KINDS = (
+    Kind(r"added_mass\.X_udot", "added mass in surge over the mass", 0.01, 0.25, _over("inertia.m")),
+    Kind(r"added_mass\.Y_vdot", "added mass in sway over the mass", 0.25, 1.8, _over("inertia.m")),
+    Kind(r"added_mass\.N_rdot", "added moment in yaw over I_z", 0.15, 2.0, _over("inertia.I_z")),
+    Kind(r"inertia\.I_z", "radius of gyration in yaw over L_pp", 0.18, 0.36, _gyration),
+    Kind(
+        rf"{_HULL}(?:Y_u?v|N_u?r|Y_\|v\|v|N_\|r\|r|X_u\|u\||X_u)", "damping, on the force side", -math.inf, 0.0, _itself
+    ),
+    Kind(r"hull\.crossflow\.C_d", "cross-flow drag", 0.1, 2.5, _itself),
+    Kind(r"hull\.mmg\.R_0", "resistance", 0.003, 0.1, _itself),
+    Kind(r"thruster\..*\.t_P", "thrust deduction", 0.0, 0.45, _itself),
+    Kind(r"thruster\..*\.w_P0", "wake", -0.05, 0.65, _itself),
+    Kind(r"thruster\..*\.a_H", "rudder force increase", 0.0, 0.9, _itself),
+    Kind(r"thruster\..*\.t_R", "steering resistance deduction", 0.0, 0.7, _itself),
+    Kind(r"thruster\..*\.gamma_R_(?:plus|minus)", "flow straightening", 0.1, 1.1, _itself),
+    Kind(r"thruster\..*\.epsilon", "wake at the rudder over that at the screw", 0.5, 1.6, _itself),
+    Kind(r"thruster\..*\.kappa", "share of the race", 0.2, 1.0, _itself),
+    Kind(r"thruster\..*\.f_alpha", "lift gradient of the rudder", 0.8, 5.5, _itself),
+    Kind(r"thruster\..*\.ell_R", "lever of the flow at the rudder over L_pp", -1.5, -0.2, _over_length),
+    Kind(r"thruster\..*\.k_T", "thrust over that of the open-water curve", 0.3, 2.0, _itself),
+)
+"""Kinds of numbers with the ranges that ships have."""
+
+
+def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
+    """Why a number cannot be that of a ship, or that it is at an end of the range; empty where it may.
+
+    Parameters
+    ----------
+    values : dotted path -> value of all numbers that were changed; the others are the vessel's.
+    """
+    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+    if kind is None:
+        return ""
+    numbers = {**vessel.parameters, **values}
+    length = vessel.document.get("particulars", {}).get("L_pp")
+    ratio = kind.ratio(numbers[path], numbers, length)
+    if ratio is None:
+        return ""
+    said = f"{path} = {numbers[path]:.4g}: {kind.words} is {ratio:.3g}"
+    usual = f"of ships {_number(kind.low)} to {_number(kind.high)}" if math.isfinite(kind.low) else "of ships below 0"
+    if not kind.low <= ratio <= kind.high:
+        return f"{said}, {usual}: no ship has that; hold it, or give it a prior"
+    width = kind.high - kind.low
+    if math.isfinite(width) and min(ratio - kind.low, kind.high - ratio) < NEAR * width:
+        return f"{said}, at the end of the range {usual}"
+    return ""
+
+
+def _number(value: float) -> str:
+    return f"{value:g}"

@@ -1,0 +1,251 @@
+"""How far off a prediction may be: bands, what share of test paths they hold, their width, and who pays."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import ReportContent
+from shipid.report.error_map import cells_map
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.palette import MUTED, styles
+from shipid.report.section import Section
+from shipid.report.selection import exemplars, sizes
+from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.wording import counted, listed, metres
+
+WORST = 12  # test runs in the table of those that pay
+BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
+
+
+def _frame(content: ReportContent, name: str) -> pd.DataFrame:
+    return content.frames.get(name, pd.DataFrame())
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+def _judged(frame: pd.DataFrame) -> float:
+    """Level that most is said about: 0.9 where it is promised, else the highest."""
+    levels = [float(level) for level in pd.unique(frame.level)]
+    return 0.9 if 0.9 in levels else max(levels)
+
+
+def coverage(content: ReportContent) -> Figure | None:
+    """Nominal against measured coverage, with intervals; None without bands."""
+    frame = _frame(content, "coverage")
+    if frame.empty:
+        return None
+    counts, looks = sizes(frame.N_D), styles(content)
+    names = [name for name in exemplars(content) if name in set(frame.model)]
+    views = {}
+    for place, size in enumerate(counts):
+        traces = [
+            line(
+                "as promised",
+                [0.45, 1.0],
+                [0.45, 1.0],
+                ["nominal"],
+                "",
+                line={"color": MUTED, "width": 1, "dash": "dash"},
+            )
+        ]
+        for i, name in enumerate(names):
+            mine = frame[frame.model.eq(name) & frame.N_D.eq(size)].sort_values("level")
+            shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
+            x, y = mine.level.to_numpy(dtype=float) + shift, mine.coverage.to_numpy(dtype=float)
+            reach = {"type": "data", "symmetric": False, "thickness": 1.5, "width": 4, "color": looks[name].colour}
+            reach |= {"array": mine.high.to_numpy() - y, "arrayminus": y - mine.low.to_numpy()}
+            ink = {"color": looks[name].colour, "width": looks[name].width}
+            points = line(name, x, y, [f"model:{name}"], "", mode="lines+markers", line=ink, marker={"size": 6})
+            points.update(error_y=reach, customdata=[_words(row) for row in mine.to_dict("records")])
+            points.update(hovertemplate=f"{label(name)}: %{{customdata}}<extra></extra>")
+            traces.append(points)
+        x_axis = axis("share promised [1]", range=[0.45, 1.0], tickvals=sorted(set(frame.level)))
+        y_axis = axis("share of whole test paths in the band [1]", range=[0, 1.02])
+        views[str(place)] = [Panel(go.Figure(traces, layout(x_axis, y_axis, hovermode="closest")))]
+    return Figure(
+        id="coverage",
+        title="What bands promise, and what they hold",
+        takeaway=_takeaway(frame, counts[-1]),
+        how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
+        "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
+        "and counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % "
+        f"intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one "
+        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less.",
+        alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
+        "numbers are in the table below.",
+        height=420,
+        views=views,
+        controls=[Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)],
+        chips=[Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width) for name in names],
+    )
+
+
+def _words(row: dict[Hashable, Any]) -> str:
+    inside = (
+        f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}] of {_percent(row['level'])}"
+    )
+    return f"{inside}, mean radius {metres(row['width'])}"
+
+
+def _takeaway(frame: pd.DataFrame, size: int) -> str:
+    level = _judged(frame[frame.N_D.eq(size)] if frame.N_D.eq(size).any() else frame)
+    mine = frame[frame.N_D.eq(size) & frame.level.eq(level)]
+    if mine.empty:
+        return f"No band is promised at N_D = {size}."
+    below = mine[mine.high < level]
+    by_width = mine.sort_values("width")
+    least, most = by_width.iloc[0], by_width.iloc[-1]
+    said = (
+        f"With N_D = {size}, bands of {_percent(level)} hold {_percent(float(mine.coverage.mean()))} of the test paths "
+    )
+    said += f"on average over {counted(len(mine), 'model')}; "
+    said += f"the mean radius is {metres(least.width)} ({least.model})"
+    said += f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". "
+    if below.empty:
+        return said + "No interval lies below its promise."
+    return said + f"Below their promise, interval and all: {listed([str(name) for name in below.model])}."
+
+
+def width_map(content: ReportContent) -> Figure | None:
+    """Mean radius of the bands over A and N_D; None where there is no map of the error either."""
+    cells, frame = content.cells, _frame(content, "coverage")
+    if "width" not in cells:
+        return None
+    if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
+        top = frame[frame.level.eq(_judged(frame))][["model", "N_D", "width"]]
+        cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
+    cells = cells[cells.width.notna()]
+    if len(cells) < 2:
+        return None
+    shown = replace(content, cells=cells.assign(H=cells.width, H_90=cells.width))
+    return cells_map(
+        shown,
+        id="width-map",
+        title="Better physics, narrower promise",
+        scale="mean radius of the band [m]",
+        how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is the mean "
+        "radius of its band over the horizon and all test windows, mean over seeds. Hatched: not narrower than the "
+        "band of pure data-driven at the same N_D. Cells with too few runs for the level are left out.",
+    )
+
+
+def table(content: ReportContent) -> Table | None:
+    """Coverage and width by model, N_D and level."""
+    frame = _frame(content, "coverage")
+    if frame.empty:
+        return None
+    rows = [
+        [
+            text(row["model"]),
+            figure(row["N_D"], 0),
+            Cell(_percent(row["level"]), row["level"]),
+            _share(row),
+            figure(row["width"], 2),
+            figure(row["end"], 2),
+            figure(row["lengths"], 3),
+        ]
+        for row in frame.to_dict("records")
+    ]
+    columns = [
+        "model",
+        "N_D [1]",
+        "promised",
+        "held [95 %]",
+        "mean radius [m]",
+        "radius at the end [m]",
+        "in lengths [1]",
+    ]
+    return Table("coverage-table", "Bands by model", _refused(content), columns, [False, *[True] * 6], rows)
+
+
+def _share(row: dict[Hashable, Any]) -> Cell:
+    return Cell(f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}]", row["coverage"])
+
+
+def _refused(content: ReportContent) -> str:
+    frame = _frame(content, "no_band")
+    if frame.empty:
+        return ""
+    parts = [
+        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in part.itertuples()])}: {reason}"
+        for reason, part in frame.groupby("reason", sort=False)
+    ]
+    return f"Without a band: {'; '.join(parts)}."
+
+
+def groups(content: ReportContent) -> Table | None:
+    """Coverage at one level by kind of manoeuvre, time ahead and speed."""
+    frame = _frame(content, "coverage_groups")
+    if frame.empty:
+        return None
+    frame = frame[frame.model.isin(exemplars(content))]
+    rows = [
+        [
+            text(row["model"]),
+            text(BY[row["by"]]),
+            text(row["group"]),
+            _share(row),
+            figure(row["width"], 2),
+            figure(row["runs"], 0),
+            text(row["note"] or None),
+        ]
+        for row in frame.to_dict("records")
+    ]
+    columns = ["model", "by", "group", "held [95 %]", "mean radius [m]", "test runs [1]", "note"]
+    numeric = [False, False, False, True, True, True, False]
+    return Table("coverage-groups", "Where bands hold more and less", _lowest(frame), columns, numeric, rows)
+
+
+def _lowest(frame: pd.DataFrame) -> str:
+    kinds = frame[frame.by.isin(["kind", "speed"])]
+    if kinds.empty:
+        return ""
+    worst = kinds.sort_values("coverage").iloc[0]
+    return (
+        f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}. A band that is told the kind of "
+        "manoeuvre holds its share for that kind."
+    )
+
+
+def worst(content: ReportContent) -> Table | None:
+    """Test runs whose paths leave their bands most often."""
+    frame = _frame(content, "coverage_runs")
+    if frame.empty:
+        return None
+    shown = frame[frame.model.isin(exemplars(content))].head(WORST)
+    rows = [
+        [
+            text(row["run"]),
+            text(row["kind"]),
+            text(row["model"]),
+            Cell(_percent(row["coverage"]), row["coverage"]),
+            figure(row["reach"], 2),
+        ]
+        for row in shown.to_dict("records")
+    ]
+    mean = frame.groupby("run").coverage.mean()
+    half = int((mean < 0.5).sum())
+    said = f"Mean over models, {counted(half, 'run')} of {len(mean)} has less than half of its paths in the bands."
+    columns = ["test run", "manoeuvre", "model", "paths in the band", "greatest error over the band [1]"]
+    return Table("coverage-runs", "Who pays", said, columns, [False, False, False, True, True], rows)
+
+
+SECTION = Section(
+    "How far off it may be",
+    draw=lambda content: (
+        coverage(content),
+        table(content),
+        width_map(content),
+        groups(content),
+        worst(content),
+    ),
+    needs=("coverage",),
+    anchors=("coverage", "coverage-table", "width-map", "coverage-groups", "coverage-runs"),
+)

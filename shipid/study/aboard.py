@@ -1,0 +1,212 @@
+"""Play a log as if at sea: rows arrive one by one, and each prediction uses the rows that have arrived."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.causal import causal_columns
+from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
+from shipid.data.windows import Instants, from_frame, past_of, to_frame, travelled
+from shipid.errors import DataError
+from shipid.files import check_table, write_table
+from shipid.hybrid.physics import assumed, check_columns
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
+from shipid.observer import observe
+from shipid.predictor import Predictor
+from shipid.study.prepare import states_along
+
+Array = np.ndarray
+AHEAD = 5  # moments of the horizon that the summary shows
+
+
+@dataclass(frozen=True)
+class Played:
+    """What would have been seen at sea.
+
+    instants : a row for each prediction: run, t, outside (the alarm), latency [s], late (whether its future is in the
+        log), and the error at the end of the horizon [m].
+    points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
+        the log goes on.
+    assumed : what the vessel feels and the log does not hold; it is 0.
+    plan : whether orders were taken as held where the predictor knows a plan.
+    """
+
+    instants: pd.DataFrame
+    points: pd.DataFrame
+    step: float
+    horizon: int
+    skipped: int
+    assumed: tuple[str, ...]
+    plan: bool
+
+
+def play(file: Path, log: Path, mapping: str | None = None, every: float | None = None) -> Played:
+    """Predict at every instant of a log from the rows up to then; the rows after it only judge.
+
+    every : seconds between predictions; default the step of the predictor. An instant is a row. A predictor that takes
+    known commands is given the present orders as the plan: at sea the log's later orders are not known.
+
+    Raises DataError where a command is missing or no run is as long as the past that is needed.
+    """
+    predictor = Predictor.load(file)
+    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    vessel, step = predictor.vessel, predictor.physics.step
+    names = {str(name): np.empty(0) for name in dataset.frame.columns}
+    if vessel is not None:
+        check_columns(vessel, names, str(log))
+    if every is not None and not every > 0:
+        raise DataError(f"{every:g}: must be above 0", path="--every")
+    rows, paths, skipped = [], [], 0
+    for run, piece in pieces(dataset):
+        found = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step)
+        rows += found[0]
+        paths += found[1]
+        skipped += found[2]
+    if not rows:
+        past = predictor.past * step
+        raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
+    missing = () if vessel is None else tuple(assumed(vessel, names))
+    return Played(
+        pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
+        predictor.commands == "known",
+    )  # fmt: skip
+
+
+def _along(
+    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, every: float
+) -> tuple[list[dict[str, object]], list[pd.DataFrame], int]:
+    """Predictions along one unbroken stretch; how many rows came before there was a past."""
+    t = rows["t"].to_numpy()
+    slack = clock_slack(t)
+    found, paths, skipped, due = [], [], 0, t[0]
+    for i in range(len(t)):
+        if t[i] < due - slack:
+            continue
+        due = max(due + every, t[i] + slack)
+        if t[i] - t[0] < predictor.past * predictor.physics.step - slack:
+            skipped += 1
+            continue
+        begin = time.perf_counter()
+        instants = known_at(predictor, dataset, rows.iloc[: i + 1])
+        predicted = predictor.predict(instants)[:, 0]
+        alone = predictor.alone(instants)[:, 0] if predictor.vessel is not None else np.full_like(predicted, np.nan)
+        latency = time.perf_counter() - begin
+        outside = bool(predictor.outside(instants.columns)[0])
+        points, error = _judged(predictor, rows, i, predicted, alone)
+        points.insert(0, "run", run)
+        points.insert(1, "t", t[i])
+        paths.append(points)
+        found.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
+    return found, paths, skipped
+
+
+def known_at(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame) -> Instants:
+    """What is known at the last of some rows of one stretch, from them alone.
+
+    Fixes that were interpolated, the past, the actuators and the observer are all taken from these rows.
+    """
+    physics = predictor.physics
+    seen = Dataset(rows.reset_index(drop=True), dataset.metadata)
+    if predictor.causal:
+        seen = causal_columns(seen, predictor.causal)
+    last = seen.frame["t"].to_numpy()[-1:]
+    columns = sample(seen.frame, last) | {"t": last}
+    hidden = estimates = None
+    if predictor.vessel is not None:
+        along = states_along(predictor.vessel, dataset.commands, seen.frame)
+        hidden = along and {name: values[-1:] for name, values in along.items()}
+        if physics.observer is not None:
+            found = observe(predictor.vessel, seen, physics.observer).columns
+            estimates = {name: values[-1:] for name, values in found.items()}
+    planned = None
+    if predictor.commands == "known":
+        planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
+    past = past_of(seen.frame, last, predictor.past, physics.step, physics.path)
+    return Instants(columns, past, planned, hidden, estimates or {})
+
+
+def _judged(
+    predictor: Predictor, rows: pd.DataFrame, i: int, predicted: Array, alone: Array
+) -> tuple[pd.DataFrame, float]:
+    """Points of a path in north-east with their errors, and the error at the end; NaN where the log has ended."""
+    physics, t = predictor.physics, rows["t"].to_numpy()
+    ahead = physics.step * np.arange(1, physics.horizon + 1)
+    origin = tuple(float(rows[name].iloc[i]) for name in ("north", "east", "psi"))
+    table: dict[str, Array] = {"ahead": ahead}
+    for prefix, path in (("", predicted), ("physics_", alone)):
+        table[f"{prefix}north"], table[f"{prefix}east"] = from_frame(path[:, 0], path[:, 1], *origin)
+    later = t[i] + ahead
+    there = later <= t[-1] + clock_slack(t)
+    error = np.full(physics.horizon, np.nan)
+    if there.any():
+        true = true_path(rows, i, later[there], physics.path)
+        error[there] = np.hypot(*(predicted[there] - true).T)
+    return pd.DataFrame({**table, "error": error}), float(error[-1])
+
+
+def true_path(rows: pd.DataFrame, i: int, later: Array, path: str) -> Array:
+    """True positions (T, 2) [m] in body axes at row i, at later times [s]."""
+    if path == "velocity":
+        north, east = travelled(rows, np.append(rows["t"].to_numpy()[i], later))
+        north, east = north[1:] - north[0], east[1:] - east[0]
+    else:
+        found = sample(rows, later)
+        north, east = (found[name] - float(rows[name].iloc[i]) for name in ("north", "east"))
+    x, y = to_frame(north, east, 0.0, 0.0, float(rows["psi"].iloc[i]))
+    return np.stack([x, y], axis=1)
+
+
+def write(played: Played, file: Path) -> None:
+    """Write every point with the alarm and the latency of its instant."""
+    check_table(file)
+    kept = played.instants.drop(columns="error")
+    write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
+
+
+def summary(played: Played) -> list[str]:
+    """What an officer would have seen, as lines."""
+    instants, points = played.instants, played.points
+    runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
+    lines = [
+        f"{len(instants)} predictions in {runs} run{'s' if runs > 1 else ''}, "
+        f"{played.horizon * played.step:g} s ahead; {played.skipped} rows before there was a past"
+    ]
+    if played.assumed:
+        lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")
+    if played.plan:
+        lines.append("the plan was: orders stay as they are, since at sea later orders are not known")
+    latency = 1e3 * instants["latency"].to_numpy()
+    lines.append(f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms")
+    lines.append(f"alarm: at {outside.sum()} of {len(outside)} instants ({outside.mean():.0%}) outside of the training")
+    lines += _spans(instants)
+    lines.append("error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm")
+    merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
+    ahead = np.unique(points["ahead"])
+    for moment in ahead[np.unique(np.linspace(0, len(ahead) - 1, AHEAD).round().astype(int))]:
+        here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
+        if len(here):
+            error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
+            inside = f"{np.median(error[alarm]):.2f}" if alarm.any() else "-"
+            lines.append(
+                f"{moment:>36g} s {np.median(error):>8.2f} {np.quantile(error, 0.9):>6.2f} {error.max():>7.2f} "
+                f"{inside:>10}"
+            )
+    return lines
+
+
+def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:
+    """The longest times of alarm."""
+    found: list[tuple[float, str, float, float]] = []
+    for run, rows in instants.groupby("run", sort=False):
+        t, outside = rows["t"].to_numpy(), rows["outside"].to_numpy(dtype=bool)
+        edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
+        found += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    found.sort(key=lambda span: -span[0])
+    lines = [f"  {run}: from {first:.1f} to {last:.1f} s" for _, run, first, last in found[:most]]
+    return [*lines, f"  and {len(found) - most} shorter ones"] if len(found) > most else lines

@@ -1,0 +1,191 @@
+"""Bands of a study: what share of test paths they hold, by model, kind of manoeuvre, step, speed and run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.hybrid.bands import Region
+from shipid.study.prepare import kinds_of_runs
+from shipid.study.results import Results
+from shipid.study.verdict import metres
+
+Array = np.ndarray
+SHOWN = (0.5, 0.8, 0.9, 0.95)
+"""Nominal levels that the report compares with what was measured."""
+CONFIDENCE = 0.95
+SPEEDS = 3  # groups of equal size
+
+
+def share_interval(held: Array, run: Array) -> tuple[float, float]:
+    """95 % interval of a share of windows, by Clopper and Pearson for so many windows as those of few runs are worth.
+
+    Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
+    never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
+    the exact interval.
+
+    Parameters
+    ----------
+    held : (S,) whether each window lies in its band. run : its run, (S,).
+    """
+    from scipy.stats import beta, t
+
+    _, place = np.unique(run, return_inverse=True)
+    sizes = np.bincount(place)
+    runs, windows = len(sizes), len(held)
+    share = float(np.mean(held))
+    count, tail = float(runs), (1 - CONFIDENCE) / 2
+    if runs > 1 and 0 < share < 1:
+        excess = np.bincount(place, held - share)
+        variance = runs / (runs - 1) * float((excess**2).sum()) / windows**2
+        freedom = (t.ppf(tail, max(windows - 1, 1)) / t.ppf(tail, runs - 1)) ** 2
+        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
+    inside = share * count
+    low = 0.0 if inside == 0 else float(beta.ppf(tail, inside, count - inside + 1))
+    high = 1.0 if inside >= count else float(beta.ppf(1 - tail, inside + 1, count - inside))
+    return low, high
+
+
+def regions(results: Results, level: float) -> Iterator[tuple[dict[str, Any], Region, Array]]:
+    """Row, region and errors (T, S, 2) [m] of every cell whose band promises a level."""
+    for row in results.rows:
+        bands = results.bands.get(row["cell"])
+        if bands is not None and bands.promises(level):
+            paths = results.paths[row["cell"]]
+            region = bands.region(paths, results.test.columns, results.test.step, level)
+            yield row, region, results.test.future - paths
+
+
+def coverage_frame(results: Results) -> pd.DataFrame:
+    """Share of whole test paths in their bands, by model, N_D and level, over seeds.
+
+    Columns: model, family, N_D, level, coverage, low, high (95 % interval, clustered by run), width [m] (mean radius
+    over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
+    """
+    length, found = ship_length(results), []
+    for level in sorted({*SHOWN, results.plan.study.bands.level}):
+        held: dict[tuple[str, str, int], list[Array]] = {}
+        sizes: dict[tuple[str, str, int], list[tuple[float, float]]] = {}
+        for row, region, errors in regions(results, level):
+            key = (row["model"], row["family"], int(row["N_D"]))
+            held.setdefault(key, []).append(region.holds(errors))
+            sizes.setdefault(key, []).append((float(region.radius.mean()), float(region.radius[-1].mean())))
+        for (model, family, N_D), parts in held.items():
+            mean = np.mean(parts, axis=0)  # seeds predict the same windows: they are no further evidence
+            low, high = share_interval(mean, results.test.run)
+            width, end = np.mean(sizes[model, family, N_D], axis=0)
+            names = {"model": model, "family": family, "N_D": N_D, "level": level}
+            row = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
+            found.append({**row, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
+    columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
+    return pd.DataFrame(found, columns=columns)
+
+
+def groups_frame(results: Results) -> pd.DataFrame:
+    """Coverage at the level of the study at the largest N_D, by kind of manoeuvre, time ahead and speed.
+
+    Columns: model, by (`kind`, `ahead`, `speed`), group, coverage, low, high, width [m], runs (test runs in the group),
+    note (a kind that too few runs calibrated). The band of a kind is the one for all kinds: the coverage says what a
+    ship meets that is not told what manoeuvre it is in. By time ahead: share of the positions at that step alone.
+    """
+    level, test, found = results.plan.study.bands.level, results.test, []
+    largest = results.cells["N_D"].max()
+    seed = results.cells["seed"].min()
+    kinds = kinds_of_runs(results.dataset)
+    kind = np.array([kinds.get(str(run), "other") for run in test.run])
+    speed = np.hypot(test.columns["u"], test.columns["v"])
+    edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
+    part = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, SPEEDS - 1)
+    for row, region, errors in regions(results, level):
+        if row["N_D"] != largest or row["seed"] != seed:
+            continue
+        bands, held, radius = results.bands[row["cell"]], region.holds(errors), region.radius.mean(axis=0)
+
+        def add(by: str, group: str, chosen: Array, inside: Array, wide: float, note: str = "") -> None:
+            low, high = share_interval(inside, test.run[chosen])
+            told = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
+            runs = len(np.unique(test.run[chosen]))
+            found.append({**told, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
+
+        for name in np.unique(kind):
+            chosen, known = kind == name, bands.kinds.get(str(name), 0)
+            few = "" if bands.promises(level, str(name)) else f"{known} runs of this kind calibrated the band: too few"
+            add("kind", str(name), chosen, held[chosen], float(radius[chosen].mean()), few)
+        for place in range(SPEEDS):
+            chosen = part == place
+            if chosen.any():
+                label = f"{edges[place]:.2g} to {edges[place + 1]:.2g} m/s"
+                add("speed", label, chosen, held[chosen], float(radius[chosen].mean()))
+        reach, every = region.reach(errors) <= 1, np.ones(len(test), dtype=bool)
+        for step in np.unique(np.linspace(0, test.horizon - 1, 5).round().astype(int)):
+            wide = float(region.radius[step].mean())
+            add("ahead", f"{(step + 1) * test.step:g} s", every, reach[step], wide)
+    columns = ["model", "by", "group", "coverage", "low", "high", "width", "runs", "note"]
+    return pd.DataFrame(found, columns=columns)
+
+
+def answer(results: Results) -> list[tuple[str, str]]:
+    """What bands promise and held, and which kinds of manoeuvre had too few runs, each with the anchor of its figure.
+
+    Means over the models at the largest N_D that has bands.
+    """
+    level, frame = results.plan.study.bands.level, coverage_frame(results)
+    mine = frame[frame["level"].eq(level)]
+    if mine.empty:
+        reasons = refused_frame(results)["reason"].unique()
+        return [(f"No band is promised: {reasons[0]}.", "cells")] if len(reasons) else []
+    top = mine[mine["N_D"] == mine["N_D"].max()]
+    share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
+    said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
+    said += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
+    said += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
+    found = [(said, "coverage")]
+    groups = groups_frame(results)
+    few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
+    if few:
+        text = f"Too few runs calibrate a band of {level:.0%} for one kind of manoeuvre alone: {', '.join(few)}."
+        found.append((text, "coverage-groups"))
+    return found
+
+
+def worst_frame(results: Results) -> pd.DataFrame:
+    """Test runs that pay: share of their paths in the band of the study's level, at the largest N_D, lowest first.
+
+    Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border)).
+    """
+    level, test, found = results.plan.study.bands.level, results.test, []
+    largest, seed = results.cells["N_D"].max(), results.cells["seed"].min()
+    kinds = kinds_of_runs(results.dataset)
+    for row, region, errors in regions(results, level):
+        if row["N_D"] == largest and row["seed"] == seed:
+            reach = region.reach(errors).max(axis=0)
+            for run in test.spans:
+                mine = test.run == run
+                inside = float((reach[mine] <= 1).mean())
+                told = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
+                found.append({**told, "reach": float(reach[mine].max())})
+    columns = ["model", "run", "kind", "coverage", "reach"]
+    return pd.DataFrame(found, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])
+
+
+def refused_frame(results: Results) -> pd.DataFrame:
+    """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
+    level, found = results.plan.study.bands.level, []
+    for row in results.rows:
+        bands = results.bands.get(row["cell"])
+        if row["status"] == "ok" and (bands is None or not bands.promises(level)):
+            found.append({"model": row["model"], "N_D": row["N_D"], "reason": results.no_band.get(row["cell"], "")})
+    return pd.DataFrame(found, columns=["model", "N_D", "reason"]).drop_duplicates(ignore_index=True)
+
+
+def ship_length(results: Results) -> float:
+    """Length between perpendiculars, else over all [m], of the first vessel that gives it; not a number without."""
+    for one in results.plan.foundations:
+        given = {} if one.base is None else one.base.document.get("particulars", {})
+        for name in ("L_pp", "L_oa"):
+            if name in given:
+                return float(given[name])
+    return float("nan")

@@ -1,0 +1,398 @@
+"""A vessel against its log, before any study: what is off, and which few numbers would explain it.
+
+The log decides by prediction: the vessel starts from recorded instants with the recorded commands, and its mean
+position error over the horizon is compared with that of constant u, v, r. Groups of numbers that a first guess gets
+wrong, such as the size of the screw, are scaled by one factor each. The factor that lowers the error most is taken,
+then the next.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+import tomlkit
+from numpy.typing import NDArray
+from tomlkit.items import KeyType, SingleKey
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Instants, Windows, cut_windows
+from shipid.errors import DocumentError
+from shipid.hybrid.physics import Physics
+from shipid.metrics import position_error
+from shipid.physics.signals import is_shaft, steers
+from shipid.simulation.approach import acceleration
+from shipid.study.prepare import constant_motion, window_memory
+from shipid.units import RPM
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+Gear = tuple[tuple[str, float], ...]
+"""Changed numbers of actuators: dotted path and value of each."""
+
+MOST_WINDOWS = 120
+MOST_CHANGES = 5
+FACTORS = (0.35, 0.55, 0.75, 1.3, 1.8, 2.8)
+FAR = (0.15, 0.4, 2.5, 7.0)  # of what may be off by more: lags and rates
+FINER = (0.82, 0.93, 1.07, 1.22)
+SWEEPS = 2  # over all groups taken, once every one is taken
+WORTH = 0.06  # of the error that a further group must save
+SAID = 0.15  # of the error that all groups together must save, else nothing is said
+PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
+STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
+TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
+FEW = 3  # windows
+MODEST = 5.0  # factor
+OFF = 1.15  # a factor by which speed or turning may differ before it is said
+
+_HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers of a vessel that share one factor.
+
+    name : what they say, in words. pattern : regular expression of their dotted paths. low, high : of the factor.
+    """
+
+    name: str
+    pattern: str
+    low: float
+    high: float
+
+
+GROUPS = (
+    Group("size of the screw", r"thruster\.[^.]+\.D_p", 0.35, 2.5),
+    Group("shaft speed of the service speed", r"thruster\.[^.]+\.n_0", 0.3, 3.0),
+    Group("resistance", rf"hull\.mmg\.R_0|hull\.resistance\.R_\d|{_HULL}X_[u|]+", 0.3, 4.0),
+    Group("rudder", r"thruster\.[^.]+\.(?:A_R|[YN]_u*delta(?:delta){0,2})", 0.3, 3.0),
+    Group("flow at the rudder", r"thruster\.[^.]+\.gamma_R_(?:plus|minus)", 0.3, 2.5),
+    Group("rate of the steering gear", r"thruster\.[^.]+\.actuator\.(?:delta|alpha)\.rate", 0.1, 10.0),
+    Group("lag of the steering gear", r"thruster\.[^.]+\.actuator\.(?:delta|alpha)\.T", 0.1, 10.0),
+    Group("lag of the shaft", r"thruster\.[^.]+\.actuator\.n\.T", 0.1, 10.0),
+    Group("yaw damping", rf"{_HULL}N_(?=[ur|]*r)[ur|]+", 0.25, 4.0),
+    Group("moment of drift", rf"{_HULL}N_(?=[uv|]*v)[uv|]+", 0.25, 3.0),
+    Group("side force of drift", rf"{_HULL}Y_(?=[uv|]*v)[uv|]+|hull\.crossflow\.C_d", 0.3, 3.0),
+    Group("side force of turning", rf"{_HULL}Y_(?=[ur|]*r)[ur|]+", 0.25, 3.0),
+    Group("speed lost in turns", rf"{_HULL}X_(?:vr|vv|rr)", 0.25, 4.0),
+    Group("inertia in yaw", r"inertia\.I_z|added_mass\.N_rdot", 0.4, 2.5),
+    Group("thrust of the tunnel thruster", r"thruster\.[^.]+\.F_[123]", 0.1, 4.0),
+)
+"""Groups in which a first guess errs, and how far at most."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A group of numbers scaled.
+
+    values : dotted path -> new value. error : mean error [m] with this change and those before it.
+    """
+
+    group: Group
+    factor: float
+    values: Mapping[str, float]
+    error: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a vessel and a log agree.
+
+    ahead : [s]. alone, constant : mean position error [m] over it of the vessel, with the recorded commands, and of
+        constant u, v, r. facts : what differs, in words. changes : those that explain it, in the order of their worth.
+    """
+
+    vessel: Vessel
+    ahead: float
+    alone: float
+    constant: float
+    facts: tuple[str, ...]
+    changes: tuple[Change, ...] = field(default=())
+
+    @property
+    def corrected(self) -> float:
+        """Mean error [m] with all changes."""
+        return self.changes[-1].error if self.changes else self.alone
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the vessel should not be used as it is."""
+        return bool(self.changes) or self.alone >= self.constant
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Dotted path -> value of all changes."""
+        return {path: value for change in self.changes for path, value in change.values.items()}
+
+    @property
+    def sentence(self) -> str:
+        """One line: what is off, and which number would explain it."""
+        errors = f"mean error over {self.ahead:g} s {self.alone:.3g} m, of constant u, v, r {self.constant:.3g} m"
+        seen = f"{'; '.join(self.facts)}; {errors}" if self.facts else errors
+        if not self.changes:
+            if self.alone < self.constant:
+                return f"{self.vessel.name} and the log agree as far as one number tells: {seen}"
+            return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
+        first, *others = self.changes
+        told = f"{_shown(self.vessel, first)} would explain most of it ({first.error:.3g} m)"
+        more = f", then {', '.join(_shown(self.vessel, one) for one in others)}" if others else ""
+        left = f" ({self.corrected:.3g} m)" if others else ""
+        return f"{self.vessel.name}: {seen}: {told}{more}{left}"
+
+    def patch(self, base: str) -> str:
+        """The changes as a patch document (TOML) on a vessel that is called `base` there; empty without changes."""
+        if not self.changes:
+            return ""
+        document = tomlkit.document()
+        document.add(tomlkit.comment("A draft from the runs of a log that do not test: one factor for each group."))
+        document.add("base", tomlkit.item(base))
+        document.add("name", tomlkit.item(f"{self.vessel.name}, corrected from its log"))
+        table = tomlkit.table()
+        for change in self.changes:
+            for path, value in change.values.items():
+                number = tomlkit.item(value)
+                number.comment(f"was {self.vessel.parameters[path]:.6g}: {change.group.name} x {change.factor:.3g}")
+                table.append(SingleKey(path, KeyType.Basic), number)
+        document.add("set", table)
+        return tomlkit.dumps(document)
+
+
+def first_look(
+    vessel: Vessel,
+    dataset: Dataset,
+    runs: Iterable[str],
+    *,
+    ahead: float,
+    step: float,
+    path: Literal["position", "velocity"] = "position",
+) -> Look:
+    """Compare a vessel with the runs of a log.
+
+    Parameters
+    ----------
+    runs : names of the runs to look at. ahead, step : of the predictions [s]. path : as in `cut_windows`.
+
+    Raises
+    ------
+    DataError : no run is as long as the horizon, or a command of the vessel is missing.
+    """
+    chosen = set(runs)
+    frame = dataset.frame[dataset.frame["run"].isin(chosen)].reset_index(drop=True)
+    part = replace(dataset, frame=frame)
+    windows = _some(part, max(round(ahead / step), 1), step, path)
+    constant = float(position_error(constant_motion(windows), windows.future).mean())
+    trial = _Trial(vessel, part, windows, constant)
+    alone = trial.errors([{}])[0]
+    facts = tuple(_facts(vessel, windows, trial.instants()))
+    changes = _explained(trial, alone)
+    if changes and changes[-1].error > (1 - SAID) * alone:
+        changes = []
+    return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
+
+
+def _some(dataset: Dataset, horizon: int, step: float, path: Literal["position", "velocity"]) -> Windows:
+    """At most so many windows, evenly over all runs."""
+    windows = cut_windows(dataset, horizon=horizon, step=step, interval=max(step, horizon * step / 4), path=path)
+    if len(windows) <= MOST_WINDOWS:
+        return windows
+    return windows.select(np.linspace(0, len(windows) - 1, MOST_WINDOWS).astype(int))
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Mean errors of a vessel with changed numbers on windows of a log."""
+
+    vessel: Vessel
+    dataset: Dataset
+    windows: Windows
+    constant: float
+    known: dict[Gear, Instants] = field(default_factory=dict)
+
+    def instants(self, gear: Gear = ()) -> Instants:
+        """What the vessel with changed actuators knows at every window: planned commands, and where they are."""
+        if gear not in self.known:
+            hidden = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
+            self.known[gear] = self.windows.instants(known=True, hidden=hidden)
+        return self.known[gear]
+
+    def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
+        """Mean error [m] for each set of changed numbers; what diverges counts as `PENALTY` times constant motion."""
+        by_gear: dict[Gear, list[int]] = {}
+        for number, row in enumerate(rows):
+            gear = tuple(sorted((path, value) for path, value in row.items() if ".actuator." in path))
+            by_gear.setdefault(gear, []).append(number)
+        result = [np.inf] * len(rows)
+        names = list(self.vessel.parameters)
+        for gear, places in by_gear.items():
+            vessel = self.vessel.with_values(dict(gear))  # where the actuators are depends on them
+            base = np.array(list(vessel.parameters.values()))
+            parameters = np.tile(base, (len(places), 1))
+            for number, place in enumerate(places):
+                for path, value in rows[place].items():
+                    parameters[number, names.index(path)] = value
+            physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
+            found = physics.distances(self.instants(gear), self.windows.future, parameters)
+            mean = np.where(found.diverged, np.inf, found.total / self.windows.horizon)
+            capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9) * 10)
+            for number, place in enumerate(places):
+                result[place] = float(capped[number].mean())
+        return result
+
+
+def _explained(trial: _Trial, alone: float) -> list[Change]:
+    """Groups and factors that lower the error most, one after another; the earlier ones refined with the later."""
+    vessel = trial.vessel
+    groups = {group: paths for group in GROUPS if (paths := _members(vessel, group))}
+    factors: dict[Group, float] = {}
+    errors: list[float] = []
+    best = alone
+    while len(factors) < MOST_CHANGES:
+        options = [
+            (group, factor)
+            for group in groups
+            if group not in factors
+            for factor in (FAR if group.high > MODEST else FACTORS)
+            if group.low <= factor <= group.high
+        ]
+        found = _least(trial, groups, [{**factors, group: factor} for group, factor in options])
+        if found is None or found[1] > (1 - WORTH) * best:
+            break
+        chosen, best = _refined(trial, groups, *found)
+        factors = chosen
+        errors.append(best)
+    for _ in range(SWEEPS if len(factors) > 1 else 0):
+        factors, best = _refined(trial, groups, factors, best)
+    if not factors:
+        return []
+    errors[-1] = best
+    return [
+        Change(group, factor, _values(vessel, groups, {group: factor}), error)
+        for (group, factor), error in zip(factors.items(), errors, strict=True)
+    ]
+
+
+def _refined(
+    trial: _Trial, groups: Mapping[Group, Sequence[str]], factors: dict[Group, float], error: float
+) -> tuple[dict[Group, float], float]:
+    """The factors, each in turn moved a little where that lowers the error."""
+    for group in list(factors):
+        near = [
+            {**factors, group: moved}
+            for change in FINER
+            if group.low <= (moved := factors[group] * change) <= group.high
+        ]
+        found = _least(trial, groups, near)
+        if found is not None and found[1] < error:
+            factors, error = found
+    return factors, error
+
+
+def _least(
+    trial: _Trial, groups: Mapping[Group, Sequence[str]], options: Sequence[dict[Group, float]]
+) -> tuple[dict[Group, float], float] | None:
+    """The option with the least error, of those that the vessel's checks accept."""
+    rows, kept = [], []
+    for option in options:
+        values = _values(trial.vessel, groups, option)
+        try:
+            trial.vessel.with_values(values)
+        except DocumentError:
+            continue
+        rows.append(values)
+        kept.append(option)
+    if not rows:
+        return None
+    errors = trial.errors(rows)
+    place = int(np.argmin(errors))
+    return kept[place], errors[place]
+
+
+def _members(vessel: Vessel, group: Group) -> list[str]:
+    """Paths of a group in a vessel whose value is not 0."""
+    return [path for path, value in vessel.parameters.items() if value and re.fullmatch(group.pattern, path)]
+
+
+def _values(vessel: Vessel, groups: Mapping[Group, Sequence[str]], factors: Mapping[Group, float]) -> dict[str, float]:
+    return {
+        path: float(f"{vessel.parameters[path] * factor:.6g}")
+        for group, factor in factors.items()
+        for path in groups[group]
+    }
+
+
+def _facts(vessel: Vessel, windows: Windows, instants: Instants) -> Iterable[str]:
+    """Sentences on speed against shaft, and turning against helm."""
+    turned = windows.states["psi"][-1] - windows.columns["psi"]
+    steady = _steady_speeds(vessel, windows, turned)
+    if steady is not None:
+        rpm, seen, held = steady
+        if held > OFF * seen or seen > OFF * held:
+            yield f"at {rpm:.4g} rpm the log runs {seen:.3g} m/s and the vessel {held:.3g} m/s"
+    backwards = _backwards(windows)
+    yield from (f"{name} is negative where the ship of the log goes ahead: is its sign right?" for name in backwards)
+    predicted = Physics(vessel, windows.horizon, windows.step, "rk4").states(instants)["psi"][-1]
+    predicted = predicted - windows.columns["psi"]
+    much = (np.abs(turned) > LEAST_TURN) & np.isfinite(predicted)
+    if much.sum() >= TURNS:
+        share = float(np.median(predicted[much] / turned[much]))
+        if share < 0:
+            yield "the vessel turns the other way than the ship of the log: is the sign of the angle right?"
+        elif not 1 / OFF < share < OFF:
+            yield f"over {windows.horizon * windows.step:g} s the vessel turns {share:.2g} times as far as the ship"
+
+
+def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[float, float, float] | None:
+    """Shaft speed [rpm], speed of the log and steady speed of the vessel [m/s] where the log goes straight; or None."""
+    commands = dynamics(vessel).commands
+    shafts = [name for name in commands if is_shaft(name) and name in windows.planned]
+    if not shafts:
+        return None
+    u = windows.states["u"]
+    change = np.abs(u[-1] - windows.columns["u"]) < STEADY * np.abs(u[-1])
+    orders = [windows.planned[name] for name in shafts]
+    same = np.all([np.ptp(order, axis=0) <= STEADY * np.abs(order[0]) for order in orders], axis=0)
+    straight = change & same & (np.abs(turned) < STRAIGHT) & (u[-1] > 0)
+    if not straight.any():
+        return None
+    driving = max(orders, key=lambda order: float(np.abs(order[0, straight]).max()))[0]
+    straight &= driving >= (1 - STEADY) * driving[straight].max()  # the fastest, where there are several speeds
+    if straight.sum() < FEW:
+        return None
+    held = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
+    return float(np.median(driving[straight])) / RPM, float(np.median(u[-1, straight])), steady_speed(vessel, held)
+
+
+def steady_speed(vessel: Vessel, commands: Mapping[str, float], most: float = 40.0) -> float:
+    """Speed [m/s] that a vessel holds straight ahead in calm water with commands [SI]; 0 where they do not drive it."""
+
+    def surge(speed: float) -> float:
+        return float(acceleration(vessel, speed, commands)[0])
+
+    if surge(1e-3) <= 0:
+        return 0.0
+    low, high = 1e-3, most
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (middle, high) if surge(middle) > 0 else (low, middle)
+    return (low + high) / 2
+
+
+def _backwards(windows: Windows) -> list[str]:
+    """Shaft speeds that are negative where the ship goes ahead."""
+    ahead = windows.columns["u"] > 0.3 * np.quantile(windows.columns["u"], 0.9)
+    return [
+        name
+        for name, values in windows.planned.items()
+        if is_shaft(name) and ahead.any() and float(np.quantile(values[0, ahead], 0.9)) < 0
+    ]
+
+
+def _shown(vessel: Vessel, change: Change) -> str:
+    """A change in words: the first of its numbers, from and to."""
+    path = next(iter(change.values))
+    others = f" and {len(change.values) - 1} with it" if len(change.values) > 1 else ""
+    return f"{path} = {change.values[path]:.4g} in place of {vessel.parameters[path]:.4g}{others}"

@@ -1,0 +1,101 @@
+"""Published regressions for a ship of which only main particulars are known: resistance, and thrust of a screw.
+
+They hold for displacement ships; each function names its source. Nothing here knows vessel documents.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.81
+BLADES, AREA_RATIO = 4, 0.55  # of the screw: usual for merchant ships
+PITCHES = (0.4, 1.5)  # P / D of the Wageningen B-series, 0.5 to 1.4, with a little on either side
+
+# Oosterveld and van Oossanen (1975), Wageningen B-screw series, table 5, Reynolds number 2e6:
+# K_T = sum of c J^s (P / D)^t (A_E / A_O)^u Z^v; rows c, s, t, u, v
+K_T_TERMS = (
+    (0.00880496, 0, 0, 0, 0), (-0.204554, 1, 0, 0, 0), (0.166351, 0, 1, 0, 0), (0.158114, 0, 2, 0, 0),
+    (-0.147581, 2, 0, 1, 0), (-0.481497, 1, 1, 1, 0), (0.415437, 0, 2, 1, 0), (0.0144043, 0, 0, 0, 1),
+    (-0.0530054, 2, 0, 0, 1), (0.0143481, 0, 1, 0, 1), (0.0606826, 1, 1, 0, 1), (-0.0125894, 0, 0, 1, 1),
+    (0.0109689, 1, 0, 1, 1), (-0.133698, 0, 3, 0, 0), (0.00638407, 0, 6, 0, 0), (-0.00132718, 2, 6, 0, 0),
+    (0.168496, 3, 0, 1, 0), (-0.0507214, 0, 0, 2, 0), (0.0854559, 2, 0, 2, 0), (-0.0504475, 3, 0, 2, 0),
+    (0.010465, 1, 6, 2, 0), (-0.00648272, 2, 6, 2, 0), (-0.00841728, 0, 3, 0, 1), (0.0168424, 1, 3, 0, 1),
+    (-0.00102296, 3, 3, 0, 1), (-0.0317791, 0, 3, 1, 1), (0.018604, 1, 0, 2, 1), (-0.00410798, 0, 2, 2, 1),
+    (-0.000606848, 0, 0, 0, 2), (-0.0049819, 1, 0, 0, 2), (0.0025983, 2, 0, 0, 2), (-0.000560528, 3, 0, 0, 2),
+    (-0.00163652, 1, 2, 0, 2), (-0.000328787, 1, 6, 0, 2), (0.000116502, 2, 6, 0, 2), (0.000690904, 0, 0, 1, 2),
+    (0.00421749, 0, 3, 1, 2), (0.0000565229, 3, 6, 1, 2), (-0.00146564, 0, 3, 2, 2),
+)  # fmt: skip
+
+
+def thrust_coefficient(J: Array, pitch: float) -> Array:
+    """K_T [-] of a Wageningen B 4-55 screw at advance ratios J (N,) and pitch ratio P / D."""
+    return np.asarray(
+        sum(c * J**s * pitch**t * AREA_RATIO**u * float(BLADES) ** v for c, s, t, u, v in K_T_TERMS), dtype=float
+    )
+
+
+@cache
+def thrust_polynomial(pitch: float) -> tuple[float, float, float]:
+    """(k_0, k_1, k_2) of K_T = k_0 + k_1 J + k_2 J^2: least squares from J = 0 to where K_T is 0.
+
+    Within 0.01 of the series up to P / D = 1.4.
+    """
+    J = np.linspace(0.0, 1.6 * pitch, 200)
+    K_T = thrust_coefficient(J, pitch)
+    J, K_T = J[K_T > 0], K_T[K_T > 0]
+    k_2, k_1, k_0 = np.polyfit(J, K_T, 2).tolist()
+    return k_0, k_1, k_2
+
+
+def friction(speed: float, length: float, nu: float) -> float:
+    """C_F [-] of the ITTC-57 line at a speed [m/s] and length [m] in water of viscosity nu [m^2/s]."""
+    return float(0.075 / (math.log10(speed * length / nu) - 2) ** 2)
+
+
+def form_factor(L: float, B: float, T: float, C_b: float) -> float:
+    """Form factor k [-] of Watanabe, at least 0: viscous resistance is (1 + k) times that of friction."""
+    return max(-0.095 + 25.6 * C_b / ((L / B) ** 2 * math.sqrt(B / T)), 0.0)
+
+
+def wetted_surface(L: float, B: float, T: float, C_b: float) -> float:
+    """S [m^2] of Mumford."""
+    return 1.025 * L * (C_b * B + 1.7 * T)
+
+
+def correlation_allowance(L: float) -> float:
+    """C_A [-] of a ship's rough hull: 0.006 (L + 100)^-0.16 - 0.00205, Holtrop and Mennen (1982); L [m]."""
+    return float(0.006 * (L + 100) ** -0.16 - 0.00205)
+
+
+def wave_resistance(L: float, B: float, T: float, C_b: float, speed: float) -> float:
+    """R_W over the displaced weight [-], Holtrop and Mennen (1982): no bulb, no immersed transom, LCB amidships.
+
+    C_M by Kerlen (1970), C_WP = (1 + 2 C_b) / 3. Lengths [m], speed [m/s]. The formula is for Froude numbers up to 0.4.
+    """
+    C_M = min(max(1.006 - 0.0056 * C_b**-3.56, 0.75), 0.995)
+    C_P, C_WP = min(C_b / C_M, 0.9), (1 + 2 * C_b) / 3
+    volume, froude = C_b * L * B * T, speed / math.sqrt(GRAVITY * L)
+    run = 1 - C_P  # length of the run over L
+    entrance = 1 + 89 * math.exp(
+        -((L / B) ** 0.80856)
+        * (1 - C_WP) ** 0.30484
+        * (1 - C_P) ** 0.6367
+        * (run * L / B) ** 0.34574
+        * (100 * volume / L**3) ** 0.16302
+    )
+    ratio = B / L
+    c_7 = 0.229577 * ratio ** (1 / 3) if ratio < 0.11 else ratio if ratio < 0.25 else 0.5 - 0.0625 / ratio
+    c_1 = 2223105 * c_7**3.78613 * (T / B) ** 1.07961 * (90 - entrance) ** -1.37565
+    slender = L**3 / volume
+    c_15 = -1.69385 if slender < 512 else 0.0 if slender > 1727 else -1.69385 + (slender ** (1 / 3) - 8) / 2.36
+    c_16 = 8.07981 * C_P - 13.8673 * C_P**2 + 6.984388 * C_P**3 if C_P < 0.8 else 1.73014 - 0.7067 * C_P
+    m_1 = 0.0140407 * L / T - 1.75254 * volume ** (1 / 3) / L - 4.79323 * B / L - c_16
+    m_2 = c_15 * C_P**2 * math.exp(-0.1 * froude**-2)
+    hollows = 1.446 * C_P - (0.03 * L / B if L / B < 12 else 0.36)
+    return float(c_1 * math.exp(m_1 * froude**-0.9 + m_2 * math.cos(hollows * froude**-2)))

@@ -1,0 +1,404 @@
+"""Do bands hold what they promise? Many seeded worlds, each with runs that no model has seen: docs/bands.md.
+
+`python -m tests.benchmarks bands --replicates 200`; the real log is measured too where SHIPID_DATA names it.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from shipid.data.dataset import Dataset
+from shipid.data.windows import Windows, cut_windows, run_folds
+from shipid.hybrid.alone import Alone
+from shipid.hybrid.bands import Bands, Region, needed, track
+from shipid.hybrid.calibration import calibrated
+from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.method import Case, Corrector, Method, Task
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.physics import Physics
+from shipid.identification.bands import bands as of_manoeuvres
+from shipid.identification.bands import refusal
+from shipid.identification.outcome import COMPARED, _measured
+from shipid.identification.settings import Identify
+from shipid.identification.solve import identify
+from shipid.identification.statistics import LinearFit, statistics
+from shipid.predictor import limits_of
+from shipid.simulation.truth import Truth, draw_manoeuvres, simulate
+from shipid.study.bands import share_interval
+from shipid.study.plan import Batch, read_plan
+from shipid.study.prepare import instants_of, obtain, partition, prepare
+from shipid.study.run import run_batch
+from shipid.vessel.load import Vessel, load_vessel
+from tests.benchmarks import coverage
+
+Array = np.ndarray
+SHARES = (0.5, 0.8, 0.9, 0.95)
+METHODS: dict[str, Method] = {"alone": Alone(), "drawn": PathDrawn(trials=8, units=48, averaged=4)}
+VESSEL = "gunnerus-28.9"
+KINDS = {
+    "turning": {"n_rpm": [50.0, 200.0], "alpha_deg": [-50.0, 50.0], "start_speed": [0.0, 2.5]},
+    "steps": {"n_rpm": [50.0, 200.0], "alpha_deg": [-40.0, 40.0], "hold": [8.0, 25.0]},
+    "zigzag": {
+        "n_rpm": [80.0, 160.0],
+        "angle_deg": [8.0, 30.0],
+        "side": ["starboard", "port"],
+        "execute_at": [1.0, 8.0],
+    },
+}
+
+
+@dataclass(frozen=True)
+class World:
+    """Windows of runs that may train, and of runs that no model sees; kind of manoeuvre by run; a wrong vessel."""
+
+    pool: Windows
+    fresh: Windows
+    kinds: dict[str, str]
+    physics: Physics
+    mixed: str
+
+
+def world(seed: int, fresh: int = 200, pool: int = 50) -> World:
+    """Draw a world: manoeuvres of one to three kinds, weather, horizon, and a model that is wrong by drawn factors."""
+    draw = np.random.default_rng([seed, 16])
+    names = sorted(draw.choice(sorted(KINDS), size=draw.integers(1, 4), replace=False))
+    horizon, interval = int(draw.integers(8, 21)), float(draw.integers(2, 6))
+    blocks = [{"kind": str(name), "share": float(draw.uniform(0.5, 2.0)), **KINDS[str(name)]} for name in names]
+    truth = Truth(
+        vessel=VESSEL,
+        manoeuvres=pool + fresh,
+        duration=horizon + float(draw.integers(20, 41)),
+        step=0.2,
+        seed=seed,
+        wind_speed=(0.0, float(draw.choice([0.0, 6.0, 12.0]))),
+        manoeuvre=blocks,
+    )
+    vessel = load_vessel(VESSEL)
+    frame = simulate(truth, vessel)
+    noise = float(draw.choice([0.0, 0.02, 0.05]))
+    for name, size in (("u", noise), ("v", noise), ("r", 0.1 * noise)):
+        frame[name] += size * draw.standard_normal(len(frame))
+    windows = cut_windows(Dataset(frame, {"clock": "run", "flags": []}), horizon=horizon, step=1.0, interval=interval)
+    runs = list(dict.fromkeys(map(str, frame["run"])))
+    kinds = {run: type(one).__name__ for run, one in zip(runs, draw_manoeuvres(truth), strict=True)}
+    train = np.isin(windows.run, runs[:pool])
+    physics = Physics(_wrong(vessel, draw), horizon, 1.0)
+    return World(windows.select(train), windows.select(~train), kinds, physics, "+".join(names))
+
+
+def _wrong(vessel: Vessel, draw: np.random.Generator) -> Vessel:
+    """The vessel with drawn factors on its numbers: nearly right to badly wrong."""
+    width = float(draw.choice([0.1, 0.4, 0.7]))
+    paths = [path for path in vessel.parameters if path.startswith("hull.derivatives.")]
+    paths += ["added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot"] * bool(draw.integers(2))
+    return vessel.with_values({p: vessel.parameters[p] * draw.uniform(1 - width, 1 + width) for p in sorted(paths)})
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A fitted method on some runs of a world: errors without each run, and what it predicts for fresh runs."""
+
+    windows: Windows
+    corrector: Corrector
+    left_out: Array
+    inside: Array
+    limits: tuple[str, ...]
+    paths: Array
+    spread: Array | None
+    bands: Bands
+
+
+def cell(made: World, runs: Sequence[str], method: Method, physics: Physics, seed: int) -> Cell | None:
+    """Fit a method on some runs; None where the physics or the fit diverges."""
+    windows = made.pool.select(np.isin(made.pool.run, runs))
+    alone, ahead = physics.paths(windows.instants()), physics.paths(made.fresh.instants())
+    if not (np.isfinite(alone).all() and np.isfinite(ahead).all()):
+        return None
+    folds = run_folds(windows, "runs", seed) if method.compensates else ()
+    task = Task({"one": Case(physics, alone)}, windows, folds, tuple(windows.planned), seed=seed)
+    fitted = method.fit(task)["one"]
+    if fitted.corrector is None or fitted.left_out is None:
+        return None
+    paths = fitted.corrector.predict(physics, made.fresh.instants(), ahead)
+    names = tuple(limits_of(windows, windows.planned))
+    bands = calibrated(fitted.left_out, windows.future, windows.run, windows.columns, names, windows.step, made.kinds)
+    assert bands is not None
+    inside = windows.future - fitted.corrector.predict(physics, windows.instants(), alone)
+    spread = None
+    if isinstance(fitted.corrector, Compensator):
+        table = fitted.corrector.inputs.table(physics, made.fresh.instants())
+        single = np.stack([network.predict(table) for network in fitted.corrector.networks])
+        spread = single.std(axis=0, ddof=1)
+    return Cell(windows, fitted.corrector, fitted.left_out, inside, names, paths, spread, bands)
+
+
+def by_run(run: Array, values: Array) -> float:
+    """Mean over runs of the means over their windows."""
+    _, place = np.unique(run, return_inverse=True)
+    return float((np.bincount(place, values) / np.bincount(place)).mean())
+
+
+def ideal_radius(scores: Array, run: Array, level: float) -> float:
+    """Quantile of the scores of fresh runs, every run weighing the same: what the radius should have been."""
+    _, place, count = np.unique(run, return_inverse=True, return_counts=True)
+    order = np.argsort(scores)
+    weights = (1 / count[place])[order]
+    return float(np.interp(level, (np.cumsum(weights) - weights / 2) / weights.sum(), scores[order]))
+
+
+def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Coverage and width at every level that so many runs can promise, by kind of manoeuvre too, and the ideal."""
+    fresh, errors = made.fresh, made.fresh.future - one.paths
+    kinds = np.array([made.kinds[str(run)] for run in fresh.run])
+    calibrated_kinds = [made.kinds[str(run)] for run in one.windows.spans]
+    for level in SHARES:
+        if not one.bands.promises(level):
+            continue
+        region = one.bands.region(one.paths, fresh.columns, 1.0, level)
+        reach = region.reach(errors).max(axis=0)
+        row = {**keys, "runs": runs, "level": level, "width": float(region.radius.mean())}
+        held = (reach <= 1).astype(float)
+        row |= {"coverage": by_run(fresh.run, held), "ratio": 1 / ideal_radius(reach, fresh.run, level)}
+        for kind in np.unique(kinds):
+            mine = kinds == kind
+            row |= {f"{kind}": by_run(fresh.run[mine], held[mine]), f"{kind} runs": calibrated_kinds.count(kind)}
+            if one.bands.promises(level, str(kind)):
+                known = one.bands.region(one.paths, fresh.columns, 1.0, level, kind=str(kind))
+                row[f"{kind} said"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
+        yield row
+
+
+def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The same share promised in other ways: coverage of whole paths and mean radius."""
+    fresh, errors, windows = made.fresh, made.fresh.future - one.paths, one.windows
+    ahead, size = track(one.paths), one.paths.shape[:2]
+
+    def circle(radius: Array) -> Region:
+        wide = np.broadcast_to(np.maximum(radius, 1e-9), size)
+        return Region(ahead, wide, wide)
+
+    off, inside = np.hypot(*np.moveaxis(one.left_out, -1, 0)), np.hypot(*np.moveaxis(one.inside, -1, 0))
+    columns, horizon = fresh.columns, len(off)
+
+    def pooled(distances: Array) -> Region:
+        scale = np.maximum(distances.mean(axis=1), 0.05 * distances.mean(axis=1).max())[:, None]
+        scores = np.sort((distances / scale).max(axis=0))
+        place = min(int(np.ceil(level * (len(scores) + 1))) - 1, len(scores) - 1)
+        return circle(scale * scores[place])
+
+    found = {
+        "band": one.bands.region(one.paths, columns, 1.0, level),
+        "each step alone": one.bands.region(one.paths, columns, 1.0, level, pointwise=True),
+        "Bonferroni over steps": circle(np.quantile(off, 1 - (1 - level) / horizon, axis=1)[:, None]),
+        "windows pooled": pooled(off),
+        "windows pooled, training errors": pooled(inside),
+        "hierarchical conformal (proven)": _proven(one, windows, level, columns),
+    }
+    if one.spread is not None:
+        z = float(np.sqrt(stats.chi2.ppf(level, 2)))
+        found["spread of the ensemble"] = Region(ahead, *(np.maximum(z * one.spread[..., i], 1e-9) for i in (0, 1)))
+    for name, region in found.items():
+        held = region.holds(errors).astype(float)
+        row = {**keys, "runs": len(windows.spans), "level": level, "rival": name}
+        yield {**row, "coverage": by_run(fresh.run, held), "width": float(region.radius.mean())}
+
+
+def _proven(one: Cell, windows: Windows, level: float, columns: Any) -> Region:
+    """The band with the quantile of Lee, Barber and Willett, which has a proof for any distribution."""
+    paths = windows.future - one.left_out
+    reach = one.bands.region(paths, windows.columns, 1.0, 0.5).reach(one.left_out).max(axis=0)
+    _, place, count = np.unique(windows.run, return_inverse=True, return_counts=True)
+    order = np.argsort(reach)
+    weights = np.cumsum((1 / (count[place] * (len(count) + 1)))[order])
+    index = min(int(np.searchsorted(weights, level - 1e-12)), len(reach) - 1)
+    return one.bands.region(one.paths, columns, 1.0, 0.5).scaled(float(reach[order][index]))
+
+
+def worlds(
+    count: int, *, amounts: Sequence[int] = (22,), every: int = 4, fresh: int = 200, first: int = 0, show: bool = False
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Promises and rivals over seeded worlds; in every fourth world also with 5, 10 and 50 runs."""
+    kept: list[dict[str, Any]] = []
+    beside: list[dict[str, Any]] = []
+    for seed in range(first, first + count):
+        made = world(seed, fresh)
+        runs = list(made.pool.spans)
+        for size in (*amounts, *((5, 10, 50) if seed % every == 0 else ())):
+            for label, method in METHODS.items():
+                physics = made.physics
+                if label == "drawn" and seed % 3 == 2:
+                    physics, label = Physics(None, physics.horizon, physics.step), "drawn, no physics"
+                one = cell(made, runs[:size], method, physics, seed)
+                keys = {"world": seed, "mixed": made.mixed, "method": label, "horizon": made.pool.horizon}
+                if one is None:
+                    continue
+                kept += promised(made, one, size, keys)
+                if size == 22:
+                    beside += rivals(made, one, 0.9, keys)
+        if show:
+            print(f"world {seed}", flush=True)
+    return pd.DataFrame(kept), pd.DataFrame(beside)
+
+
+def mean_interval(values: pd.Series[float]) -> str:
+    """Mean over worlds with its 95 % interval."""
+    values = values.dropna()
+    half = 1.96 * values.std(ddof=1) / len(values) ** 0.5 if len(values) > 1 else float("nan")
+    return f"{values.mean():.3f} +- {half:.3f}"
+
+
+def figures(kept: pd.DataFrame, beside: pd.DataFrame) -> dict[str, Any]:
+    """Tables of the docs as label -> text; the mean over the methods of a world counts once."""
+    found: dict[str, Any] = {}
+    for (runs, level), part in kept.groupby(["runs", "level"]):
+        per = part.groupby("world")[["coverage", "ratio"]].mean()
+        found[f"{runs} runs, {level:.0%}: coverage"] = mean_interval(per["coverage"])
+        found[f"{runs} runs, {level:.0%}: width / ideal"] = mean_interval(per["ratio"])
+    for (method, level), part in kept[kept.runs == 22].groupby(["method", "level"]):
+        found[f"22 runs, {method}, {level:.0%}: coverage"] = mean_interval(part["coverage"])
+    for kind in ("Turning", "Steps", "Zigzag"):
+        for level, part in kept[kept.runs == 22].groupby("level"):
+            if kind in part:
+                enough = part[part[f"{kind} runs"] >= needed(float(str(level)))]
+                label = f"22 runs, {kind}, {level:.0%}: coverage"
+                found[label] = mean_interval(enough.groupby("world")[kind].mean())
+                found[f"{label}, kind said"] = mean_interval(enough.groupby("world")[f"{kind} said"].mean())
+    for rival, part in beside.groupby("rival"):
+        width = part.width.to_numpy() / _of_band(beside, part)
+        found[f"22 runs, 90%, {rival}: coverage"] = mean_interval(part["coverage"])
+        found[f"22 runs, 90%, {rival}: width / band"] = mean_interval(pd.Series(width))
+    return found
+
+
+def _of_band(beside: pd.DataFrame, part: pd.DataFrame) -> Array:
+    band = beside[beside.rival == "band"].set_index(["world", "method"])["width"]
+    return np.array([band[key] for key in zip(part["world"], part["method"], strict=True)])
+
+
+FAMILIES = [
+    {"name": "accurate", "base": "gunnerus-28.9"},
+    {"name": "template", "base": "gunnerus-33.9-template"},
+]
+WAYS = [
+    {"name": "drawn", "kind": "path-drawn"},
+    {"name": "alone", "kind": "alone"},
+    {"name": "memory", "kind": "path-drawn", "memory": {"history": [2, 4, 8], "error": 8}},
+]
+
+
+def recorded(folder: Path, commands: str) -> pd.DataFrame:
+    """Every zigzag of the real log in turn, all other runs train: a row per window and model, with its bands."""
+    log = folder / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
+    changes = {"family": FAMILIES, "method": WAYS, "claims": None, "data.log": str(log)}
+    plan = read_plan("full-scale", {**changes, "prediction.commands": commands, "grid.seeds": [0]})
+    dataset = obtain(plan)
+    parts = []
+    for test in (run for run in dataset.runs if str(run).startswith("ZZ")):
+        split = plan.study.split.model_copy(update={"test": [test], "folds": 1})
+        least = plan.study.model_copy(update={"split": split, "grid": plan.study.grid.model_copy(update={"N_D": [2]})})
+        amount = len(partition(replace(plan, study=least, batches=()), dataset)[0].spans)
+        study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
+        turn = replace(plan, study=study, batches=(Batch(amount, 0),))
+        prepared = prepare(turn, dataset)
+        for row, predictor in run_batch(turn, prepared, turn.batches[0], "cpu"):
+            assert predictor is not None
+            instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
+            frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},
+                                 index=range(len(prepared.test)))  # fmt: skip
+            for level in (0.8, 0.9):
+                found = predictor.predict(instants, level=level)
+                frame[f"held {level}"] = found.region.holds(prepared.test.future - found.paths)
+                frame[f"end {level}"] = found.region.radius[-1]
+            parts.append(frame)
+    return pd.concat(parts, ignore_index=True)
+
+
+def recorded_figures(folder: Path) -> dict[str, Any]:
+    """Coverage over the zigzags with its exact interval, clustered by run, and the radius 15 s ahead."""
+    found: dict[str, Any] = {}
+    for commands in ("held", "known"):
+        for model, part in recorded(folder, commands).groupby("model", sort=False):
+            for level in (0.8, 0.9):
+                held, wide = part[f"held {level}"].to_numpy(), part[f"end {level}"].mean()
+                low, high = share_interval(held, part["test"].to_numpy())
+                least = part.groupby("test")[f"held {level}"].mean().min()
+                words = (
+                    f"{held.mean():.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
+                )
+                found[f"real log, {commands}, {model}, {level:.0%}"] = words
+    return found
+
+
+def identified_figures(replicates: int = 30) -> dict[str, Any]:
+    """Whether bands of 90 % on overshoots and circles hold the truth: simulated trials, whole runs and short horizons.
+
+    The measures are linear about the truth here, because a thousand zigzags would take hours.
+    """
+    ship = load_vessel(VESSEL)
+    paths = [f"hull.derivatives.{name}" for name in coverage.DERIVATIVES]
+    slopes, truth = _slopes(ship, paths)
+
+    def measure(one: Vessel) -> dict[str, float]:
+        away = np.array([one.parameters[path] / ship.parameters[path] - 1 for path in paths])
+        return {name: truth[name] + float(slope @ away) for name, slope in slopes.items()}
+
+    found: dict[str, Any] = {}
+    for label, strength, horizon in (("white noise", 0.0, 0.0), ("process noise", 1.0, 0.0), ("doubled", 2.0, 0.0),
+                                     ("doubled, 20 s", 2.0, 20.0), ("doubled, 10 s", 2.0, 10.0)):  # fmt: skip
+        held: list[Array] = []
+        refused = 0
+        for seed in range(replicates):
+            data = coverage._noisy(ship, seed, strength)
+            settings = Identify(parameters=paths, weights=coverage.NOISE, horizon=horizon,
+                                nuisance=["initial_state"], start="base")  # fmt: skip
+            solution = identify(ship, data, data.runs, settings)
+            judged = statistics(LinearFit.of(solution))
+            if refusal(solution, judged, 1.0):
+                refused += 1
+                continue
+            rows = of_manoeuvres(ship, solution, judged, [("all", measure)], 0.9)
+            right = rows["measure"].map(truth)
+            held.append(((rows["low"] <= right) & (right <= rows["high"])).to_numpy())
+        text = f"{np.mean(held):.3f}, worst measure {np.mean(held, axis=0).min():.3f}" if held else "-"
+        found[f"identified, {label}: coverage of 90%"] = text
+        found[f"identified, {label}: refused"] = f"{refused} of {replicates}"
+    return found
+
+
+def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[str, float]]:
+    """Change of each measure with each factor, and the measures of the truth."""
+
+    def measure(one: Vessel) -> dict[str, float]:
+        found = {}
+        for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
+            rows = _measured(one, kind, angles)
+            found |= {
+                name: float(rows[name]["value"]) for name in (label.replace("_", " ") for label in COMPARED[kind])
+            }
+        return found
+
+    truth = measure(ship)
+    ends = [[measure(ship.with_values({path: ship.parameters[path] * (1 + side)})) for side in (0.02, -0.02)]
+            for path in paths]  # fmt: skip
+    return {name: np.array([(up[name] - down[name]) / 0.04 for up, down in ends]) for name in truth}, truth
+
+
+def run(replicates: int = 200) -> dict[str, Any]:
+    """Everything that docs/bands.md shows."""
+    begun = time.perf_counter()
+    found = figures(*worlds(replicates, show=True))
+    found |= identified_figures()
+    data = os.environ.get("SHIPID_DATA")
+    if data:
+        found |= recorded_figures(Path(data))
+    found["seconds"] = round(time.perf_counter() - begun, 1)
+    return found

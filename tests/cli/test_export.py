@@ -1,0 +1,20 @@
+"""`shipid export` from the command line."""
+
+from __future__ import annotations
+
+from typer.testing import CliRunner
+
+from shipid.cli import app
+
+
+def test_a_bundled_vessel_is_written(tmp_path):
+    result = CliRunner().invoke(app, ["export", "mariner", "--to", "c", "--out", str(tmp_path / "ship")])
+    assert result.exit_code == 0, result.output
+    assert "ship.c" in result.output.replace("\n", "")
+    assert (tmp_path / "ship" / "ship.h").is_file()
+
+
+def test_a_cell_that_is_not_there_is_one_line(tmp_path):
+    result = CliRunner().invoke(app, ["export", str(tmp_path / "no.npz"), "--to", "c", "--out", str(tmp_path)])
+    assert result.exit_code == 1
+    assert "cannot be read" in str(result.exception)

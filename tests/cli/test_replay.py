@@ -1,0 +1,57 @@
+"""`shipid replay`: a run on the vessel that made it comes back; another vessel errs; mistakes are one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.data.dataset import Dataset, write_dataset
+from shipid.errors import ShipidError
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
+from shipid.vessel.load import load_vessel
+
+SHIP = "kvlcc2-l7"
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    kinds = [Zigzag(name=f"zz {angle}", n_rpm=627, angle_deg=angle, duration=40, execute_at=5) for angle in (10, 20)]
+    frame = perform(load_vessel(SHIP), kinds, step=0.1)
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]].astype({"run": "str"})
+    file = tmp_path_factory.mktemp("replay") / "log.parquet"
+    return write_dataset(Dataset(frame, {"clock": "run", "flags": []}), file)
+
+
+def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> None:
+    csv, page = tmp_path / "both.csv", tmp_path / "page.html"
+    words = ["replay", SHIP, str(log), "--run", "zz 1*", "--out", str(page), "--csv", str(csv)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    both = pd.read_csv(csv)
+    assert set(both["run"]) == {"zz 10"}
+    measured, replayed = (both[both["model"] == name] for name in ("measured", "replayed"))
+    for name, tolerance in (("north", 0.3), ("east", 0.3), ("psi", 0.02), ("u", 0.01)):
+        assert measured[name].to_numpy() == pytest.approx(replayed[name].to_numpy(), abs=tolerance), name
+    assert "zz 10" in page.read_text()
+    assert "Recorded and replayed" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--run", "zz 30"], "is no run"),
+        (["--out", "page.txt"], "a page is an HTML file"),
+        (["--step", "-1"], "must be positive"),
+        (["--csv", "both.doc"], "csv"),
+    ],
+)
+def test_a_mistake_is_one_line(log: Path, words: list[str], said: str) -> None:
+    result = CliRunner().invoke(app, ["replay", SHIP, str(log), *words])
+    assert isinstance(result.exception, ShipidError)
+    assert said in str(result.exception)
+    assert "\n" not in str(result.exception)

@@ -1,0 +1,285 @@
+"""C99 of predictors and vessels: the same numbers as Python, whatever the predictor."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset, sample
+from shipid.data.windows import Instants, past_of
+from shipid.engine.casadi import memory_along
+from shipid.engine.rollout import rollout
+from shipid.export.blocks import Precision
+from shipid.export.c import c_name, predictor_files, vessel_files
+from shipid.export.equations import Equations
+from shipid.export.model import model
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.features import Memory
+from shipid.hybrid.physics import Physics
+from shipid.observer import Observer, observe
+from shipid.predictor import Predictor
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from tests.conftest import pace, variety
+from tests.export.compiled import SANITIZERS, compile_, compiler, library, paths, pointer, run_example, write
+from tests.export.strange import KINDS, drawn, network_of
+
+NEAR = 1e-12  # m
+INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME = 1, 2, 4, 8, 16
+
+
+def agree(found, results, strange):
+    """Paths are those of Python, and results say what they must."""
+    with np.errstate(all="ignore"):
+        expected = strange.predictor.predict(strange.instants)
+    whole = np.isfinite(expected).all(axis=(0, 2))
+    np.testing.assert_array_equal((results & DIVERGED) > 0, ~whole)
+    np.testing.assert_array_equal((results & OUTSIDE) > 0, strange.predictor.outside(strange.instants.columns))
+    scale = max(1.0, float(np.abs(expected[:, whole]).max(initial=0.0)) / 100)
+    np.testing.assert_allclose(found[:, whole], expected[:, whole], rtol=0, atol=NEAR * scale)
+
+
+@pytest.mark.parametrize("kind", ["hankel-dmd", "path-drawn", "recurrent"])
+def test_drawn_predictors_say_the_same(kind, tmp_path):
+    strange = drawn(kind, 5, vessel="mariner")
+    exported = model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    agree(*paths(loaded, "odd", exported, strange.instants), strange)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_method_on_strange_ships(kind, seed, tmp_path):
+    strange = drawn(kind, seed, count=50)
+    exported = model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    agree(*paths(loaded, "odd", exported, strange.instants), strange)
+
+
+def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
+    strange = drawn("path-drawn", 3, vessel="mariner")
+    exported = model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    given = {key: np.ascontiguousarray(values[0]) for key, values in exported.inputs(strange.instants).items()}
+    path = np.zeros((exported.layout.horizon, 2))
+
+    def result(**changed):
+        return loaded.odd_path(*(pointer({**given, **changed}[key]) for key in exported.layout.sizes), pointer(path))
+
+    assert result() & ~OUTSIDE == 0
+    for group in ("now", "past", "planned", "parameters"):
+        for place in range(len(given[group])):
+            for fault in (np.nan, np.inf, -np.inf):
+                faulty = given[group].copy()
+                faulty[place] = fault
+                assert result(**{group: faulty}) == INVALID
+                assert np.isnan(path).all()
+    for size in (1e6, 1e100, 1e300):
+        huge = given["now"].copy()
+        huge[exported.layout.now.index("u")] = size
+        assert result(now=huge) & OUTSIDE
+    wide = result(now=huge)
+    assert wide & DIVERGED or np.isfinite(path).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_thousand_instants_with_faults(kind, tmp_path):
+    """Every eighth instant has an entry that is not finite, every eighth one that no ship has."""
+    strange = drawn(kind, 11, count=1000)
+    exported = model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    rng = np.random.default_rng(0)
+    columns = {name: values.copy() for name, values in strange.instants.columns.items()}
+    taken = [name for name in exported.layout.now if name in columns]
+    faulty = np.zeros(1000, dtype=bool)
+    for i in range(0, 1000, 8):
+        columns[str(rng.choice(taken))][i] = rng.choice([np.nan, np.inf, -np.inf])
+        faulty[i] = True
+        columns["u"][i + 1] = rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(3, 12)
+    instants = Instants(
+        columns, strange.instants.past, strange.instants.planned, strange.instants.hidden, strange.instants.estimates
+    )
+    found, results = paths(loaded, "odd", exported, instants)
+    np.testing.assert_array_equal(results[faulty], INVALID)
+    assert np.isnan(found[:, faulty]).all()
+    sound = np.flatnonzero(~faulty & (np.abs(columns["u"]) < 100))
+    with np.errstate(all="ignore"):
+        expected = strange.predictor.predict(instants.select(sound))
+    whole = np.isfinite(expected).all(axis=(0, 2))
+    np.testing.assert_array_equal((results[sound] & DIVERGED) == 0, whole)
+    np.testing.assert_allclose(found[:, sound][:, whole], expected[:, whole], rtol=0, atol=NEAR)
+    large = ~faulty & (np.abs(columns["u"]) >= 100)
+    assert ((results[large] & OUTSIDE) > 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_sanitizers_are_silent(kind, tmp_path):
+    """The example runs under address and undefined behaviour sanitizers; so does a bank of filters."""
+    strange = drawn(kind, 2)
+    run_example(predictor_files(model(strange.predictor), "odd", Precision()), tmp_path, *SANITIZERS)
+
+
+@pytest.mark.slow
+def test_sanitizers_are_silent_with_an_observer(tmp_path):
+    physics = Physics(variety()["actuators"], 10, 1.0, "rk4", Observer())
+    predictor = Predictor(physics, "alone", Unchanged({}), {})
+    run_example(predictor_files(model(predictor), "odd", Precision()), tmp_path, *SANITIZERS)
+
+
+def log_of(vessel, seconds, rng, interval):
+    """A run with orders that change, at uneven times; its heading goes on beyond pi."""
+    slow, commands = pace(vessel), dynamics(vessel).commands
+    t = np.cumsum(rng.uniform(0.8, 1.2, round(seconds / interval)) * interval) * slow
+    frame = pd.DataFrame({"run": "a", "t": t, "flags": 0})
+    psi = 3.0 + 0.03 / slow * (t - t[0])
+    frame["psi"] = psi
+    frame["u"], frame["v"] = slow * (3 + 0.2 * np.sin(t)), slow * 0.2 * np.cos(t)
+    frame["r"] = np.full(len(t), 0.03 / slow)
+    frame["north"] = 200 + np.cumsum(np.r_[0, np.diff(t) * frame["u"].to_numpy()[1:] * np.cos(psi[1:])])
+    frame["east"] = np.cumsum(np.r_[0, np.diff(t) * frame["u"].to_numpy()[1:] * np.sin(psi[1:])])
+    frame["V_w"], frame["beta_w"] = slow * 5.0, 0.3
+    for name in commands:
+        level = 0.3 if name.endswith(("alpha", "delta")) else 1.5 / slow
+        frame[name] = level * np.repeat(rng.uniform(0.2, 1, len(t) // 4 + 1), 4)[: len(t)]
+    return Dataset(frame, {"clock": "run"})
+
+
+@pytest.mark.parametrize("velocity", [False, True])
+def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
+    """Past, actuators and estimates of the observer, row by row, at uneven times."""
+    vessel = variety()["actuators"]
+    rng = np.random.default_rng(1)
+    dataset = log_of(vessel, 25, rng, 0.5)
+    strange = drawn("path-drawn", 7, vessel="actuators")
+    physics = Physics(vessel, 8, 1.0, "euler", Observer(), "velocity" if velocity else "position")
+    corrector = strange.predictor.corrector
+    memory = Memory(history=(2.0, 3.0), turned=(4.0,), error=(3.0,), observer=True)
+    inputs = type(corrector.inputs)(corrector.inputs.commands, memory)
+    rows = dataset.frame
+    t = rows["t"].to_numpy()
+    late = t[t > t[0] + 4.0]
+    estimates = observe(vessel, dataset, physics.observer)
+    along = memory_along(vessel, {name: rows[name].to_numpy() for name in dynamics(vessel).commands}, t)
+    assert along is not None
+    places = np.flatnonzero(t > t[0] + 4.0)
+    instants = Instants(
+        sample(rows, late),
+        past_of(rows, late, 4, 1.0, physics.path),
+        None,
+        {name: values[places] for name, values in along.items()},
+        {name: values[places] for name, values in estimates.columns.items()},
+    )
+    table = inputs.table(physics, instants)
+    names = [name for name in table if "." not in name or rng.random() < 0.6]
+    network = network_of(rng, names, table, physics.horizon, 3, False)
+    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (0.0, 9.0)})
+    exported = model(predictor)
+    files = predictor_files(exported, "odd", Precision())
+    size = _size_of_struct(files, tmp_path)
+    loaded = library(files, tmp_path)
+    kept = np.zeros(size + 64, dtype=np.uint8)
+    loaded.odd_init(pointer(kept))
+    path = np.zeros((physics.horizon, 2))
+    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == NO_PAST
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    found = []
+    for i in range(len(t)):
+        row = np.ascontiguousarray(rows.iloc[i][list(order)].to_numpy(dtype=float))
+        row[order.index("psi")] = (row[order.index("psi")] + np.pi) % (2 * np.pi) - np.pi
+        assert loaded.odd_record(pointer(kept), t[i], pointer(row)) == 0
+        assert loaded.odd_record(pointer(kept), t[i], pointer(row)) == TIME
+        bad = row.copy()
+        bad[3] = np.nan
+        assert loaded.odd_record(pointer(kept), t[i] + 0.1, pointer(bad)) == INVALID
+        result = loaded.odd_predict(pointer(kept), None, pointer(path))
+        assert result == (NO_PAST if t[i] < t[0] + 4.0 - 1e-9 else 0)
+        if t[i] > t[0] + 4.0:
+            found.append(path.copy())
+    expected = predictor.predict(instants)
+    np.testing.assert_allclose(np.stack(found, axis=1), expected, rtol=0, atol=1e-10)  # filters amplify rounding
+
+
+def _size_of_struct(files, folder):
+    write(files, folder)
+    (folder / "size.c").write_text(
+        '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd)); return 0; }\n'
+    )
+    compile_([compiler()], folder, "-O0", "-o", "size", "size.c")
+    return int(subprocess.run([folder / "size"], capture_output=True, text=True).stdout)
+
+
+@pytest.mark.parametrize("name", ["actuators", "gunnerus-33.9", "mariner"])
+def test_a_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
+    _steps(variety()[name], tmp_path, draw_inputs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(variety()))
+def test_every_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
+    _steps(variety()[name], tmp_path, draw_inputs)
+    run_example(vessel_files(variety()[name], "ship", "rk4", Precision()), tmp_path / "example", *SANITIZERS)
+
+
+def _steps(vessel, folder, draw_inputs):
+    """Sixty seconds in steps of a tenth, with loads, from drawn states."""
+    equations, slow = Equations(vessel), pace(vessel)
+    drawn_ = draw_inputs(vessel, 3)
+    loads = 1e-3 * float(vessel.document["inertia"]["m"]) * np.ones(equations.model.num_dof)
+    loaded = library(vessel_files(vessel, "ship", "rk4", Precision()), folder)
+    loaded.ship_step.argtypes = [*[ctypes.c_void_p] * 5, ctypes.c_double]
+    steps = 60
+    expected = rollout(
+        vessel, drawn_["start"], drawn_["commands"], drawn_["environment"], step=0.1 * slow, num_steps=steps,
+        method="rk4", tau_extra=loads, engine="native",
+    )  # fmt: skip
+    for i in range(3):
+        carry = np.zeros(equations.num_carry)
+        carry[: len(equations.model.state)] = [drawn_["start"][name][i] for name in equations.model.state]
+        groups = [np.array([drawn_[key][name][i] for name in getattr(equations.model, key)] + [0.0])
+                  for key in ("commands", "environment")]  # fmt: skip
+        values = np.array(list(vessel.parameters.values()))
+        loaded.ship_begin(pointer(carry), pointer(groups[0]))
+        given = [pointer(array) for array in (carry, *groups, loads, values)]
+        assert loaded.ship_step(*given, 0.0) == 2
+        assert loaded.ship_step(*given, float("nan")) == 1
+        for _ in range(steps):
+            result = loaded.ship_step(*given, 0.1 * slow)
+            if result:
+                break
+        assert bool(result) == bool(expected.diverged[0, i])
+        if not result:
+            names = equations.model.state
+            last = [expected[name][-1, 0, i] for name in names]
+            np.testing.assert_allclose(carry[: len(names)], last, rtol=1e-12, atol=1e-12)
+
+
+def test_single_precision_is_near(tmp_path):
+    strange = drawn("path-drawn", 5, vessel="mariner")
+    exported = model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", Precision(single=True)), tmp_path)
+    found, _ = paths(loaded, "odd", exported, strange.instants, np.float32)
+    expected = strange.predictor.predict(strange.instants)
+    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_names_are_those_of_c():
+    assert c_name("moderate-3+drawn-N0030-s0") == "moderate_3_drawn_n0030_s0"
+    assert c_name("33.9 m") == "m_33_9_m"
+    assert c_name("double") == "m_double"
+    assert c_name("Ærø") == "r"
+    assert c_name("øøø") == "model"
+
+
+def test_examples_run(tmp_path):
+    predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", Unchanged({}), {"u": (0.0, 8.0)})
+    text = run_example(predictor_files(model(predictor), "m", Precision()), tmp_path / "a")
+    assert "30 s: " in text
+    assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", Precision()), tmp_path / "b")

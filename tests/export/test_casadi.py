@@ -1,0 +1,140 @@
+"""CasADi files: the same numbers, and loops that are closed with them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.engine.rollout import rollout
+from shipid.errors import ShipidError
+from shipid.export.model import model
+from shipid.export.write import export_predictor, export_vessel
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import load_vessel
+from tests.export.strange import drawn
+
+
+@pytest.mark.parametrize("kind", ["hankel-dmd", "modules", "path-drawn"])
+def test_a_predictor_is_one_function(kind, tmp_path):
+    strange = drawn(kind, 5, count=4, vessel="mariner")
+    file, names = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
+    function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
+    given = model(strange.predictor).inputs(strange.instants)
+    expected = strange.predictor.predict(strange.instants)
+    for i in range(4):
+        path = np.array(function(**{key: values[i] for key, values in given.items()})["path"])
+        np.testing.assert_allclose(path.T, expected[:, i], rtol=0, atol=1e-11)
+    assert [entry["name"] for entry in listed["inputs"]["now"]] == list(model(strange.predictor).layout.now)
+
+
+def test_a_forest_is_refused_in_one_line(tmp_path):
+    strange = drawn("forest", 1)
+    with pytest.raises(ShipidError, match="export it to c or fmu"):
+        export_predictor(strange.predictor, "casadi", tmp_path / "f.casadi")
+
+
+def hybrid(horizon):
+    """A ship with networks at every step, whose plan is known: 10 s a step."""
+    found = drawn("one-step", 4, vessel="mariner").predictor
+    corrector = found.corrector
+    heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
+    physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
+    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known")
+
+
+def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
+    """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard."""
+    horizon = 8
+    predictor = hybrid(horizon)
+    file, names = predictor.export("casadi", tmp_path / "ship.casadi")
+    function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
+    entries = {key: [entry["name"] for entry in rows] for key, rows in listed["inputs"].items()}
+    rudder = entries["planned"].index("rudder.delta")
+    ship = {"north": 0.0, "east": 0.0, "psi": 0.0, "u": 7.7, "v": 0.0, "r": 0.0}
+    reached = {"rudder.delta": 0.0}
+    problem = ca.Opti()
+    orders, at, actual = problem.variable(horizon), problem.parameter(6), problem.parameter(1)
+    motion = dict(zip(ship, ca.vertsplit(at), strict=True)) | {"propeller.n": 1.3}
+    plan = [orders[k] if i == rudder else 1.3 for k in range(horizon) for i in range(len(entries["planned"]))]
+    path = function(
+        now=ca.vertcat(*(motion.get(name, 0.0) for name in entries["now"])), reached=actual,
+        planned=ca.vertcat(*plan), parameters=listed["defaults"]["parameters"],
+    )["path"]  # fmt: skip
+    east = at[1] + ca.sin(at[2]) * path[0, :] + ca.cos(at[2]) * path[1, :]
+    problem.minimize(ca.sumsqr(east - 20) + 2e3 * ca.sumsqr(orders) + 50 * ca.sumsqr(ca.diff(east.T)))
+    problem.subject_to(problem.bounded(-0.6, orders, 0.6))
+    problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 60})
+    for _ in range(10):
+        problem.set_value(at, list(ship.values()))
+        problem.set_value(actual, reached["rudder.delta"])
+        order = float(problem.solve().value(orders[0]))
+        columns = {name: np.array([value]) for name, value in ship.items()}
+        commands = {"propeller.n": np.array([1.3]), "rudder.delta": np.array([order])}
+        hidden = {name: np.array([value]) for name, value in reached.items()}
+        result = rollout(predictor.vessel, columns, commands, step=1.0, num_steps=10, method="rk4", memory=hidden)
+        ship = {name: float(result[name][-1, 0, 0]) for name in ship}
+        reached = {name: float(result[f"actual.{name}"][-1, 0, 0]) for name in reached}
+    assert abs(ship["east"] - 20) < 8
+
+
+def test_a_loop_is_closed_with_a_vessel(tmp_path):
+    """A receding horizon holds a course 20 m to starboard: the file is all that the controller knows."""
+    vessel = load_vessel("mariner")
+    file, names = export_vessel(vessel, "casadi", tmp_path / "ship.casadi")
+    step, listed = ca.Function.load(str(file)), json.loads(names.read_text())
+    at = [entry["name"] for entry in listed["inputs"]["carry"]]
+    assert [entry["name"] for entry in listed["inputs"]["commands"]] == ["propeller.n", "rudder.delta"]
+    values, loads, dt, ahead = listed["defaults"]["parameters"], np.zeros(3), 10.0, 8
+    x = np.zeros(len(at))
+    x[at.index("u")] = 7.7
+    x[at.index("actual.rudder.delta")] = 0.0
+
+    def after(state, rudder):
+        return step(state, ca.vertcat(1.3, rudder), [], loads, values, dt)
+
+    for _ in range(12):
+        problem = ca.Opti()
+        orders = problem.variable(ahead)
+        state, cost = ca.MX(ca.DM(x)), 0
+        for k in range(ahead):
+            state = after(state, orders[k])
+            cost += (state[at.index("east")] - 20) ** 2 + 2e3 * orders[k] ** 2 + 1e4 * state[at.index("psi")] ** 2
+        problem.minimize(cost)
+        problem.subject_to(problem.bounded(-0.6, orders, 0.6))
+        problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 50})
+        x = np.array(after(x, problem.solve().value(orders[0]))).ravel()
+    assert abs(x[at.index("east")] - 20) < 8
+    assert abs(x[at.index("psi")]) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_do_mpc_takes_the_function(tmp_path):
+    do_mpc = pytest.importorskip("do_mpc")
+    file, names = export_vessel(load_vessel("mariner"), "casadi", tmp_path / "ship.casadi")
+    step, listed = ca.Function.load(str(file)), json.loads(names.read_text())
+    at = [entry["name"] for entry in listed["inputs"]["carry"]]
+    ship = do_mpc.model.Model("discrete", "SX")
+    x, rudder = ship.set_variable("_x", "x", (len(at), 1)), ship.set_variable("_u", "rudder")
+    ship.set_rhs("x", step(x, ca.vertcat(1.3, rudder), [], np.zeros(3), listed["defaults"]["parameters"], 10.0))
+    ship.setup()
+    controller = do_mpc.controller.MPC(ship)
+    controller.set_param(n_horizon=8, t_step=10.0, store_full_solution=False)
+    controller.settings.supress_ipopt_output()
+    cost = (x[at.index("east")] - 20) ** 2 + 1e4 * x[at.index("psi")] ** 2
+    controller.set_objective(lterm=cost, mterm=cost)
+    controller.set_rterm(rudder=2e3)
+    controller.bounds["lower", "_u", "rudder"], controller.bounds["upper", "_u", "rudder"] = -0.6, 0.6
+    controller.setup()
+    now = np.zeros((len(at), 1))
+    now[at.index("u")] = 7.7
+    controller.x0 = now
+    controller.set_initial_guess()
+    for _ in range(12):
+        order = controller.make_step(now)
+        now = np.array(step(now, ca.vertcat(1.3, order), [], np.zeros(3), listed["defaults"]["parameters"], 10.0))
+    assert abs(now[at.index("east"), 0] - 20) < 8

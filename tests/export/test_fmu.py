@@ -1,0 +1,246 @@
+"""FMUs of vessels and predictors: what a tool that imports them sees."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+
+import numpy as np
+import pytest
+
+from shipid.data.windows import Instants
+from shipid.engine.casadi import memory_along
+from shipid.engine.rollout import rollout
+from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
+from shipid.export.model import model
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.physics import Physics
+from shipid.predictor import Predictor
+from shipid.vessel.load import load_vessel
+from tests.conftest import variety
+from tests.export.compiled import FLAGS, compiler
+
+SECONDS = 60.0
+
+
+@pytest.fixture(scope="module")
+def ship(tmp_path_factory):
+    compiler()
+    file = tmp_path_factory.mktemp("fmu") / "ship.fmu"
+    assert write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), file)
+    return file
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    physics = Physics(load_vessel("mariner"), 6, 5.0, "rk4")
+    return Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 8.0)}, {}, "known")
+
+
+@pytest.fixture(scope="module")
+def aboard(predictor, tmp_path_factory):
+    compiler()
+    file = tmp_path_factory.mktemp("fmu") / "path.fmu"
+    assert write_fmu(predictor_unit(model(predictor), "path"), file)
+    return file
+
+
+def test_the_description_names_every_variable(ship):
+    with zipfile.ZipFile(ship) as archive:
+        assert {"modelDescription.xml", "sources/ship.c", "sources/ship.h"} <= set(archive.namelist())
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+        source = archive.read("sources/ship.c").decode()
+    vessel = variety()["actuators"]
+    found = {entry.get("name"): entry for entry in root.iter("ScalarVariable")}
+    assert {"port.n", "V_w", "load.X", "psi", "actual.port.alpha", "solver.step", "status"} <= set(found)
+    mass = found["inertia.m"]
+    assert mass.get("causality") == "parameter"
+    assert float(mass.find("Real").get("start")) == vessel.parameters["inertia.m"]
+    assert mass.find("Real").get("unit") == "kg"
+    assert all(entry.get("description") for entry in found.values())
+    assert root.get("guid") in source
+
+
+def test_the_sources_compile_without_a_warning(aboard, tmp_path):
+    with zipfile.ZipFile(aboard) as archive:
+        archive.extractall(tmp_path)
+    for more in ((), ("-DFMI2_FUNCTION_PREFIX=path_",)):
+        command = [compiler(), *FLAGS, *more, "-c", "path.c", "-o", "path.o"]
+        result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr[:1000]
+
+
+@pytest.mark.slow
+def test_an_importer_finds_no_fault(ship, aboard):
+    validation = pytest.importorskip("fmpy.validation")
+    for file in (ship, aboard):
+        assert validation.validate_fmu(str(file)) == []
+
+
+def start_values():
+    vessel = variety()["actuators"]
+    commands = {"port.n": 2.0, "starboard.n": 2.2, "port.alpha": 0.2, "starboard.alpha": 0.1}
+    return vessel, {"u": 4.0, "psi": 0.3}, commands, {"V_w": 6.0, "beta_w": 1.0}
+
+
+@pytest.mark.slow
+def test_a_minute_of_a_vessel_is_that_of_python(ship, tmp_path):
+    """As it comes, and from its sources compiled again by the importer."""
+    fmpy = pytest.importorskip("fmpy")
+    vessel, state, commands, weather = start_values()
+    mass = 1.1 * vessel.parameters["inertia.m"]
+    values = {**state, **commands, **weather, "inertia.m": mass, "solver.step": 0.1}
+    names = ("north", "east", "psi", "u", "v", "r")
+    columns = {name: np.array([state.get(name, 0.0)]) for name in names}
+    held = {name: np.array([value]) for name, value in {**commands, **weather}.items()}
+    heavy = vessel.with_values({"inertia.m": mass})
+    expected = rollout(heavy, columns, held, held, step=0.1, num_steps=600, method="rk4", engine="native", every=10)
+    again = tmp_path / "again.fmu"
+    again.write_bytes(ship.read_bytes())
+    for file in (ship, again):
+        if file == again:
+            strict = ["--all-warnings", "--warning-as-error"]
+            command = [sys.executable, "-m", "fmpy", "compile", *strict, str(again)]
+            result = subprocess.run(command, capture_output=True, text=True)
+            assert result.returncode == 0, result.stdout[-1000:] + result.stderr[-1000:]
+        for step in (1.0, 0.5):
+            found = fmpy.simulate_fmu(
+                str(file), stop_time=SECONDS, step_size=step, output_interval=step, start_values=values, output=names
+            )
+            every = round(1.0 / step)
+            for name in names:
+                np.testing.assert_allclose(found[name][::every], expected[name][:, 0, 0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_minute_of_a_predictor_is_that_of_python(aboard, predictor):
+    """The rudder follows its orders from the first row on; the plan is that orders stay."""
+    fmpy = pytest.importorskip("fmpy")
+    t = np.arange(0.0, SECONDS + 1)
+    u, delta = 6 + np.sin(t / 10), 0.2 * np.sin(t / 7)
+    signals = np.rec.fromarrays([t, u, delta, np.full_like(t, 1.2)], names="time,u,rudder.delta,propeller.n")
+    found = fmpy.simulate_fmu(
+        str(aboard), stop_time=SECONDS, step_size=1.0, output_interval=1.0, input=signals,
+        output=["x[6]", "y[6]", "x[1]", "instant", "alarm", "status"],
+    )  # fmt: skip
+    at = np.round(found["instant"]).astype(int)
+    assert len(at) > 50
+    orders = {"propeller.n": np.full(len(t), 1.2), "rudder.delta": delta}
+    along = memory_along(predictor.vessel, orders, t)
+    zero = np.zeros(len(at))
+    columns = {"u": u[at], "v": zero, "r": zero, "psi": zero, **{name: values[at] for name, values in orders.items()}}
+    planned = {name: np.tile(columns[name], (6, 1)) for name in orders}
+    hidden = {name: values[at] for name, values in along.items()}
+    expected = predictor.predict(Instants(columns, planned=planned, hidden=hidden))
+    for name, k, axis in (("x[6]", 5, 0), ("y[6]", 5, 1), ("x[1]", 0, 0)):
+        np.testing.assert_allclose(found[name], expected[k, :, axis], rtol=0, atol=1e-12)
+    assert not found["alarm"].any()
+    assert not found["status"].any()
+
+
+class Instance:
+    """One instance of an FMU through FMPy's low level, with its messages."""
+
+    def __init__(self, file, folder, name="a"):
+        fmpy = pytest.importorskip("fmpy")
+        from fmpy.fmi2 import FMU2Slave
+
+        self.description = fmpy.read_model_description(str(file))
+        self.fmu = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self.at = {v.name: v.valueReference for v in self.description.modelVariables if v.type == "Real"}
+
+    def begin(self):
+        self.fmu.instantiate()
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        return self
+
+    def set(self, **values):
+        self.fmu.setReal([self.at[name] for name in values], list(values.values()))
+
+    def get(self, *names):
+        return self.fmu.getReal([self.at[name] for name in names])
+
+
+@pytest.fixture
+def folder(ship, tmp_path):
+    with zipfile.ZipFile(ship) as archive:
+        archive.extractall(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_wrong_values_are_refused_and_the_instance_goes_on(ship, folder):
+    fmi = pytest.importorskip("fmpy.fmi1")
+    one = Instance(ship, folder).begin()
+    one.set(u=4.0)
+    for value in (np.nan, np.inf):
+        with pytest.raises(fmi.FMICallException):
+            one.set(V_w=value)
+    with pytest.raises(fmi.FMICallException):
+        one.fmu.getReal([100000])
+    one.fmu.exitInitializationMode()
+    with pytest.raises(fmi.FMICallException):
+        one.set(u=3.0)
+    for step in (np.nan, -1.0):
+        with pytest.raises(fmi.FMICallException):
+            one.fmu.doStep(0.0, step)
+    one.set(**{"load.X": 1e12})
+    with pytest.raises(fmi.FMICallException):
+        one.fmu.doStep(0.0, 1.0)
+    assert one.get("u") == [4.0]
+    one.set(**{"load.X": 0.0})
+    one.fmu.doStep(0.0, 1.0)
+    assert 3.0 < one.get("u")[0] < 4.5
+    state = one.fmu.getFMUstate()
+    bytes_ = one.fmu.serializeFMUstate(state)
+    one.fmu.doStep(1.0, 1.0)
+    after = one.get("u", "north")
+    again = one.fmu.deSerializeFMUstate(bytes_)
+    one.fmu.setFMUstate(again)
+    one.fmu.doStep(1.0, 1.0)
+    assert one.get("u", "north") == after
+    one.fmu.freeFMUstate(state)
+    one.fmu.terminate()
+    one.fmu.freeInstance()
+
+
+@pytest.mark.slow
+def test_ten_copies_do_not_know_each_other(ship, folder):
+    copies = [Instance(ship, folder, f"copy {i}").begin() for i in range(10)]
+    for i, one in enumerate(copies):
+        one.set(u=1.0 + i / 10)
+        one.fmu.exitInitializationMode()
+    for k in range(5):
+        for one in copies:
+            one.fmu.doStep(float(k), 1.0)
+    speeds = [one.get("u")[0] for one in copies]
+    assert (np.diff(speeds) > 0).all()
+    for one in copies:
+        one.fmu.terminate()
+        one.fmu.freeInstance()
+
+
+@pytest.mark.slow
+def test_ten_thousand_cycles_leave_no_memory_behind(ship, folder):
+    one = Instance(ship, folder)
+    used = []
+    for i in range(10_000):
+        one.fmu.instantiate()
+        one.fmu.setupExperiment(startTime=0.0)
+        one.fmu.enterInitializationMode()
+        one.fmu.exitInitializationMode()
+        one.fmu.doStep(0.0, 0.1)
+        one.fmu.component, component = None, one.fmu.component
+        one.fmu.fmi2FreeInstance(component)
+        if i in (1000, 9999):
+            used.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    assert used[1] - used[0] < 2000  # kB

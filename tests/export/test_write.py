@@ -1,0 +1,53 @@
+"""What a user asks for is written, or refused in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.export.write import TARGETS, export_predictor, export_vessel
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.physics import Physics
+from shipid.predictor import Predictor
+from shipid.vessel.load import load_vessel
+from tests.export.strange import drawn
+
+
+@pytest.fixture(scope="module")
+def simple():
+    return Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {})
+
+
+def test_the_folder_of_c_holds_three_files(simple, tmp_path):
+    files = simple.export("c", tmp_path / "my-ship")
+    assert {file.name for file in files} == {"my_ship.c", "my_ship.h", "main.c"}
+    assert all(file.is_file() for file in files)
+    again = simple.export("c", tmp_path / "other", name="my ship", single=True)
+    assert "typedef float my_ship_real;" in again[0].read_text()
+
+
+@pytest.mark.parametrize(
+    ("to", "out", "options", "message"),
+    [
+        ("matlab", "a", {}, "--to: no such target: valid: c, casadi, fmu, onnx"),
+        ("fmu", "a.zip", {}, "ends in .fmu"),
+        ("fmu", "a.fmu", {"single": True}, "always in double precision"),
+        ("casadi", ".", {}, "is a folder"),
+    ],
+)
+def test_a_wrong_wish_is_one_line(simple, tmp_path, to, out, options, message):
+    with pytest.raises(ShipidError, match=message) as caught:
+        export_predictor(simple, to, tmp_path / out, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_vessel_has_no_networks(tmp_path):
+    with pytest.raises(ShipidError, match="export it to c, fmu or casadi"):
+        export_vessel(load_vessel("mariner"), "onnx", tmp_path / "a.onnx")
+    assert set(TARGETS) == {"c", "fmu", "casadi", "onnx"}
+
+
+def test_a_forest_beyond_the_size_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr("shipid.export.model.MOST_NUMBERS", 10)
+    with pytest.raises(ShipidError, match=r"hold .* numbers, an export at most 10: use fewer trees"):
+        export_predictor(drawn("forest", 5, vessel="mariner").predictor, "c", tmp_path / "f")

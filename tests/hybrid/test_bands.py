@@ -1,0 +1,152 @@
+"""Bands: regions, their growth, what they refuse, and how they adapt along a run."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError, ResultError
+from shipid.hybrid.bands import (
+    LEVELS,
+    Bands,
+    Region,
+    adapted,
+    adaptive,
+    at_level,
+    factor,
+    nearest,
+    needed,
+    track,
+)
+from tests.hybrid.runs import HORIZON, made
+
+STRANGE = [made(seed) for seed in range(4)]
+
+
+def test_fewest_runs() -> None:
+    assert [needed(level) for level in (0.5, 0.8, 0.9, 0.95, 0.99)] == [3, 4, 9, 19, 99]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_higher_level_holds_all_of_a_lower_one(seed: int) -> None:
+    made_, bands = STRANGE[seed]
+    regions = [bands.region(made_.paths, made_.columns, 1.0, level) for level in (0.2, 0.505, 0.8, 0.9)]
+    for inner, outer in itertools.pairwise(regions):
+        assert (inner.along <= outer.along).all()
+        assert (inner.across <= outer.across).all()
+    apart = [region.holds(made_.errors).mean() for region in regions]
+    assert apart == sorted(apart)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_step_alone_needs_less_than_the_whole_path(seed: int) -> None:
+    made_, bands = STRANGE[seed]
+    whole = bands.region(made_.paths, made_.columns, 1.0, 0.9)
+    alone = bands.region(made_.paths, made_.columns, 1.0, 0.9, pointwise=True)
+    assert (alone.radius <= whole.radius * 1.001).mean() > 0.9
+    assert (alone.reach(made_.errors) <= 1).mean() == pytest.approx(0.9, abs=0.06)
+
+
+def test_far_from_training_bands_grow_without_bound() -> None:
+    made_, bands = STRANGE[0]
+    away = [{**made_.columns, "u": made_.columns["u"] + shift} for shift in (0.0, 1e2, 1e3, 1e4)]
+    sizes = [bands.growth(made_.paths, columns, 1.0).min() for columns in away]
+    assert sizes == sorted(sizes)
+    assert sizes[-1] > 50 * sizes[0]
+
+
+def test_too_few_runs_are_one_sentence() -> None:
+    made_, bands = STRANGE[0]
+    few = replace(bands, runs=8)
+    with pytest.raises(DataError, match=r"a band of 90 % needs 9 runs or more to calibrate it: there are 8"):
+        few.region(made_.paths, made_.columns, 1.0, 0.9)
+    few.region(made_.paths, made_.columns, 1.0, 0.85)
+    for level in (0.0, 1.0, -0.1, 90.0, float("nan")):
+        with pytest.raises(DataError, match="is no level of a band"):
+            bands.region(made_.paths, made_.columns, 1.0, level)
+    with pytest.raises(DataError, match="no run of the kind 'spiral' calibrated this band"):
+        bands.region(made_.paths, made_.columns, 1.0, 0.9, kind="spiral")
+
+
+def test_arrays_rebuild_it() -> None:
+    made_, bands = STRANGE[1]
+    again = Bands.from_arrays(bands.header(), bands.arrays())
+    for one, other in zip(_both(bands, made_), _both(again, made_), strict=True):
+        np.testing.assert_array_equal(one, other)
+    parts = {name: values for name, values in bands.arrays().items() if name != "slopes"}
+    with pytest.raises(ResultError, match="'slopes'"):
+        Bands.from_arrays(bands.header(), parts)
+
+
+def _both(bands: Bands, made_: object) -> list[np.ndarray]:
+    region = bands.region(made_.paths, made_.columns, 1.0, 0.9)  # type: ignore[attr-defined]
+    return [region.ahead, region.along, region.across]
+
+
+def test_a_region_is_an_ellipse_along_the_track() -> None:
+    course = 0.7
+    ahead = np.array([np.cos(course), np.sin(course)])
+    region = Region(np.tile(ahead, (1, 3, 1)), np.full((1, 3), 4.0), np.full((1, 3), 1.0))
+    aside = np.array([-ahead[1], ahead[0]])
+    errors = np.stack([4 * ahead, 1 * aside, 2 * aside])[None]
+    np.testing.assert_allclose(region.reach(errors)[0], [1.0, 1.0, 2.0])
+    np.testing.assert_allclose(region.radius, 2.0)
+    assert region.scaled(2.001).holds(errors).all()
+
+
+def test_tracks_are_unit_vectors_even_at_rest() -> None:
+    paths = np.random.default_rng(0).normal(size=(HORIZON, 5, 2)).cumsum(axis=0)
+    paths[:, 2] = 0.0
+    ahead = track(paths)
+    np.testing.assert_allclose(np.hypot(*np.moveaxis(ahead, -1, 0)), 1.0)
+    np.testing.assert_array_equal(ahead[:, 2], np.tile([1.0, 0.0], (HORIZON, 1)))
+
+
+def test_the_nearest_point_is_found() -> None:
+    rng = np.random.default_rng(3)
+    points, centres = rng.normal(1e4, 1.0, (40, 3)), rng.normal(1e4, 1.0, (7, 3))
+    by_hand = np.sqrt(((points[:, None] - centres) ** 2).mean(axis=2)).min(axis=1)
+    np.testing.assert_allclose(nearest(points, centres), by_hand, rtol=1e-6)
+
+
+def test_levels_between_those_of_the_table() -> None:
+    table = LEVELS**2
+    assert at_level(table, 0.9) == pytest.approx(0.81)
+    assert at_level(table, 0.905) == pytest.approx((0.81 + 0.91**2) / 2)
+    assert at_level(table, 0.005) == pytest.approx(table[0] / 2)
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.5, -0.5])
+@pytest.mark.parametrize("level", [0.5, 0.9])
+def test_an_adaptive_band_keeps_its_long_run_rate(level: float, drift: float) -> None:
+    """Scores drift away from those of calibration, with bursts: the share of misses goes to that wanted."""
+    rng, table = np.random.default_rng(5), -np.log1p(-LEVELS)  # radii of exponential scores
+    state, misses, fixed = adaptive(level, 0.02), [], []
+    for i in range(6000):
+        score = rng.exponential() * np.exp(drift * i / 6000 + (i % 500 < 50))
+        usual = float(at_level(table, level))
+        missed = score > usual * factor(state, table)
+        state = adapted(state, bool(missed))
+        misses.append(missed)
+        fixed.append(score > usual)
+    assert np.mean(misses) == pytest.approx(1 - level, abs=0.012)
+    if drift > 0:
+        assert np.mean(fixed) > 1 - level + 0.05
+
+
+def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() -> None:
+    table = -np.log1p(-LEVELS)
+    state = adaptive(0.9, 0.1)
+    assert factor(state, table) == pytest.approx(1.0)
+    factors = []
+    for _ in range(20):
+        state = adapted(state, True)
+        factors.append(factor(state, table))
+    assert factors == sorted(factors)
+    assert factors[-1] > 1e6  # it goes on where the table ends
+    for _ in range(2000):
+        state = adapted(state, False)
+    assert factor(state, table) == 0.0

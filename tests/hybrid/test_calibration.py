@@ -1,0 +1,106 @@
+"""Calibration: the share that was promised, whatever the runs are like; no unit and no order matters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.hybrid.calibration import calibrated, radii
+from tests.hybrid.runs import NAMES, made, runs
+
+AT = [49, 79, 89]  # 50, 80, 90 %
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("count", [10, 22])
+def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
+    """Mean over many draws: scores of windows that share so much within a run, of a law with a heavy tail."""
+    rng, windows, rounds = np.random.default_rng([count, int(10 * alike)]), 12, 250
+    place, held = np.repeat(np.arange(count), windows), []
+    for _ in range(rounds):
+        shared, single = rng.standard_normal((count + 20, 1)), rng.standard_normal((count + 20, windows))
+        scores = np.exp(np.sqrt(alike) * shared + np.sqrt(1 - alike) * single)
+        radius = radii(scores[:count].ravel(), place)[AT]
+        held.append([(scores[count:] <= one).mean() for one in radius])
+    np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
+    assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
+
+
+def test_one_window_a_run_is_the_order_statistic() -> None:
+    scores = np.arange(1.0, 20.0)  # 19 runs: the 18th of 19 holds a share of 18 / 20 of new ones
+    radius = radii(scores, np.arange(19))
+    assert 17.5 <= radius[89] <= 18.5
+    assert radius[94] == pytest.approx(19.0, abs=0.5)
+    assert (np.diff(radius) >= 0).all()
+
+
+def test_calibrated_bands_hold_whole_paths_of_new_runs() -> None:
+    """Scale, growth and radius together, each fitted to the same few runs: their freedom is allowed for."""
+    held = []
+    for seed in range(30):
+        drawn, bands = made(seed)
+        fresh = runs(1000 + seed, count=30)
+        regions = [bands.region(fresh.paths, fresh.columns, 1.0, level) for level in (0.5, 0.8, 0.9)]
+        held.append([region.holds(fresh.errors).mean() for region in regions])
+        assert drawn is not None
+    np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.035)
+
+
+def test_neither_order_nor_unit_matters() -> None:
+    drawn, bands = made(2)
+    size = len(drawn.run) // 22
+    places = np.random.default_rng(0).permutation(22)[:, None] * size + np.arange(size)
+    shuffled = drawn.bands(places.ravel())
+    for name in ("along", "across", "whole", "slopes"):
+        np.testing.assert_allclose(getattr(shuffled, name), getattr(bands, name), rtol=1e-6)
+    miles = drawn.bands(scale=1 / 1852)
+    here = bands.region(drawn.paths, drawn.columns, 1.0, 0.9)
+    columns = {**drawn.columns, "u": drawn.columns["u"] / 1852}
+    there = miles.region(drawn.paths / 1852, columns, 1.0, 0.9)
+    np.testing.assert_allclose(there.radius * 1852, here.radius, rtol=1e-4)
+
+
+def test_an_ellipse_is_tighter_where_errors_are_along_the_track() -> None:
+    _, bands = made(3)
+    assert bands.along[-1] > 1.5 * bands.across[-1]
+
+
+def test_kinds_have_radii_of_their_own() -> None:
+    """Zigzags whose errors are three times those of turning circles: each kind holds its share for itself."""
+    held = {"zigzag": [], "turning": []}
+    for seed in range(16):
+        drawn, fresh = runs(seed, count=30), runs(2000 + seed, count=30)
+        for one in (drawn, fresh):
+            wild = np.array([one.kinds[str(name)] == "zigzag" for name in one.run])
+            one.errors[:, wild] *= 3.0
+        bands = drawn.bands()
+        assert bands.kinds == {"turning": 15, "zigzag": 15}
+        for kind, shares in held.items():
+            mine = np.array([fresh.kinds[str(name)] == kind for name in fresh.run])
+            region = bands.region(fresh.paths, fresh.columns, 1.0, 0.9, kind=kind)
+            shares.append(region.holds(fresh.errors)[mine].mean())
+    assert min(np.mean(shares) for shares in held.values()) > 0.86
+    assert max(np.mean(shares) for shares in held.values()) < 0.96
+
+
+def test_runs_without_errors_do_not_calibrate() -> None:
+    drawn = runs(0, count=6)
+    errors = drawn.errors.copy()
+    errors[:, drawn.run != "M000"] = np.nan
+    assert calibrated(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0) is None
+    errors[:, np.isin(drawn.run, ["M001", "M002", "M003"])] = 1.0
+    bands = calibrated(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0)
+    assert bands is not None
+    assert bands.runs == 4
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-12, 1e6])
+def test_strange_errors_give_finite_bands(error: float) -> None:
+    """Nothing missed at all, a ship that never moves, columns that are constant: still numbers."""
+    drawn = runs(1, count=5)
+    still = {name: np.zeros_like(values) for name, values in drawn.columns.items()}
+    errors = np.full_like(drawn.errors, error)
+    bands = calibrated(errors, errors, drawn.run, still, NAMES, 1.0)
+    assert bands is not None
+    region = bands.region(np.zeros_like(errors), still, 1.0, 0.7)
+    assert np.isfinite(region.radius).all()

@@ -1,0 +1,100 @@
+"""Bands on manoeuvres of an identified vessel: linear measures exactly, coverage, and when there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from shipid.errors import DataError, ShipidError
+from shipid.identification.bands import bands, principal, refusal, short_horizon
+from shipid.identification.outcome import run_identification
+from shipid.identification.settings import Identify
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.identification.test_outcome import FEW, NOISE, noisy
+from tests.identification.trials import trials
+
+SHIP = load_vessel("gunnerus-28.9")
+SLOPES = np.array([0.3, -1.2, 0.5])
+
+
+def settings(**more: object) -> Identify:
+    return Identify(**{"parameters": FEW, "start": "base", "horizon": 0, "weights": NOISE, **more})
+
+
+def linear(vessel: Vessel) -> Mapping[str, float]:
+    """A measure that is linear in the factors, and one of the other sign in other units."""
+    factors = np.array([vessel.parameters[path] / SHIP.parameters[path] for path in FEW])
+    value = float(SLOPES @ factors)
+    return {"one": value, "other": 10.0 - 1000.0 * value}
+
+
+def judged(seed: int) -> tuple[Solution, Statistics]:
+    data = noisy(trials(SHIP, runs=5, steps=40), seed)
+    solution = identify(SHIP, data, data.runs, settings())
+    return solution, statistics(LinearFit.of(solution))
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Solution, Statistics]:
+    return judged(3)
+
+
+def test_of_a_linear_measure_it_is_the_propagated_covariance(found: tuple[Solution, Statistics]) -> None:
+    solution, known = found
+    rows = bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
+    best = known.covariances[known.chosen]
+    slopes = SLOPES[[FEW.index(path) for path in solution.paths]]
+    deviation = np.sqrt(slopes @ best.matrix @ slopes)
+    half = deviation * stats.t.ppf(0.9, np.median(best.freedom))
+    assert rows["deviation"]["one"] == pytest.approx(deviation, rel=1e-3)
+    assert (rows["high"]["one"] - rows["low"]["one"]) / 2 == pytest.approx(half, rel=1e-3)
+    assert rows["high"]["other"] - rows["low"]["other"] == pytest.approx(2000 * half, rel=1e-3)
+    wider = bands(SHIP, solution, known, [("all", linear)], 0.95).set_index("measure")
+    assert (wider["low"] < rows["low"]).all()
+    assert (wider["high"] > rows["high"]).all()
+
+
+def test_bands_hold_the_truth_of_simulated_trials() -> None:
+    truth, held = linear(SHIP)["one"], []
+    for seed in range(12):
+        rows = bands(SHIP, *judged(seed), [("all", linear)], 0.8)
+        held.append(float(rows["low"][0]) <= truth <= float(rows["high"][0]))
+    assert sum(held) >= 7  # 12 of 0.8: fewer than 7 has a chance of 0.4 %
+
+
+def test_axes_make_up_the_covariance() -> None:
+    root = np.random.default_rng(0).normal(size=(4, 4))
+    axes = principal(root @ root.T)
+    np.testing.assert_allclose(axes @ axes.T, root @ root.T, atol=1e-9)
+    assert principal(np.diag([1.0, 0.0, 1e-12])).shape == (3, 1)
+
+
+def test_a_manoeuvre_that_cannot_be_performed_says_why(found: tuple[Solution, Statistics]) -> None:
+    def never(_: Vessel) -> Mapping[str, float]:
+        raise ShipidError("no shaft speed gives it 9 m/s")
+
+    rows = bands(SHIP, *found, [("fast", never), ("all", linear)])
+    assert rows["note"][0] == "no shaft speed gives it 9 m/s"
+    assert np.isfinite(rows["low"][1])
+
+
+def test_short_horizons_with_coloured_residuals_are_refused(found: tuple[Solution, Statistics]) -> None:
+    solution, known = found
+    coloured = {name: replace(one, memory=4.0, probability=0.0) for name, one in known.whiteness.items()}
+    bad = replace(known, whiteness=coloured)
+    short = replace(solution, settings=settings(horizon=20.0))
+    assert refusal(solution, known, 1.0) == ""
+    assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in refusal(short, bad, 1.0)
+    assert short_horizon(replace(solution, settings=settings(horizon=50.0)), bad, 1.0) == ""
+    assert short_horizon(solution, bad, 1.0) == ""  # whole runs
+
+
+def test_a_level_that_is_none_is_said_before_the_fit() -> None:
+    with pytest.raises(DataError, match="90 is no level of a band"):
+        run_identification(SHIP, trials(SHIP, runs=2, steps=10), settings(), band=90.0)

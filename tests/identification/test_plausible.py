@@ -1,0 +1,45 @@
+"""Ranges hold for every bundled vessel, and refuse what no ship has."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipid.identification.plausible import KINDS, verdict
+from shipid.vessel.load import Vessel, load_vessel
+
+
+def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
+    assert [said for path in bundled_vessel.parameters if (said := verdict(bundled_vessel, path, {}))] == []
+
+
+@pytest.mark.parametrize(
+    ("path", "factor", "said"),
+    [
+        ("added_mass.Y_vdot", 1e-5, "added mass in sway over the mass is 7.69e-06, of ships 0.25 to 1.8"),
+        ("added_mass.Y_vdot", 0.3, "no ship has that"),
+        ("added_mass.N_rdot", 5.0, "added moment in yaw"),
+        ("inertia.I_z", 0.3, "radius of gyration"),
+        ("hull.mmg.Y_v", -1.0, "of ships below 0"),
+        ("hull.mmg.N_r", -0.5, "of ships below 0"),
+        ("thruster.rudder.gamma_R_plus", 2.4, "flow straightening is 1.54"),
+        ("thruster.rudder.a_H", 2.87, "at the end of the range of ships 0 to 0.9"),
+        ("thruster.rudder.ell_R", -1.0, "lever of the flow"),
+    ],
+)
+def test_what_no_ship_has_is_said(path: str, factor: float, said: str) -> None:
+    vessel = load_vessel("kvlcc2-l7")
+    sentence = verdict(vessel, path, {path: factor * vessel.parameters[path]})
+    assert said in sentence
+    assert sentence.startswith(path)
+    assert "\n" not in sentence
+
+
+def test_added_mass_is_judged_by_the_mass_that_was_fitted_too() -> None:
+    vessel = load_vessel("kvlcc2-l7")
+    heavier = {"inertia.m": 5 * vessel.parameters["inertia.m"]}
+    assert "added mass in sway" in verdict(vessel, "added_mass.Y_vdot", heavier)
+
+
+def test_what_has_no_range_is_not_judged() -> None:
+    assert verdict(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr", {"hull.mmg.Y_vvr": 1e6}) == ""
+    assert all(kind.low < kind.high for kind in KINDS)

@@ -1,0 +1,88 @@
+"""The section on bands: what it says and draws, from frames made by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from shipid.report import ReportContent, bands
+from shipid.report.page import render
+from shipid.report.section import drawn
+from shipid.report.sections import SECTIONS
+
+NASTY = "<b>wrong</b>"
+
+
+@pytest.fixture
+def banded(simulation: ReportContent) -> ReportContent:
+    cells = simulation.cells.assign(width=2.0 * simulation.cells.H, coverage=0.9)
+    rows = [
+        {
+            "model": str(model),
+            "family": "f",
+            "N_D": size,
+            "level": level,
+            "coverage": level - 0.05 * (model == "high-1"),
+        }
+        | {"low": level - 0.1, "high": min(level + 0.1, 1.0), "width": 1.0 + level, "end": 3.0, "lengths": 0.1}
+        | {"runs": 20, "seeds": 2}
+        for model in pd.unique(cells.model)
+        for size in (10, 30, 100)
+        for level in (0.5, 0.8, 0.9)
+    ]
+    groups = [
+        {"model": "nominal", "by": by, "group": group, "coverage": share, "low": 0.5, "high": 0.95, "width": 1.0}
+        | {"runs": 5, "note": note}
+        for by, group, share, note in [
+            ("kind", NASTY, 0.6, "2 runs of this kind calibrated the band: too few"),
+            ("speed", "1 to 2 m/s", 0.9, ""),
+            ("ahead", "5 s", 0.99, ""),
+        ]
+    ]
+    worst = [{"model": "nominal", "run": "M003", "kind": "turning", "coverage": 0.1, "reach": 3.0}]
+    refused = [{"model": "none", "N_D": 10, "reason": "a band of 90 % needs 9 runs or more"}]
+    frames = {"coverage": pd.DataFrame(rows), "coverage_groups": pd.DataFrame(groups)}
+    frames |= {"coverage_runs": pd.DataFrame(worst), "no_band": pd.DataFrame(refused)}
+    return replace(simulation, cells=cells, frames=frames)
+
+
+def test_it_says_what_was_held(banded: ReportContent) -> None:
+    figure = bands.coverage(banded)
+    assert figure is not None
+    assert "bands of 90 % hold 89 % of the test paths" in figure.takeaway
+    assert len(figure.views) == 3
+    groups = bands.groups(banded)
+    assert groups is not None
+    assert NASTY in groups.takeaway
+    assert "60 %" in groups.takeaway
+    table = bands.table(banded)
+    assert table is not None
+    assert "needs 9 runs" in table.takeaway
+    worst = bands.worst(banded)
+    assert worst is not None
+    assert worst.rows[0][0].text == "M003"
+
+
+def test_the_map_of_the_width(banded: ReportContent) -> None:
+    figure = bands.width_map(banded)
+    assert figure is not None
+    least, most = banded.cells.groupby(["model", "N_D"]).width.mean().agg(["min", "max"])
+    assert figure.scale is not None
+    assert (figure.scale.low, figure.scale.high) == (pytest.approx(least), pytest.approx(most))
+
+
+def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
+    only = {"how-far-off": SECTIONS["how-far-off"]}
+    page = render(replace(banded, snapshots=[], answer=[], findings=[]))
+    assert "How far off it may be" in page
+    assert NASTY not in page
+    (section,) = drawn(only, banded)
+    assert [item.id for item in section.items] == list(bands.SECTION.anchors)
+
+
+def test_without_bands_nothing_is_drawn(simulation: ReportContent) -> None:
+    assert bands.coverage(simulation) is None
+    assert bands.width_map(simulation) is None
+    assert drawn({"how-far-off": SECTIONS["how-far-off"]}, simulation) == []

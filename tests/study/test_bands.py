@@ -1,0 +1,185 @@
+"""Bands of a study: what its cells keep, what the frames say, refits, and a log with a band."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binomtest
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.errors import DataError
+from shipid.hybrid.bands import LEVELS, Bands
+from shipid.predictor import Predictor
+from shipid.study import bands, store
+from shipid.study.apply import Band, along_run
+from shipid.study.compare import compare_bands
+from shipid.study.plan import read_plan
+from shipid.study.results import Results, border, read_results
+from tests.study.tiny import run_here, tiny_plan
+
+LEVEL = 0.8  # the tiny study has 6 runs at most
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("bands")
+    run_here(tiny_plan(made, {"bands.level": LEVEL}), made / "run")
+    return made / "run"
+
+
+@pytest.fixture(scope="module")
+def results(folder: Path) -> Results:
+    return read_results(folder)
+
+
+@pytest.mark.parametrize(("inside", "count"), [(0, 7), (3, 7), (7, 7), (18, 20)])
+def test_one_window_a_run_has_the_exact_interval(inside: int, count: int) -> None:
+    held, run = np.arange(count) < inside, np.arange(count)
+    exact = binomtest(inside, count).proportion_ci(method="exact")
+    np.testing.assert_allclose(bands.share_interval(held, run), (exact.low, exact.high), atol=1e-9)
+
+
+def test_windows_that_are_alike_count_once() -> None:
+    """Whole runs inside or outside: a hundred windows of each are worth no more than one."""
+    once = np.arange(10) < 8
+    low, high = bands.share_interval(np.repeat(once, 100), np.repeat(np.arange(10), 100))
+    np.testing.assert_allclose((low, high), bands.share_interval(once, np.arange(10)), atol=0.02)
+    rng = np.random.default_rng(0)
+    apart = bands.share_interval(rng.random(1000) < 0.8, np.repeat(np.arange(10), 100))
+    assert apart[1] - apart[0] < 0.5 * (high - low)
+
+
+def test_intervals_cover_shares_of_few_runs() -> None:
+    rng, run, covered = np.random.default_rng(1), np.repeat(np.arange(20), 10), 0
+    for _ in range(300):
+        chance = rng.beta(4, 1, 20)  # of each run; 0.8 in the mean
+        low, high = bands.share_interval(rng.random(200) < chance[run], run)
+        covered += low <= 0.8 <= high
+    assert covered / 300 > 0.92
+
+
+def test_cells_keep_coverage_and_width(results: Results) -> None:
+    for row in results.rows:
+        kept = results.bands.get(row["cell"])
+        if kept is None or not kept.promises(LEVEL):
+            assert np.isnan(row["coverage"])
+            assert results.no_band[row["cell"]]
+        else:
+            region = kept.region(results.paths[row["cell"]], results.test.columns, results.test.step, LEVEL)
+            errors = results.test.future - results.paths[row["cell"]]
+            assert row["coverage"] == pytest.approx(region.holds(errors).mean())
+            assert row["width"] == pytest.approx(region.radius.mean())
+    assert results.cells["width"].notna().any()
+
+
+def test_frames_agree_with_the_cells(results: Results) -> None:
+    frame = bands.coverage_frame(results)
+    top = frame[frame["level"].eq(LEVEL)].set_index(["model", "N_D"])
+    known = results.cells[results.cells["width"].notna()].groupby(["model", "N_D"])[["coverage", "width"]].mean()
+    for key, row in known.iterrows():
+        assert top.loc[key, "coverage"] == pytest.approx(row["coverage"])
+        assert top.loc[key, "width"] == pytest.approx(row["width"])
+        assert top.loc[key, "low"] <= row["coverage"] <= top.loc[key, "high"]
+    width = frame.pivot_table(index=["model", "N_D"], columns="level", values="width")
+    assert (np.diff(width.to_numpy(), axis=1)[~np.isnan(np.diff(width.to_numpy(), axis=1))] >= 0).all()
+    groups, worst = bands.groups_frame(results), bands.worst_frame(results)
+    assert set(groups["by"]) == {"kind", "ahead", "speed"}
+    assert (groups["low"] <= groups["coverage"] + 1e-9).all()
+    assert set(worst["run"]) == set(results.test.spans)
+    assert bands.answer(results)[0][0].startswith("Bands of 80% held ")
+
+
+def test_too_few_runs_are_said(tiny_run: Path) -> None:
+    results = read_results(tiny_run)  # 0.9 of 6 runs
+    assert results.cells["coverage"].isna().all()
+    assert "needs 9 runs or more" in bands.answer(results)[0][0]
+    assert compare_bands([results, results]).empty
+
+
+def test_compare_has_coverage_and_width(results: Results) -> None:
+    frame = compare_bands([results, results])
+    assert (frame["worlds"] == 2).all()
+    assert frame["width"].notna().all()
+
+
+def test_an_outline_goes_round_the_path(results: Results) -> None:
+    cell, kept = next((cell, kept) for cell, kept in results.bands.items() if kept.promises(LEVEL))
+    paths = results.paths[cell]
+    region = kept.region(paths, results.test.columns, results.test.step, LEVEL)
+    outline = border(region, paths, 0)
+    np.testing.assert_array_equal(outline[0], outline[-1])
+    last = outline[1 + len(paths) : 1 + len(paths) + 13] - paths[-1, 0]
+    apart = region.reach(np.tile(last[:, None], (1, 1, 1))[None, 0].repeat(len(paths), 0)[:, :1])
+    assert apart[-1, 0] == pytest.approx(1.0)
+
+
+def test_predict_writes_the_band(folder: Path, tmp_path: Path, results: Results) -> None:
+    cell = next(cell for cell, kept in results.bands.items() if kept.promises(LEVEL))
+    out, log = tmp_path / "band.csv", folder / store.DATASET
+    plain = CliRunner().invoke(app, ["predict", str(folder), str(log), "--cell", cell, "--out", str(out)])
+    assert plain.exit_code == 0, plain.output
+    assert "band_along" not in pd.read_csv(out)
+    asked = ["predict", str(folder), str(log), "--cell", cell, "--out", str(out), "--level", str(LEVEL)]
+    assert CliRunner().invoke(app, asked).exit_code == 0
+    frame = pd.read_csv(out)
+    assert (frame[["band_along", "band_across"]] > 0).all(axis=None)
+    assert frame["band_course"].between(0, 2 * np.pi).all()
+    assert CliRunner().invoke(app, [*asked, "--adaptive", "0.1"]).exit_code == 0
+    adaptive = pd.read_csv(out)
+    np.testing.assert_allclose(adaptive["band_along"], frame["band_along"] * adaptive["band_factor"])
+    assert adaptive["band_factor"].nunique() > 1
+    with pytest.raises(DataError, match="needs 99 runs"):
+        CliRunner().invoke(app, [*asked[:-1], "0.99"], catch_exceptions=False)
+
+
+def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
+    """A miss at instant 0 whose path ends at 5 s widens the band from 5 s on, not before."""
+    now, table = np.arange(12.0), -np.log1p(-LEVELS)
+    reach = np.where(now == 0, 2.0, 0.5)
+    factors = along_run(reach, now + 5.0, now, Band(0.9, rate=0.05), table)
+    np.testing.assert_array_equal(factors[:5], 1.0)
+    assert factors[5] > 1.0
+    assert (np.diff(factors[5:]) < 0).all()
+    later = along_run(np.where(now > 6, np.nan, reach), now + 5.0, now, Band(0.9, rate=0.05), table)
+    np.testing.assert_array_equal(later, factors)
+
+
+def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
+    """An identified family and a method trained step by step: without a band by default, with one from refits."""
+    changes = {
+        "bands": {"level": 0.7, "refits": 3},
+        "method": [
+            {"name": "alone", "kind": "alone"},
+            {"name": "steps", "kind": "one-step", "trials": 1, "families": ["wrong"]},
+        ],
+        "grid.N_D": [6],
+    }
+    file = tmp_path / "tiny.toml"
+    from tests.study.tiny import TINY
+
+    file.write_text(
+        TINY.read_text()
+        + '\n[[family]]\nname = "fitted"\nextends = "wrong"\n'
+        + '[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
+    )
+    run_here(read_plan(file, changes), tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    assert set(results.bands) == set(results.paths)
+    assert {kept.runs for kept in results.bands.values()} == {6}
+    run_here(read_plan(file, {**changes, "bands": {"level": 0.7}}), tmp_path / "without")
+    plain = read_results(tmp_path / "without")
+    lost = set(results.bands) - set(plain.bands)
+    assert {(cell.partition("-")[0], cell.partition("+")[2].partition("-")[0]) for cell in lost} == {
+        ("fitted", "alone"),
+        ("wrong", "steps"),
+    }
+    assert all("refits" in plain.no_band[cell] for cell in lost)
+    for cell, kept in plain.bands.items():
+        same: Bands = results.bands[cell]
+        np.testing.assert_array_equal(same.whole, kept.whole)
+    stored = Predictor.load(store.cell_file(tmp_path / "run", next(iter(lost))))
+    assert stored.bands is not None

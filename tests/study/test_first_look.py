@@ -1,0 +1,73 @@
+"""A vessel against its log: a planted mistake is found, named and explained; a true vessel is left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.simulation.manoeuvre import TurningCircle, Zigzag
+from shipid.simulation.perform import perform
+from shipid.study.first_look import GROUPS, Look, _members, first_look, steady_speed
+from shipid.vessel.load import Vessel, load_vessel
+
+SHIP, RPM = "kvlcc2-l7", 627.0
+D_P, RUDDER = "thruster.propeller.D_p", "thruster.rudder.A_R"
+
+
+@pytest.fixture(scope="module")
+def log() -> Dataset:
+    """Zigzags and circles of the model, without noise."""
+    how = {"n_rpm": RPM, "duration": 90.0, "execute_at": 20.0}
+    kinds = [Zigzag(name=f"zz {angle}", angle_deg=angle, **how) for angle in (10, 20)]
+    kinds += [TurningCircle(name=f"circle {side}", angle_deg=25, side=side, **how) for side in ("port", "starboard")]
+    frame = perform(load_vessel(SHIP), kinds, step=0.1, interval=1.0)
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    return Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+
+
+def look(vessel: Vessel, log: Dataset) -> Look:
+    return first_look(vessel, log, log.runs, ahead=16.0, step=1.0)
+
+
+def test_the_vessel_that_made_the_log_is_left_alone(log: Dataset) -> None:
+    found = look(load_vessel(SHIP), log)
+    assert not found.changes
+    assert not found.facts
+    assert not found.wrong
+    assert found.patch(SHIP) == ""
+    assert found.alone < 0.05 * found.constant
+    assert "agree" in found.sentence
+
+
+def test_a_screw_too_large_is_said_and_explained(log: Dataset) -> None:
+    """Twice the thrust: the speed tells at once, and a smaller screw explains it."""
+    truth = load_vessel(SHIP)
+    found = look(truth.with_values({D_P: 1.4 * truth.parameters[D_P]}), log)
+    assert any("at 627 rpm the log runs" in fact for fact in found.facts)
+    assert found.changes[0].group.name in ("size of the screw", "resistance")
+    assert found.values.get(D_P, 0.0) == pytest.approx(truth.parameters[D_P], rel=0.1)
+    assert found.corrected < 0.3 * found.alone
+    assert "would explain most of it" in found.sentence
+    assert "\n" not in found.sentence
+
+
+def test_a_rudder_of_the_other_sign_is_said(log: Dataset) -> None:
+    mirrored = Dataset(log.frame.assign(**{"rudder.delta": -log.frame["rudder.delta"]}), log.metadata)
+    found = look(load_vessel(SHIP), mirrored)
+    assert any("turns the other way" in fact for fact in found.facts)
+    assert found.wrong
+
+
+def test_steady_speed_is_that_of_the_published_approach() -> None:
+    vessel, orders = load_vessel(SHIP), {"propeller.n": RPM / 60, "rudder.delta": 0.0}
+    assert steady_speed(vessel, orders) == pytest.approx(1.179, rel=0.02)
+    assert steady_speed(vessel, orders | {"propeller.n": 0.0}) == 0.0
+
+
+def test_groups_share_no_number() -> None:
+    """A number that two groups scaled would be counted twice."""
+    for name in ("gunnerus-33.9-template", SHIP, "mariner", "gunnerus-28.9"):
+        paths = [path for group in GROUPS for path in _members(load_vessel(name), group)]
+        assert len(paths) == len(set(paths)) > 3, name
+    assert np.all([group.low < 1 < group.high for group in GROUPS])

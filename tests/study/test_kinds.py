@@ -1,0 +1,53 @@
+"""Kinds of runs: names that people give win; orders and motion say the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
+from shipid.study.kinds import seen_kind
+from shipid.study.survey import kinds_of, typical_runs
+from tests.study.tiny import logged
+
+T = np.arange(0.0, 200.0)
+
+
+def rows(helm: np.ndarray, n: np.ndarray | float = 2.0, u: np.ndarray | float = 4.0) -> pd.DataFrame:
+    """A ship whose yaw rate follows the helm of both azimuth units."""
+    r = -0.05 * helm
+    columns = {"psi": np.cumsum(r), "r": r, "u": u, "port.n": n, "starboard.n": n}
+    return logged({"x": columns | {"port.alpha": helm, "starboard.alpha": helm}}, T).frame
+
+
+def steps(levels: list[float]) -> np.ndarray:
+    return np.repeat(np.radians(levels), len(T) // len(levels))
+
+
+def test_random_helm_is_no_zigzag() -> None:
+    assert seen_kind(rows(steps([20, -5, 12, -18, 3, -9, 15, -20])), 4.0, 2.0) == RANDOM
+    assert seen_kind(rows(steps([10, -10, 10, -10, 10, -10, 10, -10])), 4.0, 2.0) == "zigzag"
+
+
+def test_a_stopped_shaft_at_speed_is_coasting_and_a_slow_ship_manoeuvres() -> None:
+    helm = np.zeros(len(T))
+    assert seen_kind(rows(helm, n=0.0, u=np.linspace(4, 1, len(T))), 4.0, 2.0) == COASTING
+    assert seen_kind(rows(steps([20, -5, 12, -18]), u=0.4), 4.0, 2.0) == LOW_SPEED
+
+
+def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:
+    helm = steps([10, -10, 10, -10, 10, -10, 10, -10])
+    columns = {"psi": np.cumsum(-0.05 * helm), "r": -0.05 * helm, "u": 4.0, "port.n": 2.0, "port.alpha": helm}
+    runs = {"ZZ 1": columns, "berthing 1": columns, "run 3": columns}
+    said = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
+    assert kinds_of(said) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
+
+
+def test_every_kind_reaches_the_test() -> None:
+    kinds = ["zigzag"] * 4 + [RANDOM] * 4 + [COASTING] * 3 + ["stop"]
+    frame = pd.DataFrame(
+        {"kind": kinds, "duration": np.arange(12.0) + 100, "speed": 4.0, "rate": 0.02, "helm": 0.2}
+        | {"whole": True, "sound": True},
+        index=[f"run {number}" for number in range(12)],
+    )
+    assert set(frame.loc[typical_runs(frame), "kind"]) == {"zigzag", RANDOM, COASTING}

@@ -1,0 +1,65 @@
+"""Regressions against published ships and screws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.vessel.regressions import (
+    correlation_allowance,
+    form_factor,
+    friction,
+    thrust_coefficient,
+    thrust_polynomial,
+    wave_resistance,
+    wetted_surface,
+)
+
+KVLCC2 = (320.0, 58.0, 20.8, 0.81)
+KCS = (230.0, 32.2, 10.8, 0.651)
+
+
+def test_friction_is_the_ittc_line() -> None:
+    """Re 7.2e6: the 7 m model of KVLCC2, see models/kvlcc2-l7.toml; Re 1e9: 1.53e-3 (ITTC 1957, table)."""
+    assert friction(1.0, 1e9, 1.0) == pytest.approx(1.53e-3, rel=0.005)
+    assert friction(1.0, 1e7, 1.0) == pytest.approx(3.0e-3, rel=0.005)
+
+
+def test_surface_and_form_of_published_ships() -> None:
+    """SIMMAN: 27,194 m^2 of KVLCC2, 9,539 m^2 of KCS; k of KVLCC2 about 0.2 to 0.3, of KCS 0.1."""
+    assert wetted_surface(*KVLCC2) == pytest.approx(27194, rel=0.05)
+    assert wetted_surface(*KCS) == pytest.approx(9539, rel=0.05)
+    assert 0.15 < form_factor(*KVLCC2) < 0.35
+    assert 0.05 < form_factor(*KCS) < 0.15
+
+
+def test_waves_matter_for_a_fast_ship_alone() -> None:
+    """Over dynamic pressure and surface: KCS at 24 kn has about 1e-3, a tanker at 15.5 kn hardly any."""
+
+    def C_W(sizes: tuple[float, float, float, float], speed: float) -> float:
+        L, B, T, C_b = sizes
+        weight = 9.81 * C_b * L * B * T
+        return wave_resistance(*sizes, speed) * weight / (0.5 * speed**2 * wetted_surface(*sizes))
+
+    assert C_W(KVLCC2, 7.97) < 2e-4
+    assert 3e-4 < C_W(KCS, 12.35) < 2e-3
+    rising = [wave_resistance(*KCS, speed) for speed in (6.0, 8.0, 10.0, 12.0, 14.0)]
+    assert np.all(np.diff(rising) > 0)
+
+
+def test_allowance_falls_with_length() -> None:
+    assert 0 < correlation_allowance(320.0) < correlation_allowance(100.0) < 1e-3
+
+
+def test_the_series_is_near_the_screw_of_kvlcc2() -> None:
+    """P / D = 0.721: K_T = 0.2931 - 0.2753 J - 0.1385 J^2 (Yasukawa and Yoshimura 2015), another area ratio."""
+    J = np.linspace(0, 0.6, 7)
+    assert thrust_coefficient(J, 0.721) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.025)
+
+
+@pytest.mark.parametrize("pitch", [0.4, 0.8, 1.0, 1.2, 1.5])
+def test_a_parabola_holds_the_series_where_it_pushes(pitch: float) -> None:
+    J = np.linspace(0, 0.9 * pitch, 20)
+    k_0, k_1, k_2 = thrust_polynomial(pitch)
+    assert k_0 + k_1 * J + k_2 * J**2 == pytest.approx(thrust_coefficient(J, pitch), abs=0.015)
+    assert k_0 > 0 > k_1
