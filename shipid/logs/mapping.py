@@ -339,7 +339,8 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             raise DocumentError(message, file=file, path=f"{path}.interpolation")
     for name, entry in mapping.file.items():
         _factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
-    clocks = {"clock": mapping.clock, **{f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}}
+    clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
+    clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
         if clock.date is not None and clock.unit != "date":
             message = f"a column of dates beside a clock in {clock.unit!r}: write unit = 'date'"
