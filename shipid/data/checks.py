@@ -19,6 +19,7 @@ CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
 STRETCH, WINDOW = 30.0, 10.0  # s
 SURE = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
+EXACT = 1e-4  # of a change: a smaller misfit is none
 DELAY, DELAYS, EXPLAINED = 0.3, 3.0, 0.35  # s: least delay reported, longest tried; share of the misfit it explains
 
 
@@ -172,7 +173,7 @@ def _late(
     usual = max(steps)
     longest = max(DELAYS, 3 * usual)
     delays = np.arange(-longest, longest + usual / 4, max(usual / 2, longest / 24))
-    misfit, noise, count = np.zeros(len(delays)), 0.0, 0
+    misfit, noise, size, count = np.zeros(len(delays)), 0.0, 0.0, 0
     for rows in stretches:
         t = rows["t"].to_numpy()
         width = WINDOW if t[-1] - t[0] > 4 * WINDOW else (t[-1] - t[0]) / 6
@@ -186,13 +187,14 @@ def _late(
             misfit[index] += float(np.sum(np.abs(change - ran) ** 2))
         sigma = np.hypot(noise_of(values.real), noise_of(values.imag))
         noise += 2 * sigma**2 * len(first)
+        size += float(np.sum(np.abs(change) ** 2))
         count += len(first)
     if count < 6:
         return
     best, none = int(np.argmin(misfit)), int(np.argmin(np.abs(delays)))
     explained = 1.0 - misfit[best] / misfit[none] if misfit[none] > 0 else 0.0
-    # without a delay both misfits are noise, and differ by its scatter alone
-    chance = SURE * noise * np.sqrt(2 / count)
+    # without a delay both misfits are noise, of the log or of its digits, and differ by its scatter alone
+    chance = SURE * noise * np.sqrt(2 / count) + EXACT**2 * size
     real = misfit[none] - misfit[best] > chance and misfit[none] > 2 * noise and explained > EXPLAINED
     delay = float(delays[best]) if real else 0.0
     late, other = (what, against) if delay >= 0 else (against, what)

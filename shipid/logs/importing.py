@@ -28,7 +28,7 @@ from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.admit import check_log
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
-from shipid.logs.readers import Format, Progress, TextFormat, read_table, require_file, seconds
+from shipid.logs.readers import Format, Progress, TextFormat, dated, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command
 
@@ -189,6 +189,7 @@ def _added(parts: list[Records]) -> Records:
 def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> tuple[pd.DataFrame, Records, int]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
     here = {column.source for column in mapping.columns.values() if not column.file}
+    here |= {mapping.clock.date} if mapping.clock.date is not None else set()
     log = read_table(file, mapping.format, mapping.clock.source, here, progress)
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
     records = _passed_over(log)
@@ -240,7 +241,8 @@ def _passed_over(table: pd.DataFrame) -> Records:
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
     if clock.unit == "date":
-        t = seconds(_column(log, clock.source, file, f"{path}.from"))
+        times = _column(log, clock.source, file, f"{path}.from")
+        t = seconds(times if clock.date is None else dated(_column(log, clock.date, file, f"{path}.date"), times))
     else:
         t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
     if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():

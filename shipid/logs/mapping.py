@@ -43,7 +43,18 @@ INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
-Manoeuvre = Literal["zigzag", "turning", "speed run", "transit"]
+Manoeuvre = Literal[
+    "zigzag",
+    "turning",
+    "spiral",
+    "pull-out",
+    "stop",
+    "coasting",
+    "speed run",
+    "transit",
+    "random",
+    "manoeuvring at low speed",
+]
 
 
 class Source(Strict):
@@ -68,12 +79,14 @@ class Source(Strict):
 class Clock(Strict):
     """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
 
-    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants. With
-    `every` [s] the rows of the log are that far apart, and its column of time is only their rounded time.
+    `date` is the column of dates beside times of day, with the unit "date". With `step` [s] the rows of the dataset are
+    that far apart, and every column is interpolated at their instants. With `every` [s] the rows of the log are that
+    far apart, and its column of time is only their rounded time.
     """
 
     source: str = Field(alias="from")
     unit: str = "s"
+    date: str | None = None
     max_gap: float | None = Field(default=None, gt=0)
     step: float | None = Field(default=None, gt=0)
     every: float | None = Field(default=None, gt=0)
@@ -84,6 +97,7 @@ class FileClock(Strict):
 
     source: str = Field(alias="from")
     unit: str = "s"
+    date: str | None = None
 
 
 class File(Strict):
@@ -325,6 +339,12 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             raise DocumentError(message, file=file, path=f"{path}.interpolation")
     for name, entry in mapping.file.items():
         _factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
+    clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
+    clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
+    for path, clock in clocks.items():
+        if clock.date is not None and clock.unit != "date":
+            message = f"a column of dates beside a clock in {clock.unit!r}: write unit = 'date'"
+            raise DocumentError(message, file=file, path=f"{path}.date")
     if mapping.resamples and mapping.clock.max_gap is None:
         message = "missing: columns are interpolated at other instants, so set the longest gap"
         raise DocumentError(message, file=file, path="clock.max_gap")

@@ -149,6 +149,12 @@ def seconds(dates: pd.Series[Any]) -> Array:
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
 
 
+def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
+    """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
+    text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")
+    return text.astype(object)
+
+
 def _since_1970(moments: pd.Series[Any]) -> Array:
     since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
     return np.array(since, dtype=np.float64)
@@ -226,7 +232,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         message = f"nothing is left after {form.skip_rows} skipped lines"
         raise DataError(message, file=file, path="format.skip_rows")
     names, table = _named_columns(table, form, file)
-    table, ragged = _without_ragged(table, names, form, file)
+    table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
     table.attrs["ragged"] = ragged
     return table.reset_index(drop=True)
@@ -262,14 +268,17 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
 
 
 def _without_ragged(
-    table: pd.DataFrame, names: list[str], form: TextFormat, file: Path
+    table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
 ) -> tuple[pd.DataFrame, list[int]]:
     """Return the rows with one cell for every name, and the line numbers of the others; refuse them if so declared."""
     named = [index for index, name in enumerate(names) if name]
     beyond = [index for index in range(len(names)) if index > (named[-1] if named else 0)]
     wrong = np.zeros(len(table), dtype=bool)
+    short: dict[int, int] = {}
     for index in named[-1:]:  # a short line lacks the last cells
-        wrong |= table.iloc[:, index].isna().to_numpy()
+        empty = table.iloc[:, index].fillna("").eq("").to_numpy()
+        short = _short_lines(source, form, {int(number) for number in table.index[empty]}, index + 1)
+        wrong |= np.isin(table.index, list(short))
     for index in beyond:
         wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
     lines = [int(number) + 1 + form.skip_rows for number in table.index[wrong]]
@@ -277,8 +286,10 @@ def _without_ragged(
         message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
         raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
     if lines and form.ragged == "refuse":
-        row = table.iloc[int(np.argmax(wrong))]
-        cells = int(row.notna().to_numpy().nonzero()[0].max()) + 1
+        first = int(np.argmax(wrong))
+        row = table.iloc[first]
+        filled = row.fillna("").str.strip().ne("").to_numpy()
+        cells = short.get(int(table.index[first]), int(filled.nonzero()[0].max()) + 1)
         count = len(named) if not beyond or cells < beyond[0] else beyond[0]
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
         message = (
@@ -286,6 +297,27 @@ def _without_ragged(
         )
         raise DataError(message, file=file, path=f"line {lines[0]}")
     return (table.loc[~wrong] if lines else table), lines
+
+
+def _short_lines(source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int) -> dict[int, int]:
+    """Return number -> count of cells of the lines asked for that have fewer than `width` cells.
+
+    Lines are counted from 0 after those that are skipped. To pandas, a cell that is not there is an empty one.
+    """
+    if not asked:
+        return {}
+    short = {}
+    text = io.StringIO(source.getvalue()) if isinstance(source, io.StringIO) else source.open(encoding=form.encoding)
+    with text:
+        lines = (line for index, line in enumerate(text) if index >= form.skip_rows)
+        kept = (line for line in lines if form.comment is None or not line.startswith(form.comment))
+        for number, line in enumerate(kept):
+            if number in asked:
+                whole = re.sub(r'"[^"]*"', "", line)
+                count = len(whole.split() if form.separator == "whitespace" else whole.split(form.separator))
+                if count < width:
+                    short[number] = count
+    return short
 
 
 def _large_text(

@@ -115,9 +115,15 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
 
 def width_map(content: ReportContent) -> Figure | None:
     """Mean radius of the bands over A and N_D; None where there is no map of the error either."""
-    if "width" not in content.cells or content.cells.width.notna().sum() < 2:
+    cells, frame = content.cells, _frame(content, "coverage")
+    if "width" not in cells:
         return None
-    cells = content.cells[content.cells.width.notna()]
+    if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
+        top = frame[frame.level.eq(_judged(frame))][["model", "N_D", "width"]]
+        cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
+    cells = cells[cells.width.notna()]
+    if len(cells) < 2:
+        return None
     shown = replace(content, cells=cells.assign(H=cells.width, H_90=cells.width))
     return cells_map(
         shown,

@@ -318,7 +318,7 @@ def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float],
     words = [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
     x = axis("models by A [m]", tickvals=shown.tolist(), ticktext=words, showgrid=False)
     top = 1.03 * max(span[1] + back * deep, back * (deep + 1))
-    y = axis("H [m] of the front row", range=[0, top], tickvals=_heights(span[1]))
+    y = axis("H, front row [m]", range=[0, top], tickvals=_heights(span[1]))
     some = np.unique(np.linspace(0, deep, min(len(counts), 5)).round().astype(int))
     places = [_oblique(last + 0.55, deep - i, 0.0, back) for i in some]
     notes = [

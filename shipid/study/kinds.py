@@ -1,45 +1,24 @@
-"""What kind of run each run of a dataset is: as the log says, else by its name, else by its orders and its motion."""
+"""What kind of run a stretch is, by its orders and its motion."""
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
 from shipid.logs.segments import kind_of
 from shipid.physics.signals import is_shaft, steers
 
 Array = NDArray[np.float64]
 
-RANDOM, LOW_SPEED, COASTING = "random", "manoeuvring at low speed", "coasting"
-WORDS = {
-    "zigzag": r"zz|zig\W?zag\w*|z\W?\d+\W\d+",
-    "turning": r"tc|turn\w*|circles?",
-    LOW_SPEED: r"berth\w*|dock\w*|undock\w*|moor\w*|harbou?r\w*|low\W?speed|station\w*|dp",
-    COASTING: r"coast\w*|drift\w*|decel\w*|freewheel\w*",
-    "stop": r"stop\w*|crash\w*",
-    RANDOM: r"random\w*|rnd|rand|aprbs|prbs|multisine\w*|excitation\w*",
-    "spiral": r"spiral\w*|dieudonne|bech",
-    "pull-out": r"pull\W?out\w*",
-    "speed run": r"speed\W?runs?|speed\W?trials?|accel\w*|mile",
-    "transit": r"transits?|straight\w*|course\w*",
-}
-"""Kind -> regular expression of the words in a run's name that say it; the first kind that fits counts."""
 STOPPED, MOSTLY = 0.05, 0.6  # of the usual shaft speed; of the time
 SLOW = 0.3  # of the usual speed of the runs
 LEVELS, APART = 4, np.radians(3.0)  # levels of helm, and how far apart, from which orders count as random
 ALIKE = 0.25  # spread of the helm over its size in a zigzag
 LEAST_HELD, SHORTEST = 0.03, 3  # of the time of the run, and rows: a level
-
-
-def declared_kind(name: str) -> str | None:
-    """Kind that the name of a run says in words, as in `ZZ_10_10` or `berthing 3`; None if none."""
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).replace("_", " ").lower()
-    text = re.sub(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", " ", text)
-    return next((kind for kind, words in WORDS.items() if re.search(rf"\b(?:{words})\b", text)), None)
 
 
 def seen_kind(rows: pd.DataFrame, speed: float, shaft: float) -> str:

@@ -9,8 +9,9 @@ import pandas as pd
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, cumulative_integral, pieces
+from shipid.logs.kinds import declared_kind
 from shipid.physics.signals import is_shaft, steers
-from shipid.study.kinds import declared_kind, seen_kind
+from shipid.study.kinds import seen_kind
 
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
 

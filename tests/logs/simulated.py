@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.engine.rollout import rollout
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.evidence import windows
 from shipid.vessel.load import load_vessel
 
 KNOT = 1852 / 3600
@@ -69,3 +71,17 @@ def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
             "rudder": -np.degrees(frame["alpha"]),  # > 0 to starboard
         }
     )
+
+
+def state_of(columns: dict[str, np.ndarray], t: np.ndarray) -> State:
+    """Return the start of a guess of columns (N,) at instants t (N,) [s]."""
+    return State(t, "s", columns, windows(t))
+
+
+def state_with_pose(columns: dict[str, np.ndarray]) -> State:
+    """Return a guess of columns (N,) at the instants of `si_log()`, whose position and heading are already known."""
+    log = si_log()
+    state = state_of(columns, log["t"].to_numpy())
+    state.position = np.asarray(log["north"] + 1j * log["east"])
+    state.psi = log["psi"].to_numpy()
+    return state

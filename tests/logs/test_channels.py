@@ -240,5 +240,5 @@ class TestHsva:
         failed = checks[~checks["ok"].astype(bool)]
         assert set(failed["check"]) == {"heading rate", "heading scale", "heading error", "path"}
         counts = failed.groupby("check")["run"].nunique()
-        assert counts["heading rate"] == counts["heading scale"] == 13
+        assert counts["heading rate"] == 13  # the scale is not known where nothing correlates
         assert counts["path"] == 10  # heading stays within a few degrees in the other three

@@ -158,7 +158,11 @@ IMPORTS: dict[str, tuple[Write, str]] = {
     "control characters": (renamed("u", "\x1b[31mu\x07"), "columns.u.from"),
     "huge": (text(lambda g: g + (ROWS[-1] + "\n") * 200_000), "twice"),
     "many columns": (
-        text(lambda _: ",".join(map(str, range(1000))) + "\n" + ",".join(["1"] * 1000) + "\n2\n"),
+        text(
+            lambda _: (
+                ",".join(map(str, range(1000))) + "\n" + ",".join(["1"] * 1000) + "\n" + ",".join(["2"] * 1000) + "\n"
+            )
+        ),
         "clock.from",
     ),
 }

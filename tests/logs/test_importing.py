@@ -10,7 +10,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
 from shipid.errors import DataError
-from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of
 from tests.logs.conftest import as_log, turning
 
 Write = Callable[..., Path]
@@ -150,6 +150,55 @@ def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
     motion = turning(T)
     dataset = import_log(read_mapping(mapping), as_log(motion.assign(t=motion["t"] / 60.0), tmp_path / "log.csv"))
     assert dataset.frame["t"].iloc[[0, -1]].tolist() == [30.0, 60.0]
+
+
+@pytest.mark.parametrize(("step", "rounded"), [(0.5, 1.0), (0.02, 0.1), (0.1, 1.0)])
+def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping: Write, tmp_path: Path) -> None:
+    """The rows are `every` apart; without the key, the same log is refused, for its times stand twice."""
+    t = 30.0 + step * np.arange(400)
+    motion = turning(t)
+    log = as_log(motion.assign(t=np.round(np.floor(t / rounded + 1e-9) * rounded, 6)), tmp_path / "log.csv")
+    with pytest.raises(DataError, match="appears twice"):
+        import_log(read_mapping(plain_mapping()), log)
+    mapping = plain_mapping("", ('from = "time"', f'from = "time"\nevery = {step}'))
+    found = import_log(read_mapping(mapping), log).frame["t"].to_numpy()
+    np.testing.assert_allclose(np.diff(found), step, rtol=1e-9)
+    np.testing.assert_allclose(found, t, atol=rounded)
+
+
+def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
+    t = np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(300.0, 320.0, 0.1)])
+    even, pauses = even_clock(np.floor(t + 1e-9), 0.1)
+    assert pauses == 1
+    np.testing.assert_allclose(even, t, atol=1.0)
+    np.testing.assert_allclose(np.delete(np.diff(even), 199), 0.1)
+
+
+def test_a_clock_of_another_rate_is_refused() -> None:
+    t = np.floor(np.arange(0.0, 60.0, 0.1) + 1e-9)
+    with pytest.raises(DataError, match=r"log\.csv: row \d+, clock\.every: the time is .* from rows every 0\.2 s"):
+        evenly(t, 0.2, Path("log.csv"))
+
+
+def test_the_rounding_of_a_clock_grows_with_its_numbers() -> None:
+    """Of numbers with three digits, 9.99 is known to 0.01, and 99.9 to 0.1."""
+    t = np.arange(1.0, 99.0, 0.05)
+    rounding = rounding_of(np.array([float(f"{value:.3g}") for value in t]))
+    np.testing.assert_allclose(rounding[[0, -1]], [0.05, 0.1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_angles_are_unwrapped_as_numpy_does(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turns = np.cumsum(random.normal(0.0, 1.5, 500))
+    for values in (
+        turns % (2 * np.pi),
+        np.angle(np.exp(1j * turns)),
+        np.pi * random.integers(-3, 4, 500).astype(float),
+    ):
+        expected = np.unwrap(values)
+        _unwrap(values)
+        np.testing.assert_allclose(values, expected, atol=1e-9)
 
 
 def test_wind_from_becomes_towards(plain_mapping: Write, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """One motion, written in every format a log may have, comes back as the same dataset."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import pytest
 from scipy.io import savemat
 
 from shipid.errors import DataError, DocumentError
+from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.readers import TextFormat, read_table, require_file, seconds
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]
@@ -85,6 +88,106 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
     mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
     frame = import_log(read_mapping(mapping), tmp_path / "log").frame
     np.testing.assert_allclose(frame["t"] - 1666857600.0, T, atol=1e-5)  # date -u -d 2022-10-27T08:00 +%s
+
+
+@pytest.mark.parametrize(
+    ("style", "unix"),
+    [
+        ("%d.%m.%Y %H:%M:%S.%f", True),
+        ("%Y/%m/%d %H:%M:%S.%f", True),
+        ("%Y-%m-%d %H:%M:%S.%f", True),
+        ("%H:%M:%S.%f", False),
+    ],
+)
+def test_dates_as_they_are_written(style: str, unix: bool) -> None:
+    """From a minute before midnight; a time of day goes on after it."""
+    moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
+    found = seconds(pd.Series(moments.strftime(style)))
+    np.testing.assert_allclose(found, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+
+
+def test_what_is_no_date_is_not_a_number() -> None:
+    found = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
+    np.testing.assert_array_equal(found, [1666857600.0, np.nan, 1666857601.0])
+
+
+@pytest.mark.parametrize(("day", "time"), [("%d.%m.%Y", "%H:%M:%S.%f"), ("%Y-%m-%d", "%H:%M:%S,%f")])
+def test_date_and_time_in_two_columns(day: str, time: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(log["time"], "s")
+    split = log.assign(time=moments.dt.strftime(time), day=moments.dt.strftime(day))
+    split.to_csv(tmp_path / "log", sep=";", index=False)
+    clock = 'from = "time"\nunit = "date"\ndate = "day"'
+    mapping = mapping_with(tmp_path, 'separator = ";"', ('from = "time"', clock))
+    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
+    np.testing.assert_allclose(frame["t"] - 1666828770.0, T, atol=1e-5)
+    mapping.write_text(mapping.read_text().replace('unit = "date"\n', ""))
+    with pytest.raises(DocumentError, match=r"clock\.date: .*write unit = 'date'"):
+        read_mapping(mapping)
+
+
+LARGE_TEXTS: dict[str, tuple[TextFormat, str]] = {
+    "commas": (TextFormat(), "a,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+    "decimal commas": (TextFormat(separator=";", decimal=","), "a;b;c\n0,5;1;x\n1,5;;y\n2,5;3;z\n"),
+    "no header": (TextFormat(names=("a", "b", "c")), "0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+    "lines above": (TextFormat(skip_rows=2), "ship\nday\na,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+    "utf-16": (TextFormat(encoding="utf-16"), "a,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+}
+
+
+@pytest.mark.parametrize("name", LARGE_TEXTS)
+def test_a_large_text_is_read_by_blocks_as_a_small_one(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    form, text = LARGE_TEXTS[name]
+    file = tmp_path / "log.csv"
+    file.write_text(text, encoding=form.encoding)
+    small = read_table(file, form, "a")
+    monkeypatch.setattr(readers, "LARGE", 1)
+    shares: list[float] = []
+    large = read_table(file, form, "a", ("b", "c"), shares.append)
+    assert [str(column) for column in large] == ["a", "b", "c"]
+    assert large["a"].to_numpy().tolist() == [0.5, 1.5, 2.5]
+    np.testing.assert_array_equal(large["b"].to_numpy(dtype=float), [1.0, np.nan, 3.0])
+    assert large["c"].tolist() == small["c"].tolist()
+    assert shares
+    assert max(shares) <= 1.0
+    assert list(read_table(file, form, "a", ("b",))) == ["a", "b"]
+
+
+@pytest.mark.parametrize("bad", ["2.5,oops,z", "2.5,3"], ids=["a word", "a short line"])
+def test_what_blocks_cannot_read_is_left_to_the_thorough_way(
+    bad: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of a large text names the same place as that of a small one."""
+    file = as_log(turning(T), tmp_path / "log.csv")
+    file.write_text(file.read_text() + ("60.0,1,2,3,4,5,oops,7\n" if "oops" in bad else "60.0,1,2\n"))
+    messages = []
+    for large in (readers.LARGE, 1):
+        monkeypatch.setattr(readers, "LARGE", large)
+        with pytest.raises(DataError) as error:
+            import_log(read_mapping(mapping_with(tmp_path, "")), file)
+        messages.append(str(error.value))
+    assert messages[0] == messages[1]
+    assert "row 121" in messages[0] or "line 122" in messages[0]
+
+
+def test_a_device_and_a_folder_are_no_logs(tmp_path: Path) -> None:
+    for path, said in ((Path("/dev/zero"), "a device or a pipe, not a file"), (tmp_path, "it is a folder")):
+        with pytest.raises(DataError, match=said):
+            require_file(path)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(DataError, match="a device or a pipe"):
+        read_table(tmp_path / "pipe", TextFormat(), "time")
+
+
+def test_a_short_line_is_refused_or_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("a,b,c\n1,2,3\n2,3\n3,4,\n4,5,6\n")
+    with pytest.raises(DataError, match=r"line 3: 2 cells, where the header has 3: .*ragged = 'drop'"):
+        read_table(file, TextFormat(), "a")
+    table = read_table(file, TextFormat(ragged="drop"), "a")
+    assert table["a"].tolist() == ["1", "3", "4"]  # an empty cell is none that is missing
+    assert table.attrs["ragged"] == [3]
 
 
 @pytest.mark.parametrize(("kind", "remedy"), [("parquet", "not a Parquet file"), ("mat", "not a MATLAB file")])

@@ -238,6 +238,12 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
         provenance={"shipid": "0.1.0", "study digest": "09f6a2c1d4e5b7a8", "seed": "0", "wall time": "2 h 10 min"},
         study_document='question = "How much?"\n\n[recipe]\ntrials = 50 # a < b & c\n',
         command="shipid study run simulation",
+        frames={
+            "kinds": pd.DataFrame(
+                {"kind": "turning", "runs": 4, "model": models[0].name, "source": ["physics", "cooperative"]}
+                | {"N_D": [0, sizes[-1]], "mean": [2.0, 0.8], "end": [4.0, 1.6]}
+            )
+        },
     )
 
 

@@ -110,7 +110,7 @@ def test_bars_stand_as_high_as_the_error(failing):
 
 def test_sides_of_the_bars_have_units(simulation):
     layout = error_map(simulation).views["1"][0].figure.layout
-    assert (layout.xaxis.title.text, layout.yaxis.title.text) == ("models by A [m]", "H [m] of the front row")
+    assert (layout.xaxis.title.text, layout.yaxis.title.text) == ("models by A [m]", "H, front row [m]")
     assert layout.yaxis.range[0] == 0
     assert {note.text for note in layout.annotations} == {"N_D = 10", "N_D = 30", "N_D = 100"}
 

@@ -1,11 +1,17 @@
 import json
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from shipid.report.paths import browser, fixed_data, snapshots, window_data, windows_of
+from shipid.report import paths
+from shipid.report.paths import browser, fixed_data, windows_of
+from shipid.report.selection import FEW_RUNS
 from shipid.report.wording import number
+
+window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
+snapshots = lru_cache(maxsize=2)(paths.snapshots)
 
 
 def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
@@ -44,9 +50,9 @@ def test_many_instants_are_spread_with_both_ends(full_scale):
 
 def test_many_runs_share_the_room_of_the_page(simulation):
     first = simulation.snapshots[0]
-    many = [replace(first, run=f"run-{i:02d}", t=float(t)) for i in range(30) for t in range(50)]
+    many = [replace(first, run=f"run-{i:02d}", t=float(t)) for i in range(60) for t in range(50)]
     runs = windows_of(replace(simulation, snapshots=many))
-    assert len(runs) == 12
+    assert len(runs) == FEW_RUNS
     assert sum(map(len, runs.values())) <= 600
     assert all(windows[0].t == 0 and windows[-1].t == 49 for windows in runs.values())
 

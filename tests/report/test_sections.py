@@ -5,6 +5,7 @@ import pytest
 from shipid.report import ReportContent, checks, identification, manoeuvre
 from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
+from shipid.study.contents import FRAMES
 from tests.report import test_checks, test_identification, test_manoeuvre
 
 PAGES = {
@@ -34,6 +35,6 @@ def test_a_full_study_draws_every_declared_item(simulation_drawn):
 
 
 def test_needs_are_parts_of_the_content():
-    known = {field.name for field in fields(ReportContent)}
+    known = {field.name for field in fields(ReportContent)} | set(FRAMES)
     for name, section in SECTIONS.items():
         assert set(section.needs) <= known, name

@@ -95,7 +95,9 @@ def test_an_approach_that_never_settles_or_diverges_is_told() -> None:
     gains = Controls.of(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
     with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
         steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
-    ponderous = Controls.of(SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1}))
+    ponderous = Controls.of(
+        SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1, "unusual": ["added_mass.X_udot"]})
+    )
     with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: start from rest"):
         steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
 

@@ -24,7 +24,8 @@ HULLS = ("gunnerus-28.9-6dof", "gunnerus-33.9-6dof")
 BOTH = pytest.mark.parametrize("name", HULLS)
 OF = {HEAVE: "down", ROLL: "phi", PITCH: "theta"}
 OFF = {f"thruster.{side}.off": True for side in ("port", "starboard")}
-HELD = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e12, "added_mass.N_rdot": -1e14}
+HELD: dict[str, object] = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e12, "added_mass.N_rdot": -1e14}
+HELD["unusual"] = ["added_mass.*"]
 LOW = Sea(H_s=0.1, T_p=5.0)  # linear: heading and path of a ship that no course keeper holds stay as they were
 ENGINE = "auto" if compiler() is None else "native"
 BETA_DEG = (0, 45, 90, 135, 180)

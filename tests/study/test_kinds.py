@@ -4,37 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pytest
 
-from shipid.study.kinds import COASTING, LOW_SPEED, RANDOM, declared_kind, seen_kind
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
+from shipid.study.kinds import seen_kind
 from shipid.study.survey import kinds_of, typical_runs
 from tests.study.tiny import logged
 
 T = np.arange(0.0, 200.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        ("ZZ_10_10", "zigzag"),
-        ("zigzag 3", "zigzag"),
-        ("Zig-Zag20", "zigzag"),
-        ("TC35stbd", "turning"),
-        ("turning 4", "turning"),
-        ("circle_port", "turning"),
-        ("random07", RANDOM),
-        ("Berthing3", LOW_SPEED),
-        ("low speed 2", LOW_SPEED),
-        ("docking_12", LOW_SPEED),
-        ("coastdown 1", COASTING),
-        ("crash-stop", "stop"),
-        ("run 7", None),
-        ("M001", None),
-        ("stczz", None),
-    ],
-)
-def test_names_say_the_kind(name: str, kind: str | None) -> None:
-    assert declared_kind(name) == kind
 
 
 def rows(helm: np.ndarray, n: np.ndarray | float = 2.0, u: np.ndarray | float = 4.0) -> pd.DataFrame:

@@ -18,6 +18,7 @@ AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name h
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+USUAL = np.radians(20.0)  # rudder angle of a usual turn
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -166,12 +167,21 @@ def _off_advance(state: State, values: Array, unit: str) -> float:
         return np.inf
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speed = float(np.median(np.abs(state.chosen.change(state.position)) / span))
-    rate = float(np.percentile(np.abs(state.chosen.change(state.psi).real) / span, 90))
+    rate = float(np.percentile(np.abs(state.chosen.change(state.psi).real) / span, 90)) / _hard_over(state)
     shaft = float(np.median(np.abs(values))) * to_si(unit, "propeller.n")
     if not (speed > 0 and rate > 0 and shaft > 0):
         return np.inf
     ratio = speed / shaft / (speed / rate) / ADVANCE
     return max(ratio, 1.0 / ratio)
+
+
+def _hard_over(state: State) -> float:
+    """Return the larger rudder angles over that of a usual turn, at most 1: small ones turn the ship less."""
+    for column in state.suggestions:
+        if column.name.endswith(".delta"):
+            angle = np.abs(state.columns[column.source]) * to_si(column.unit, "rudder.delta")
+            return float(np.clip(np.percentile(angle, 90) / USUAL, 0.05, 1.0))
+    return 1.0
 
 
 def likely_unit(state: State, name: str, signal: str) -> str:

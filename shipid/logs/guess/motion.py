@@ -18,6 +18,7 @@ from shipid.logs.mapping import UNITS, to_si
 CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
 LEFT, NAMED_LEFT = 0.1, 0.5  # unexplained share of the track, at most: of columns without fitting names, and with
 SAME = 0.8  # ratio of two unexplained shares, above which neither is better
+MISLED = 0.1  # unexplained share of the heading, and distance from a unit, at most: of a rate with a misleading name
 OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
 
 
@@ -295,24 +296,21 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
         return
-    candidates = []
-    for name in state.eligible("r"):
-        integrated = state.chosen.change(evidence.integral(state.t, state.columns[name]))
-        fit = evidence.fit(change, integrated)
-        unit = min(UNITS["rad/s"], key=lambda entry: abs(np.log(max(abs(fit.scale), 1e-12) / UNITS["rad/s"][entry])))
-        if fit.left < 0.5 and abs(abs(fit.scale) / UNITS["rad/s"][unit] - 1) < 0.35:
-            candidates.append((fit, name, unit))
-    candidates.sort(key=lambda entry: entry[0].left)
+    candidates = _rates(state, change, state.eligible("r"))
     called = state.all_called("r")
     named = [
         entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
     ]
+    if not state.numbered and (not candidates or (not named and candidates[0][0].left > most)):
+        # a name that says something else misleads, if the integral of its column is the heading to within little
+        others = [name for name in state.free() if np.ptp(state.columns[name]) > 0]
+        candidates = [entry for entry in _rates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED]
     if not candidates or (not named and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():
             sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
             state.find("yaw rate does not fit", (called[0],), 0.6, sentence)
         return
-    fit, name, unit = named[0] if named else candidates[0]
+    fit, name, unit, _ = named[0] if named else candidates[0]
     extra: dict[str, Any] = {}
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
     confidence = 0.99 * (1 - min(0.5, fit.left))
@@ -327,6 +325,22 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
         state.find("unit of r", (name,), confidence, f"{name!r} says {said}, but is in {unit}")
     state.suggest("r", name, unit, confidence, why, **extra)
     state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
+
+
+def _rates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:
+    """Return the columns whose integral resembles the heading, the best first: fit, name, unit, how far off the unit.
+
+    change : of the heading over the windows [rad], (W,). The distance from the unit is relative.
+    """
+    found = []
+    for name in names:
+        fit = evidence.fit(change, state.chosen.change(evidence.integral(state.t, state.columns[name])))
+        scale = max(abs(fit.scale), 1e-12)
+        unit, factor = min(UNITS["rad/s"].items(), key=lambda entry: abs(np.log(scale / entry[1])))
+        off = abs(scale / factor - 1)
+        if fit.left < 0.5 and off < 0.35:
+            found.append((fit, name, unit, off))
+    return sorted(found, key=lambda entry: entry[0].left)
 
 
 def _rate_by_name(state: State) -> None:

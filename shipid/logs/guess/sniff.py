@@ -22,6 +22,7 @@ from shipid.logs.readers import (
     READERS,
     TIME_OF_DAY,
     TextFormat,
+    dated,
     parse_text,
     read_table,
     require_file,
@@ -103,10 +104,10 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         table = read_table(file, model, "time")
     columns, words = _numbers(table, form.get("decimal", "."))
     clock, t = _clock(table, columns, file)
-    named = clock["from"]
-    notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name not in (named, ""))
+    named = {clock["from"], clock.get("date")}
+    notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name and name not in named)
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
-    kept = {name: values for name, values in columns.items() if name != named and name not in constant}
+    kept = {name: values for name, values in columns.items() if name not in named and name not in constant}
     empty = tuple(f"column {name!r} is empty" for name in constant if name)
     form.pop("ragged", None) if form.get("ragged") == "refuse" else None
     return Sniffed(form, clock, t, kept, notes + empty)
@@ -264,7 +265,13 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     called = [name for name in columns if _is_clock(name)]
     texts = [name for name in map(str, table.columns) if name not in columns and name]
     for name in sorted(texts, key=lambda name: not _is_clock(name)):
-        column = table.iloc[:, list(map(str, table.columns)).index(name)]
+        column = _called(table, name)
+        of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
+        beside = _dates(table, texts) if len(of_day) and of_day.all() else None
+        if beside is not None:
+            with_date = seconds(dated(_called(table, beside), column))
+            if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
+                return {"from": name, "unit": "date", "date": beside}, with_date
         since = seconds(column) if _is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         if not np.isfinite(since).all():
             called += [name] if _is_clock(name) else []
@@ -291,6 +298,20 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         return {"from": rising[0], "unit": unit}, np.asarray(factor * finite[rising[0]], dtype=np.float64)
     said = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {said}", file=file)
+
+
+def _called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
+    """Return the first column of this name."""
+    return table.iloc[:, list(map(str, table.columns)).index(name)]
+
+
+def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
+    """Return the first of these columns that holds a date in every row, without a time."""
+    for name in names:
+        said = _called(table, name).astype(str).str.strip()
+        if said.str.fullmatch(r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}").all():
+            return name
+    return None
 
 
 def _is_clock(name: str) -> bool:

@@ -5,29 +5,19 @@ Their rows are put one after another with a pause between, so that what one run 
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
 from shipid.errors import DataError, ShipidError
 from shipid.logs.guess.sniff import Sniffed, sniff
-from shipid.logs.guess.words import parts_of
 from shipid.logs.importing import run_of
-from shipid.logs.mapping import Manoeuvre
+from shipid.logs.kinds import declared_kind
 
 ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".parquet", ".mat", ".nmea")
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
-KIND_WORDS = {
-    "zigzag": ["zigzag", "zz", "zig", "zag", "z", "zickzack", "sikksakk", "siksak"],
-    "turning": ["turning", "tc", "turn", "circle", "circles", "drehkreis", "svingsirkel", "tcs", "tcp", "williamson"],
-    "speed run": ["speedrun", "speed", "acceleration", "deceleration"],
-    "transit": ["transit", "straight", "course"],
-}
-"""Kind of manoeuvre -> parts of the names of files that say so."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +63,7 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
         raise DataError(f"no file can be read: {first}: {skipped[first]}{more}", file=folder)
     kept = _alike(sniffed, folder, skipped)
     runs = {run_of(file, folder, pattern): file for file in kept}
-    kinds = {run: kind for run, file in runs.items() if (kind := kind_said(file.stem))}
+    kinds = {run: kind for run, file in runs.items() if (kind := declared_kind(file.stem))}
     return Source(folder, pattern, runs, skipped, kinds, _joined(list(kept.values())))
 
 
@@ -92,15 +82,6 @@ def _pattern(path: Path) -> tuple[Path, str | None]:
     ending = Counter(file.suffix for file in found).most_common(1)[0][0]
     flat = all(file.parent == path for file in found if file.suffix == ending)
     return path, f"*{ending}" if flat else f"**/*{ending}"
-
-
-def kind_said(stem: str) -> str | None:
-    """Return the kind of manoeuvre that the name of a file says; None if it says none."""
-    words = set(parts_of(stem)) | set(re.split(r"[^a-z]+", stem.lower()))
-    for kind, said in KIND_WORDS.items():
-        if kind in get_args(Manoeuvre) and words & set(said):
-            return kind
-    return None
 
 
 def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:

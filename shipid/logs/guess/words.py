@@ -153,6 +153,7 @@ _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å":
 _LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
 SYNONYMS = {"velocity": "vel", "position": "pos", "pos": "pos", "longitudinal": "long", "transversal": "trans"}
 SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
+LONGEST_WORD = 80  # letters: a longer one is not cut
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
@@ -177,13 +178,11 @@ def _vocabulary() -> frozenset[str]:
 def _cut(word: str) -> tuple[str, ...]:
     """Cut a word that is no known one into known words, such as `ruderwinkel`; return it whole where it cannot be."""
     known = _vocabulary()
-    if word in known or len(word) < 6:
+    if word in known or not 6 <= len(word) <= LONGEST_WORD:
         return (word,)
     best: dict[int, tuple[str, ...]] = {0: ()}
     for end in range(1, len(word) + 1):
-        options = [
-            (*best[start], word[start:end]) for start in range(end) if start in best and word[start:end] in known
-        ]
+        options = [(*before, word[start:end]) for start, before in best.items() if word[start:end] in known]
         if options:
             best[end] = min(options, key=len)
     return best.get(len(word), (word,))

@@ -81,6 +81,26 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
 
+@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d"])
+def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
+    moments = pd.to_datetime(1.7e9 + T, unit="s")
+    split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
+    split.insert(0, "Day", moments.strftime(day))
+    split.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": "date", "date": "Day"}
+    np.testing.assert_allclose(sniffed.t, 1.7e9 + T, atol=1e-5)
+    assert sniffed.notes == ()
+
+
+def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
+    t = np.arange(0.0, 60.0, 0.1)
+    pd.DataFrame({"time": np.floor(t + 1e-9), "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
+    np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
+
+
 def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
     counted = TABLE.rename(columns={"time": "time_s"})
     counted.insert(0, "row", range(len(T)))

@@ -10,7 +10,7 @@ from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping
-from shipid.logs.guess.sources import kind_said, read_source
+from shipid.logs.guess.sources import read_source
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import as_bridge, si_log
 
@@ -58,18 +58,3 @@ def test_a_folder_without_a_log(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("no\n")
     with pytest.raises(DataError, match=r"no file can be read: a\.csv"):
         read_source(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("stem", "kind"),
-    [
-        ("zigzag_20_20_1", "zigzag"),
-        ("ZZ10-10", "zigzag"),
-        ("TC35_2", "turning"),
-        ("Drehkreis_35_1", "turning"),
-        ("run007", None),
-        ("log", None),
-    ],
-)
-def test_a_name_says_the_kind(stem: str, kind: str | None) -> None:
-    assert kind_said(stem) == kind

@@ -1,0 +1,106 @@
+"""Commands are chosen by name; sign and unit by what they do to the ship."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.commands import choose_commands, likely_unit
+from tests.logs.simulated import si_log, state_with_pose
+
+LOG = si_log()
+T, R, ALPHA, N = (LOG[name].to_numpy() for name in ("t", "r", "alpha", "n"))
+RUDDER = -np.degrees(ALPHA)  # > 0 to starboard
+RPM = 60.0 * N
+
+
+def chosen(columns: dict[str, np.ndarray], quiet: bool = False) -> State:
+    state = state_with_pose(columns)
+    state.r = R
+    if quiet:
+        assert state.psi is not None
+        state.psi = state.r = 0.0 * state.psi
+    choose_commands(state)
+    return state
+
+
+def told(state: State) -> dict[str, tuple[str, str, int]]:
+    return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions}
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected", "found"),
+    [
+        ({"rudder": RUDDER}, {"rudder.delta": ("rudder", "deg", 1)}, set()),
+        ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"rudder": np.radians(RUDDER)}, {"rudder.delta": ("rudder", "rad", 1)}, set()),
+        ({"azimuth": -RUDDER}, {"thruster.alpha": ("azimuth", "deg", 1)}, set()),
+        ({"azimuth": RUDDER}, {"thruster.alpha": ("azimuth", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"channel a": np.sin(T), "channel b": RUDDER}, {"rudder.delta": ("channel b", "deg", 1)}, set()),
+    ],
+    ids=["starboard", "port", "rad", "azimuth", "azimuth to starboard", "no name"],
+)
+def test_what_steers(
+    columns: dict[str, np.ndarray], expected: dict[str, tuple[str, str, int]], found: set[str]
+) -> None:
+    state = chosen(columns)
+    assert told(state) == expected
+    assert {finding.kind for finding in state.findings} == found
+
+
+def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
+    (column,) = chosen({"rudder": RUDDER}, quiet=True).suggestions
+    assert column.confidence <= 0.5
+    assert "its sign is not known" in column.evidence
+
+
+def test_both_sides_are_commands_of_their_own() -> None:
+    state = chosen({"rudder_port": RUDDER, "rudder_stbd": RUDDER, "rpm_port": RPM, "rpm_stbd": RPM})
+    assert list(told(state)) == ["port.delta", "starboard.delta", "port.n", "starboard.n"] or list(told(state)) == [
+        "rudder_port.delta",
+        "rudder_starboard.delta",
+        "port.n",
+        "starboard.n",
+    ]
+
+
+def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
+    state = chosen({"rudder order": RUDDER, "rudder angle": RUDDER})
+    assert told(state)["rudder.delta"][0] == "rudder angle"
+    (finding,) = state.findings
+    assert finding.kind == "several columns for one command"
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit", "asked", "found"),
+    [
+        ("shaft speed", RPM, "rpm", False, set()),
+        ("shaft speed", N, "rev/s", False, set()),
+        ("shaft [rpm]", RPM, "rpm", False, set()),
+        ("shaft [rpm]", RPM / 60, "rev/s", False, {"unit of the shaft"}),
+        ("shaft speed [%]", RPM / 2.5, "rpm", True, set()),
+        ("shaft speed", RPM / 2.5, "rpm", True, set()),
+    ],
+    ids=["rpm", "rev/s", "said", "wrongly said", "%", "% not said"],
+)
+def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bool, found: set[str]) -> None:
+    state = chosen({"rudder": RUDDER, name: values})
+    assert told(state)["propeller.n"][:2] == (name, unit)
+    assert [question.about for question in state.questions] == [("n",)] * asked
+    assert {finding.kind for finding in state.findings} == found
+
+
+def test_small_rudder_angles_do_not_make_a_slow_shaft() -> None:
+    """A ship that turns a twentieth as fast at a twentieth of the angle has the same shaft speed, in the same unit."""
+    for share in (1.0, 0.05):
+        state = state_with_pose({"rudder [deg]": share * RUDDER, "n": N})
+        assert state.psi is not None
+        state.psi, state.r = share * state.psi, share * R
+        choose_commands(state)
+        assert told(state)["propeller.n"][:2] == ("n", "rev/s")
+
+
+def test_a_unit_is_the_one_in_the_name_or_else_the_likely_one() -> None:
+    state = state_with_pose({"rudder": RUDDER, "rudder rad": RUDDER, "delta": np.radians(RUDDER)})
+    assert [likely_unit(state, name, "delta") for name in state.columns] == ["deg", "rad", "rad"]

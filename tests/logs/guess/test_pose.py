@@ -1,0 +1,102 @@
+"""Position and heading are the columns whose track keeps to the heading, whatever they are called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.pose import choose_pose, plane
+from tests.logs.simulated import si_log, state_of
+
+LOG = si_log()
+T, NORTH, EAST, PSI = (LOG[name].to_numpy() for name in ("t", "north", "east", "psi"))
+DEG = np.degrees(PSI) % 360.0
+FILE = Path("log.csv")
+
+
+def chosen(columns: dict[str, np.ndarray]) -> State:
+    state = state_of(columns, T)
+    choose_pose(state, FILE)
+    return state
+
+
+def sources(state: State) -> dict[str, str]:
+    return {column.name: column.source for column in state.suggestions}
+
+
+def assert_motion(state: State) -> None:
+    """The position and the heading of the state are those of the ship."""
+    assert state.psi is not None
+    assert state.position is not None
+    np.testing.assert_allclose(np.exp(1j * state.psi), np.exp(1j * PSI), atol=1e-6)
+    np.testing.assert_allclose(state.position - state.position[0], NORTH + 1j * EAST - NORTH[0] - 1j * EAST[0])
+
+
+def test_named_columns_in_degrees_or_radians() -> None:
+    for values in (DEG, PSI):
+        state = chosen({"N": NORTH, "E": EAST, "heading": values})
+        assert sources(state) == {"north": "N", "east": "E", "psi": "heading"}
+        assert state.suggestions[-1].unit == ("deg" if values is DEG else "rad")
+        assert state.findings == []
+        assert_motion(state)
+
+
+def test_columns_without_names() -> None:
+    """A mirror image fits as well, which is asked; a signal that is no motion is not taken."""
+    state = chosen({"2": np.sin(T / 7), "3": DEG, "4": NORTH, "5": EAST})
+    assert sources(state) == {"north": "4", "east": "5", "psi": "3"}
+    assert [question.about for question in state.questions] == [("psi", "north", "east")]
+    assert_motion(state)
+
+
+def test_names_that_mislead_are_overridden_with_a_reason() -> None:
+    state = chosen({"N": np.cos(T / 11), "E": np.sin(T / 7), "heading": DEG, "A": NORTH, "B": EAST})
+    assert set(sources(state).values()) == {"A", "B", "heading"}
+    (finding,) = (finding for finding in state.findings if finding.kind == "misleading names")
+    assert "'N', 'E', 'heading' do not fit together" in finding.sentence
+
+
+@pytest.mark.parametrize(
+    ("columns", "kind"),
+    [
+        ({"N": EAST, "E": NORTH, "heading": DEG}, "north and east swapped"),
+        ({"x": EAST, "y": NORTH, "heading": DEG}, "x is east"),
+        ({"N": NORTH, "E": EAST, "heading": -DEG % 360.0}, "heading counted to port"),
+        ({"N": NORTH, "E": EAST, "yaw": (90.0 - DEG) % 360.0}, "heading counted from east"),
+        ({"N": NORTH, "E": EAST, "heading": (DEG + 180.0) % 360.0}, "zero of the heading"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_frames_signs_and_zeros(columns: dict[str, np.ndarray], kind: str) -> None:
+    state = chosen(columns)
+    assert {finding.kind for finding in state.findings} == {kind}
+    assert_motion(state)
+
+
+def test_false_samples_across_360_are_counted_and_repaired() -> None:
+    slow = np.interp(T, T[::4], DEG[::4])
+    state = chosen({"N": NORTH, "E": EAST, "heading": slow})
+    (finding,) = state.findings
+    assert finding.kind == "interpolation across 360"
+    assert finding.repair is not None
+    assert finding.repair["kind"] == "wrap_interpolation"
+
+
+@pytest.mark.parametrize(
+    ("columns", "missing"),
+    [({"N": NORTH, "E": EAST, "rpm": np.sin(T)}, "heading"), ({"heading": DEG, "rpm": np.sin(T)}, "position")],
+    ids=["heading", "position"],
+)
+def test_what_is_missing_is_named(columns: dict[str, np.ndarray], missing: str) -> None:
+    with pytest.raises(DataError, match=rf"log\.csv.*no column can be the {missing}"):
+        chosen(columns)
+
+
+def test_a_degree_of_latitude_is_sixty_miles() -> None:
+    state = state_of({"lat": np.array([60.0, 60.5, 61.0]), "lon": np.array([5.0, 5.0, 6.0])}, np.arange(3.0))
+    assert plane(state, "lat", "lon", on_globe=True)[1] == pytest.approx(30 * 1852, rel=5e-3)
+    np.testing.assert_array_equal(plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
