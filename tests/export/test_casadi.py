@@ -91,7 +91,7 @@ def test_the_example_of_the_docs_keeps_a_course(tmp_path, monkeypatch, capsys):
     (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     export_vessel(load_vessel("mariner"), "casadi", tmp_path / "mariner.casadi")
     monkeypatch.chdir(tmp_path)
-    exec(compile(example, "docs/export-casadi.md", "exec"), {})  # noqa: S102
+    exec(compile(example, "docs/export-casadi.md", "exec"), {})
     assert abs(float(capsys.readouterr().out.split()[-1]) - 20) < 8
 
 
