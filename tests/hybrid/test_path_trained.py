@@ -7,6 +7,7 @@ from shipid.hybrid.path_trained import PathTrained
 def test_the_trained_path_is_what_the_method_pins():
     assert PathTrained().model_dump() == {
         "trials": 50,
+        "budget": None,
         "layers": (1, 3),
         "units": (10, 500),
         "input_dropout": (0.0, 1.0),

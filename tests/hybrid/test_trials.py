@@ -73,7 +73,7 @@ def test_every_foundation_is_fitted_or_has_diverged():
         asked.append(name)
         return Fitted(Unchanged({}), [], 1.0)
 
-    fitted = fit_each(here, [{"a": 1.0}, {"a": 2.0}], fit)
+    fitted = fit_each(here, OneStep(), lambda: [{"a": 1.0}, {"a": 2.0}], fit)
     assert asked == ["other"]
     assert told == [(1, 2), (2, 2)]
     assert fitted["one"].corrector is None
@@ -83,7 +83,7 @@ def test_every_foundation_is_fitted_or_has_diverged():
     ]
     assert (sound(here, "one"), sound(here, "other")) == (False, True)
     np.testing.assert_array_equal(used(here), np.arange(9))
-    assert diverged([]).trials == []
+    assert diverged(OneStep(), []).trials == []
 
 
 def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():

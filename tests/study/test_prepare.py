@@ -176,7 +176,7 @@ def test_what_cannot_be_drawn_is_told(tmp_path: Path) -> None:
     for factor, said in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 100 redraws")):
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
         family["perturb"][0]["factor"] = factor  # type: ignore[index]
-        plan = tiny_plan(tmp_path, {"family": [family]})
+        plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
         with pytest.raises(DocumentError, match=said) as caught:
             prepare(plan, obtain(plan))
         assert caught.value.path == "family.lost"

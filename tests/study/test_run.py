@@ -127,7 +127,7 @@ def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
     rows = store.read_rows(tiny_run).set_index("cell")
     for entry in table.itertuples():
         assert entry.value == pytest.approx(rows.loc[entry.cell, entry.metric], nan_ok=True)
-        assert entry.unit == ("s" if entry.metric == "seconds" else "m")
+        assert entry.unit == {"seconds": "s", "coverage": "1"}.get(entry.metric, "m")
     trials = pd.read_parquet(tiny_run / "trials.parquet")
     assert list(trials["cell"].value_counts().unique()) == [1]  # the method of the tiny study has one trial
     assert {"value", "motion_scale", "mirror", "state"} <= set(trials.columns)

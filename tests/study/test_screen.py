@@ -103,7 +103,8 @@ def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Pa
 def test_a_member_that_diverges_is_said_so(tmp_path: Path) -> None:
     wild = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"], "factor": [-3e4, 1.0]}]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
-    frame = screened(tiny_plan(tmp_path, {"family": family}), 6)
+    meant = {"unusual": ["family.0.perturb.0.factor*"]}
+    frame = screened(tiny_plan(tmp_path, {"family": family, **meant}), 6)
     bad = frame["diverged"] > 0
     assert bad.any()
     assert frame["A"].isna().equals(bad)

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.plan import Batch
 from tests.study.tiny import tiny_plan
 
@@ -56,6 +56,7 @@ def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
         file = store.batch_file(tmp_path, batch)
         file.parent.mkdir(exist_ok=True)
         file.write_text(json.dumps([{**row, "N_D": batch.N_D, "seed": batch.seed, "H": None}]))
+        seals.write_seal(tmp_path, batch.key, [file])
     assert store.finished(tmp_path, batches) == batches[:2]
     rows = store.read_rows(tmp_path)
     assert rows["seed"].tolist() == [0, 1]
