@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from shipid.cli.options import check_band
+
 
 def export(
     what: Annotated[
@@ -43,11 +45,20 @@ def aboard(
         float | None, typer.Option(help="seconds between predictions; default the predictor's step")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="table of every point: .parquet or .csv")] = None,
+    level: Annotated[
+        float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: shows it")
+    ] = None,
+    kind: Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")] = None,
+    adaptive: Annotated[
+        float | None,
+        typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
+    ] = None,
 ) -> None:
     """Play a log as if at sea: every instant uses the past alone. Show what an officer would have seen."""
     from shipid.study.aboard import play, summary, write
 
-    played = play(predictor, log, mapping, every)
+    check_band(level, kind, adaptive)
+    played = play(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
     if out is not None:
         write(played, out)
     for line in summary(played):

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, ShipidError
 
 Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
@@ -49,6 +49,16 @@ def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
         except (ValueError, DocumentError):
             raise DocumentError(f"{pair!r}: write {example}", path=option) from None
     return result
+
+
+def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
+    """Raise ShipidError where --kind or --adaptive come without --level, or the rate is none."""
+    if level is None and (kind is not None or adaptive is not None):
+        raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
+    if adaptive is not None and not 0 < adaptive <= 1:
+        raise ShipidError(
+            f"{adaptive:g} is no rate: give a number above 0 and up to 1, such as 0.02", path="--adaptive"
+        )
 
 
 def stem(name: str | Path) -> str:

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.options import Folder
-from shipid.errors import ShipidError
+from shipid.cli.options import Folder, check_band
 
 
 def predict(
@@ -29,13 +28,7 @@ def predict(
     """Write physics and cooperative paths in north-east for every instant of a log."""
     from shipid.study.apply import predict_log
 
-    if level is None and (kind is not None or adaptive is not None):
-        raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
-    if adaptive is not None and not 0 < adaptive <= 1:
-        raise ShipidError(
-            f"{adaptive:g} is no rate: give a number above 0 and up to 1, such as 0.02", path="--adaptive"
-        )
-
+    check_band(level, kind, adaptive)
     file = out or Path(f"{cell}.parquet")
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")

@@ -14,9 +14,11 @@ from casadi import SX
 
 from shipid.engine.integrate import Method
 from shipid.errors import ShipidError
+from shipid.export.band import COLUMNS
 from shipid.export.blocks import Block, Formula, Precision, c_functions
 from shipid.export.equations import Equations
 from shipid.export.model import Model
+from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.version import __version__
@@ -355,7 +357,7 @@ int main(void)
 
 
 def predictor_files(model: Model, name: str, precision: Precision) -> Files:
-    """A predictor: physics, method, memory, observer and alarm as one C source."""
+    """A predictor: physics, method, memory, observer, alarm and band as one C source."""
     parts = PredictorParts(model, name, precision)
     return Files(name, {f"{name}.h": parts.header(), f"{name}.c": parts.source(), "main.c": parts.example()})
 
@@ -399,7 +401,13 @@ class PredictorParts:
             "NUM_PLANNED": len(names.planned),
             "NUM_ESTIMATES": len(names.estimates),
             "NUM_PARAMETERS": len(names.parameters),
+            **({} if self.bands is None else {"BAND": len(COLUMNS), "NUM_KINDS": len(self.bands.kinds)}),
         }
+
+    @property
+    def bands(self) -> Bands | None:
+        """The bands of the predictor, where it has some."""
+        return self.model.predictor.bands
 
     def _groups(self) -> dict[str, tuple[str, ...]]:
         names = self.model.layout
@@ -428,6 +436,10 @@ class PredictorParts:
         for key, array in values.items():
             declared.append(f"extern const {name}_real {name}_{key}[{max(1, array.size)}];")
             defined.append(_array(f"{name}_real", f"{name}_{key}", array.size, self.precision.table(array)))
+        if self.bands is not None:
+            kinds = f"const char *const {name}_kind_names[{len(self.bands.kinds) + 1}]"
+            declared.append(f"extern {kinds};")
+            defined.append(f"{kinds} = {{\n    {strings(['any', *self.bands.kinds])}}};")
         return "\n".join(declared), "\n".join(defined)
 
     def header(self) -> str:
@@ -455,6 +467,7 @@ class PredictorParts:
                     "",
                     "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
                     "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
+                    *self._promise(),
                     "Limits of the alarm: " + ("; ".join(limits) or "none: every instant counts as outside") + ".",
                     "",
                     "Not in this file: a screening of inputs, a fusion of sensors, a repair of logs. Fixes that were interpolated",
@@ -485,7 +498,10 @@ enum {{
     {name}_OUTSIDE = 2,    /* the alarm: the instant is outside of what training has seen; the path is given */
     {name}_DIVERGED = 4,   /* the path is not finite */
     {name}_NO_PAST = 8,    /* the past is shorter than {names.num_past} steps, or there is no row: the path is NAN */
-    {name}_TIME = 16       /* time does not go on: the row is not kept */
+    {name}_TIME = 16,      /* time does not go on: the row is not kept */
+    {
+            name
+        }_NO_BAND = 32    /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
 }};
 
 {declared}
@@ -516,7 +532,7 @@ int {name}_predict(const {name} *self, const {name}_real *planned, {name}_real *
  * observer. parameters: {name}_defaults, or a changed copy. Arrays without entries may be null pointers. */
 int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}_real *past, const {name}_real *planned,
                 const {name}_real *estimates, const {name}_real *parameters, {name}_real *path);
-
+{self._declared_band()}
 #ifdef __cplusplus
 }}
 #endif
@@ -530,7 +546,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
         advance = _advance(model.vessel) if names.reached else None
         filters = self.filters
         filtering = None if filters is None else _filter(filters)
-        blocks += [block for block in (advance, filtering) if block is not None]
+        blocks += [block for block in (advance, filtering, model.radii, model.band) if block is not None]
         text, call = c_functions(blocks, self.precision)
         return f"""{comment([f"Predictor, written by shipid {__version__}; see {name}.h."])}
 {_head(name, self.precision)}
@@ -539,7 +555,109 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
 {text}
 {self._path(call)}
 {"" if filters is None or filtering is None else _observing(filters, call[id(filtering)], self.row, self.precision)}
-{self._recorder(None if advance is None else call[id(advance)])}"""
+{self._recorder(None if advance is None else call[id(advance)])}
+{self._band(call)}"""
+
+    def _promise(self) -> list[str]:
+        """What is said of the band."""
+        if self.bands is None:
+            return [f"No band: {self.model.no_band}."]
+        kinds = "".join(f", {kind} ({count})" for kind, count in self.bands.kinds.items())
+        return [
+            f"Bands: calibrated on {self.bands.runs} runs{kinds}. A level p needs p / (1 - p) runs or more: 9 for 0.9. Where the",
+            "alarm is raised, nothing is promised.",
+        ]
+
+    def _declared_band(self) -> str:
+        name = self.name
+        if self.bands is None:
+            return ""
+        return f"""
+/* The band around a path from an instant: {name}_HORIZON rows of half axes along the predicted track and across it [m],
+ * and the unit vector x, y of the track in body axes. level: share of whole paths that it holds, above 0 to 0.99;
+ * pointwise: 1 for the share of positions at each step alone. kind: of the manoeuvre under way, an entry of
+ * {name}_kind_names; 0 for any. With both pointwise and kind, or too few runs for the level, the result is
+ * {name}_NO_BAND. */
+int {name}_band(const {name}_real *now, const {name}_real *path, double level, int pointwise, int kind, {name}_real *band);
+
+/* Path and band from the newest row; results of both. Where the result has {name}_OUTSIDE nothing is promised. */
+int {name}_predict_band(const {name} *self, const {name}_real *planned, double level, int pointwise, int kind,
+                        {name}_real *path, {name}_real *band);
+
+/* A band that adapts along a run, for those who judge paths when their time has come. miss: begins at 1 - level. missed:
+ * whether a path left the band that was given for it. rate: such as 0.02. Returns miss from then on. */
+double {name}_adapted(double miss, double level, double rate, int missed);
+
+/* How much wider than calibrated such a band is now: times both half axes. A kind that is none gives NAN. */
+double {name}_factor(double miss, double level, int kind);
+"""
+
+    def _band(self, call: Mapping[int, str]) -> str:
+        """The band of a path, and how it adapts."""
+        name, bands, names, row = self.name, self.bands, self.model.layout, self.row
+        radii, band = self.model.radii, self.model.band
+        if bands is None or radii is None or band is None:
+            return ""
+        real, rows, most = f"{name}_real", len(COLUMNS) * names.horizon, float(LEVELS[-1])
+        taken_ = [row.index(key) for key in names.now]
+        return f"""static int no_band({real} *band, int status)
+{{
+    int i;
+    for (i = 0; i < {rows}; ++i) band[i] = NAN;
+    return status;
+}}
+
+int {name}_band(const {real} *now, const {real} *path, double level, int pointwise, int kind, {real} *band)
+{{
+    static const int runs[] = {{{_whole([bands.runs, *bands.kinds.values()])}}};
+    const real asked = (real)level, alone = (real)(pointwise != 0), of = (real)kind;
+    int i;
+    for (i = 0; i < {len(names.now)}; ++i) if (!isfinite(now[i])) return no_band(band, {name}_NOT_FINITE);
+    for (i = 0; i < {2 * names.horizon}; ++i) if (!isfinite(path[i])) return no_band(band, {name}_DIVERGED);
+    if (kind < 0 || kind > {len(bands.kinds)} || (pointwise && kind)) return no_band(band, {name}_NO_BAND);
+    if (!(level > 0 && level <= {most!r}) || runs[kind] < {FEWEST}) return no_band(band, {name}_NO_BAND);
+    if (level / (1 - level) - 1e-9 > runs[kind]) return no_band(band, {name}_NO_BAND);
+    {call[id(band)]}(now, path, &asked, &alone, &of, band);
+    for (i = 0; i < {rows}; ++i) if (!isfinite(band[i])) return no_band(band, {name}_NO_BAND);
+    return 0;
+}}
+
+int {name}_predict_band(const {name} *self, const {real} *planned, double level, int pointwise, int kind,
+                        {real} *path, {real} *band)
+{{
+    static const int taken[{len(taken_)}] = {{{_whole(taken_)}}};
+    const int newest = (self->first + self->count - 1) % {self.capacity};
+    const int status = {name}_predict(self, planned, path);
+    real now[{len(taken_)}];
+    int i;
+    if (status & ~{name}_OUTSIDE) return no_band(band, status);
+    for (i = 0; i < {len(taken_)}; ++i) now[i] = self->rows[newest][taken[i]];
+    return status | {name}_band(now, path, level, pointwise, kind, band);
+}}
+
+static double radius_of(double level, int kind)
+{{
+    const real asked = (real)(level < {most!r} ? level : {most!r}), alone = 0, of = (real)kind;
+    real radius[{names.horizon}];
+    {call[id(radii)]}(&asked, &alone, &of, radius);
+    return radius[0];
+}}
+
+double {name}_adapted(double miss, double level, double rate, int missed)
+{{
+    return miss + rate * ((1 - level) - (missed != 0));
+}}
+
+double {name}_factor(double miss, double level, int kind)
+{{
+    double usual, now = 1 - miss;
+    if (kind < 0 || kind > {len(bands.kinds)}) return NAN;
+    if (now <= 0) return 0;
+    usual = radius_of(level, kind);
+    if (usual == 0) return 1;
+    return radius_of(now, kind) / usual * exp((now > {most!r} ? now - {most!r} : 0) / 0.05);
+}}
+"""
 
     def _path(self, call: Mapping[int, str]) -> str:
         """The pure function."""
@@ -751,6 +869,17 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
                 repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else "")
             )
         rows = names.num_past + 1
+        predict, around, shown = "predict(&ship, 0, path)", "", ""
+        if self.bands is not None:
+            predict, around = (
+                "predict_band(&ship, 0, 0.5, 0, 0, path, band)",
+                f"    {name}_real band[{name}_BAND * {name}_HORIZON];\n",
+            )
+            shown = (
+                f"    for (i = 0; i < {name}_HORIZON && !(status & {name}_NO_BAND); ++i)\n"
+                f'        printf("half of the paths: %.2f m along the track, %.2f m across\\n", '
+                f"(double)band[{name}_BAND * i], (double)band[{name}_BAND * i + 1]);\n"
+            )
         return f"""/* A ship that does the same for a while, and where she goes. cc -std=c99 main.c {name}.c -lm */
 #include <stdio.h>
 
@@ -762,17 +891,17 @@ int main(void)
     /* {", ".join(row)} */
     {name}_real row[{name}_NUM_ROW] = {{{", ".join(values)}}};
     {name}_real path[2 * {name}_HORIZON];
-    int i, status;
+{around}    int i, status;
     {name}_init(&ship);
     for (i = 0; i < {rows}; ++i) {{
         {name}_record(&ship, {self.model.physics.step!r} * i, row);
         row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* north, as if she sailed that way */
     }}
-    status = {name}_predict(&ship, 0, path);
+    status = {name}_{predict};
     printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");
     for (i = 0; i < {name}_HORIZON; ++i)
         printf("%g s: %.2f m ahead, %.2f m to starboard\\n", {self.model.physics.step!r} * (i + 1), (double)path[2 * i], (double)path[2 * i + 1]);
-    return status & ~{name}_OUTSIDE;
+{shown}    return status & ~{name}_OUTSIDE;
 }}
 """
 

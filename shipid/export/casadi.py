@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import numpy as np
 from casadi import MX
 
 from shipid.engine.integrate import Method
+from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 from shipid.export.c import VesselParts
 from shipid.export.model import Model
 from shipid.files import whole, write_json
+from shipid.hybrid.bands import FEWEST, LEVELS
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
@@ -54,6 +57,41 @@ def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, 
         "outputs": outputs,
         "defaults": {"parameters": model.parameters.tolist()},
         "limits": model.limits,
+        "provenance": dict(model.predictor.provenance),
+    }
+
+
+def band_function(model: Model, name: str) -> tuple[ca.Function, dict[str, Any]] | None:
+    """(now, path, level, pointwise, kind) -> along, across (1, T) [m], ahead (2, T), promised, and names of entries.
+
+    path : as from `predictor_function`. pointwise : 0 or 1. kind : 0 for any, or its number. promised : 0 where too few
+    runs calibrated that level or kind; the band is then not a number. None where the predictor has no bands.
+
+    It is apart from the path, so that derivatives of a path never meet those of its band.
+    """
+    bands, graph, names = model.predictor.bands, model.band, model.layout
+    if bands is None or graph is None:
+        return None
+    now, path = MX.sym("now", len(names.now)), MX.sym("path", 2, names.horizon)
+    level, pointwise, kind = (MX.sym(key) for key in CHOICE)
+    counts = ca.DM([bands.runs, *bands.kinds.values()])
+    runs = ca.dot(counts, kind == ca.DM(range(len(bands.kinds) + 1)))
+    promised = ca.logic_and(ca.logic_and(level > 0, level <= float(LEVELS[-1])), runs >= FEWEST)
+    promised = ca.logic_and(promised, level / (1 - level) - 1e-9 <= runs)
+    promised = ca.logic_and(promised, ca.logic_not(ca.logic_and(pointwise != 0, kind != 0)))
+    rows = ca.reshape(graph.function(now, ca.vec(path), level, pointwise, kind), len(COLUMNS), names.horizon)
+    rows = ca.if_else(promised, rows, np.nan)
+    results = {"along": rows[0, :], "across": rows[1, :], "ahead": rows[2:, :], "promised": promised}
+    inputs = {"now": now, "path": path, "level": level, "pointwise": pointwise, "kind": kind}
+    plane = [{"name": axis, "unit": "m"} for axis in "xy"]
+    listed = {"now": [{"name": entry, "unit": model.unit(entry)} for entry in names.now], "path": plane}
+    return ca.Function(name, list(inputs.values()), list(results.values()), list(inputs), list(results)), {
+        "what": f"band around a path of {names.horizon} steps of {model.physics.step:g} s",
+        "inputs": listed | {key: [{"name": key, "unit": "-"}] for key in CHOICE},
+        "outputs": {key: [{"name": key, "unit": "m"}] for key in ("along", "across")}
+        | {"ahead": [{"name": axis, "unit": "-"} for axis in "xy"], "promised": [{"name": "promised", "unit": "-"}]},
+        "runs": bands.runs,
+        "kinds": {kind_: [number, count] for number, (kind_, count) in enumerate(bands.kinds.items(), start=1)},
         "provenance": dict(model.predictor.provenance),
     }
 

@@ -20,6 +20,7 @@ import numpy as np
 from shipid.engine.integrate import Method
 from shipid.engine.native import compiler
 from shipid.errors import ShipidError
+from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 from shipid.export.c import Files, PredictorParts, VesselParts, predictor_files, vessel_files
 from shipid.export.model import Model
@@ -29,6 +30,12 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): "linux64", ("Darwin", "x86_64"): "darwin64"}
+_BAND = {
+    "along": ("m", "half axis along the predicted track"),
+    "across": ("m", "half axis across the predicted track"),
+    "ahead_x": ("-", "unit vector of the track, ahead"),
+    "ahead_y": ("-", "unit vector of the track, to starboard"),
+}
 LARGEST_STEP = 0.1  # s: of a vessel inside a communication step, scaled by the size of the ship
 
 
@@ -105,7 +112,7 @@ def vessel_unit(vessel: Vessel, name: str, method: Method, largest: float | None
 
 
 def predictor_unit(model: Model, name: str) -> Packed:
-    """The FMU of a predictor: motion, weather and commands in, path and alarm out."""
+    """The FMU of a predictor: motion, weather and commands in, path, band and alarm out."""
     parts, names = PredictorParts(model, name, Precision()), model.layout
     found = []
     for key in parts.row:
@@ -121,6 +128,11 @@ def predictor_unit(model: Model, name: str) -> Packed:
         for k in range(names.horizon):
             text = f"way {word} after {step * (k + 1):g} s, in body axes at the instant of prediction"
             found.append(Variable(f"{axis}[{k + 1}]", "output", "continuous", "m", text, None))
+    bands = model.predictor.bands
+    for key, (unit, word) in _BAND.items() if bands is not None else ():
+        for k in range(names.horizon):
+            text = f"band after {step * (k + 1):g} s: {word}"
+            found.append(Variable(f"{key}[{k + 1}]", "output", "continuous", unit, text, None))
     found.append(Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None))
     for key, value in zip(names.parameters, model.parameters, strict=True):
         found.append(
@@ -129,10 +141,22 @@ def predictor_unit(model: Model, name: str) -> Packed:
     if names.planned:
         text = "1: orders stay as they are over the horizon; 0: as in planned[...]"
         found.append(Variable("held", "parameter", "tunable", "-", text, 1.0))
+    if bands is not None:
+        kinds = ", ".join(f"{number}: {kind}" for number, kind in enumerate(("any", *bands.kinds)))
+        usual = next(level for level in (0.9, 0.8, 0.5) if bands.promises(level) or level == 0.5)
+        for key, text, value in (
+            ("level", "share of whole paths that the band holds, above 0 to 0.99", usual),
+            ("pointwise", "1: the share is that of positions at each step alone", 0.0),
+            ("kind", f"of the manoeuvre under way: {kinds}", 0.0),
+        ):
+            found.append(Variable(key, "parameter", "tunable", "-", text, value))
     what = "no physics" if model.vessel is None else model.vessel.name
     return Packed(
         name, f"{what}, {model.predictor.method}", tuple(found), predictor_files(model, name, Precision()),
-        _predictor_wrapper(name, len(parts.row), names.horizon, len(names.planned), len(names.parameters), found), step,
+        _predictor_wrapper(
+            name, len(parts.row), names.horizon, len(names.planned), len(names.parameters), bands is not None, found
+        ),
+        step,
     )  # fmt: skip
 
 
@@ -316,14 +340,44 @@ static int model_boolean(const Model *self, unsigned reference)
 
 
 def _predictor_wrapper(
-    name: str, num_row: int, horizon: int, num_planned: int, num_parameters: int, variables: Sequence[Variable]
+    name: str,
+    num_row: int,
+    horizon: int,
+    num_planned: int,
+    num_parameters: int,
+    banded: bool,
+    variables: Sequence[Variable],
 ) -> str:
     planned = num_row
     path = planned + horizon * num_planned
-    instant = path + 2 * horizon
+    band = path + 2 * horizon
+    instant = band + (len(COLUMNS) * horizon if banded else 0)
     parameters = instant + 1
-    total = parameters + num_parameters + (1 if num_planned else 0)
-    plan = f"self->values[{total - 1}] != 0 ? 0 : self->values + {planned}" if num_planned else "0"
+    held = parameters + num_parameters
+    chosen = held + (1 if num_planned else 0)
+    total = chosen + (len(CHOICE) if banded else 0)
+    plan = f"self->values[{held}] != 0 ? 0 : self->values + {planned}" if num_planned else "0"
+    declared, shown = "", ""
+    call = f"{name}_predict(kept, {plan}, path)"
+    if banded:
+        asked = f"self->values[{chosen}], self->values[{chosen + 1}] != 0, kind_of(self->values[{chosen + 2}])"
+        call = f"{name}_predict_band(kept, {plan}, {asked}, path, band)"
+        declared = f"    double band[{len(COLUMNS)} * {horizon}];\n"
+        shown = "\n".join(
+            f"        self->values[{band + place * horizon} + k] = band[{len(COLUMNS)} * k + {place}];"
+            for place in range(len(COLUMNS))
+        )
+    numbered = (
+        """
+/* A whole number, or -1, which is no kind. */
+static int kind_of(double value)
+{
+    return value >= 0 && value < 1e9 && floor(value) == value ? (int)value : -1;
+}
+"""
+        if banded
+        else ""
+    )
     return f"""
 #define NUM_REALS {total}
 #define NUM_BOOLEANS 1
@@ -341,17 +395,19 @@ static void model_init(Model *self)
     {name}_init(&self->kept);
 }}
 
+{numbered}
 static const char *predict_from(Model *self, {name} *kept, double t)
 {{
     double path[2 * {horizon}];
-    int k;
+{declared}    int k;
     {"memcpy(kept->parameters, self->values + " + str(parameters) + ", " + str(num_parameters) + " * sizeof(double));" if num_parameters else ""}
     self->status = {name}_record(kept, t, self->values);
     if (self->status) return self->status == {name}_TIME ? "time does not go on" : "an input is not finite";
-    self->status = {name}_predict(kept, {plan}, path);
+    self->status = {call};
     for (k = 0; k < {horizon}; ++k) {{
         self->values[{path} + k] = path[2 * k];
         self->values[{path + horizon} + k] = path[2 * k + 1];
+{shown}
     }}
     self->values[{instant}] = t;
     return 0;

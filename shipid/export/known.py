@@ -77,7 +77,8 @@ def layout(
     place = ("north", "east") if physics.observer is not None and physics.path == "position" else ()
     every = tuple(dict.fromkeys((*taken, *commands)))
     environment = tuple(dict.fromkeys((*weather, *(("V_w", "beta_w") if wind else ()))))
-    environment += tuple(name for name in limited if name not in (*MOTIONS, *every, *environment))
+    others = dict.fromkeys(limited)
+    environment += tuple(name for name in others if name not in (*MOTIONS, *every, *environment))
     now = (*place, "psi", *MOTIONS, *states, *every, *environment)
     past = tuple(name for name in now if name not in place)
     return Layout(

@@ -11,9 +11,11 @@ import numpy as np
 
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
+from shipid.export.band import Radii, band_graph, radii
 from shipid.export.blocks import Graph, num_numbers
 from shipid.export.correctors import CORRECTORS, taken
 from shipid.export.known import Known, Layout, layout
+from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.method import Corrector
 from shipid.hybrid.physics import Physics
@@ -45,6 +47,8 @@ class Exportable(Protocol):
     def causal(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def past(self) -> int: ...  # noqa: D102
+    @property
+    def bands(self) -> Bands | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +74,30 @@ class Model:
         known = Known(self.physics, self.layout)
         path = CORRECTORS[type(self.predictor.corrector)](known, self.predictor.corrector)
         graph = known.graph.finish(path)
-        count = num_numbers(graph)
+        count = num_numbers(graph) + (0 if self.band is None else num_numbers(self.band))
         if count > MOST_NUMBERS:
             raise ShipidError(
                 f"the tables of {self.predictor.method} hold {count} numbers, an export at most {MOST_NUMBERS}: "
                 "use fewer trees or units, larger leaves, or the method path-drawn"
             )
         return graph
+
+    @cached_property
+    def radii(self) -> Radii | None:
+        """(level, pointwise, kind) -> radius (T,) of the band; None where the predictor has none."""
+        return None if self.predictor.bands is None else radii(self.predictor.bands)
+
+    @cached_property
+    def band(self) -> Graph | None:
+        """(now, path, level, pointwise, kind) -> band, a row for each step, see `shipid.export.band.COLUMNS`."""
+        if self.radii is None or self.predictor.bands is None:
+            return None
+        return band_graph(self.predictor.bands, self.layout.now, self.physics.step, self.radii)
+
+    @property
+    def no_band(self) -> str:
+        """Why there is no band."""
+        return str(self.predictor.provenance.get("no_band", "it was made without"))
 
     @property
     def parameters(self) -> Array:
@@ -139,7 +160,7 @@ def model(predictor: Exportable) -> Model:
         predictor.past,
         known=predictor.commands == "known",
         wind=taken_.wind,
-        limited=tuple(predictor.limits),
+        limited=(*predictor.limits, *(() if predictor.bands is None else predictor.bands.names)),
     )
     return Model(predictor, physics, names)
 

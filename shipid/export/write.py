@@ -10,7 +10,7 @@ from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name, predictor_files, vessel_files
-from shipid.export.casadi import predictor_function, vessel_function, write_function
+from shipid.export.casadi import band_function, predictor_function, vessel_function, write_function
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, model
 from shipid.export.onnx import write_onnx
@@ -28,8 +28,8 @@ def export_predictor(
 
     Parameters
     ----------
-    to : `c` (a folder with NAME.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, and its names as JSON) or
-        `onnx` (the networks alone).
+    to : `c` (a folder with NAME.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, its names as JSON, and the
+        same for the band as NAME-band) or `onnx` (the networks alone).
     out : the folder for `c`, else the file.
     single : numbers in single precision (`c` and `onnx`).
     name : begins every public name in C, and is the model identifier of an FMU; default the stem of `out`.
@@ -46,7 +46,10 @@ def export_predictor(
     if target == "fmu":
         return _fmu(predictor_unit(kept, title), file)
     if target == "casadi":
-        return write_function(*predictor_function(kept, title), file)
+        band = band_function(kept, f"{title}_band")
+        beside = file.with_name(f"{file.stem}-band{file.suffix}")
+        written = write_function(*predictor_function(kept, title), file)
+        return written if band is None else [*written, *write_function(*band, beside)]
     return [write_onnx(kept, title, file, single=single)]
 
 

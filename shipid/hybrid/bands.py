@@ -217,7 +217,7 @@ def track(paths: Array) -> Array:
     first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
     chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
     size = np.hypot(chords[..., 0], chords[..., 1])
-    moves = size > 1e-12 * max(float(np.max(size, initial=0.0)), 1e-300)
+    moves = size > 1e-12 * np.max(size, axis=0, initial=0.0)
     ahead: Array = np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0])
     return ahead
 
@@ -242,7 +242,8 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     chords = np.diff(points, axis=0)
     size = np.hypot(chords[..., 0], chords[..., 1])
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
-    angles = np.arctan2(cross, (chords[:-1] * chords[1:]).sum(axis=-1))
+    dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
+    angles = np.arctan2(cross, dot)
     first, second = angles
     held = columns["r"] * step * horizon * 2 / 3
     return np.column_stack(
@@ -265,8 +266,8 @@ def nearest(points: Array, centres: Array) -> Array:
     """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,)."""
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle  # else large coordinates would cost digits
-    squares = (points**2).sum(axis=1) + ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).min(axis=0)
-    found: Array = np.sqrt(np.maximum(squares, 0.0) / points.shape[1])
+    which = ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).argmin(axis=0)
+    found: Array = np.sqrt(((points - centres[which]) ** 2).mean(axis=1))  # anew: sums of squares leave half the digits
     return found
 
 

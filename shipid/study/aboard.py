@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,27 +15,32 @@ from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, samp
 from shipid.data.windows import Instants, from_frame, past_of, to_frame, travelled
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
+from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.observer import observe
 from shipid.predictor import Predictor
+from shipid.study.apply import Band, along_run
 from shipid.study.prepare import states_along
 
 Array = np.ndarray
 AHEAD = 5  # moments of the horizon that the summary shows
+STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
 
 @dataclass(frozen=True)
 class Played:
     """What would have been seen at sea.
 
-    instants : a row for each prediction: run, t, outside (the alarm), latency [s], late (whether its future is in the
-        log), and the error at the end of the horizon [m].
+    instants : a row for each prediction: run, t, outside (the alarm), latency [s], and the error at the end of the
+        horizon [m]. With a band also factor, by which it was wider than calibrated, and reach, the greatest error of
+        the whole path over the band as calibrated; not a number where the log ends before.
     points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
-        the log goes on.
+        the log goes on. With a band also band_along, band_across [m], band_course [rad, clockwise from north].
     assumed : what the vessel feels and the log does not hold; it is 0.
     plan : whether orders were taken as held where the predictor knows a plan.
+    band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
     """
 
     instants: pd.DataFrame
@@ -44,17 +50,34 @@ class Played:
     skipped: int
     assumed: tuple[str, ...]
     plan: bool
+    band: Band | None = None
+    bands: Bands | None = None
 
 
-def play(file: Path, log: Path, mapping: str | None = None, every: float | None = None) -> Played:
+def play(
+    file: Path,
+    log: Path,
+    mapping: str | None = None,
+    every: float | None = None,
+    *,
+    level: float | None = None,
+    kind: str | None = None,
+    rate: float | None = None,
+) -> Played:
     """Predict at every instant of a log from the rows up to then; the rows after it only judge.
 
     every : seconds between predictions; default the step of the predictor. An instant is a row. A predictor that takes
     known commands is given the present orders as the plan: at sea the log's later orders are not known.
+    level : share of whole paths that the band is to hold. kind : of the manoeuvre. rate : with one, the band adapts
+    along each unbroken stretch by the paths that have ended by then.
 
-    Raises DataError where a command is missing or no run is as long as the past that is needed.
+    Raises DataError where a command is missing, no run is as long as the past that is needed, or no band of the level
+    can be promised.
     """
     predictor = Predictor.load(file)
+    if level is not None:
+        predictor.check_level(level, kind)
+    band = None if level is None else Band(level, kind, rate)
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     vessel, step = predictor.vessel, predictor.physics.step
     names = {str(name): np.empty(0) for name in dataset.frame.columns}
@@ -64,7 +87,7 @@ def play(file: Path, log: Path, mapping: str | None = None, every: float | None 
         raise DataError(f"{every:g}: must be above 0", path="--every")
     rows, paths, skipped = [], [], 0
     for run, piece in pieces(dataset):
-        found = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step)
+        found = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step, band)
         rows += found[0]
         paths += found[1]
         skipped += found[2]
@@ -74,17 +97,18 @@ def play(file: Path, log: Path, mapping: str | None = None, every: float | None 
     missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(
         pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
-        predictor.commands == "known",
+        predictor.commands == "known", band, predictor.bands,
     )  # fmt: skip
 
 
 def _along(
-    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, every: float
+    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, every: float, band: Band | None
 ) -> tuple[list[dict[str, object]], list[pd.DataFrame], int]:
     """Predictions along one unbroken stretch; how many rows came before there was a past."""
     t = rows["t"].to_numpy()
     slack = clock_slack(t)
-    found, paths, skipped, due = [], [], 0, t[0]
+    found: list[dict[str, Any]] = []
+    paths, skipped, due = [], 0, t[0]
     for i in range(len(t)):
         if t[i] < due - slack:
             continue
@@ -96,14 +120,33 @@ def _along(
         instants = known_at(predictor, dataset, rows.iloc[: i + 1])
         predicted = predictor.predict(instants)[:, 0]
         alone = predictor.alone(instants)[:, 0] if predictor.vessel is not None else np.full_like(predicted, np.nan)
+        region = None if band is None else predictor.band(predicted[:, None], instants, band.level, kind=band.kind)
         latency = time.perf_counter() - begin
         outside = bool(predictor.outside(instants.columns)[0])
-        points, error = _judged(predictor, rows, i, predicted, alone)
+        points, error, reach = _judged(predictor, rows, i, predicted, alone, region)
         points.insert(0, "run", run)
         points.insert(1, "t", t[i])
         paths.append(points)
         found.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
+        if band is not None:
+            found[-1]["reach"] = reach
+    if band is not None and found:
+        _adapt(predictor, found, paths, band)
     return found, paths, skipped
+
+
+def _adapt(predictor: Predictor, found: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:
+    """Give each instant the factor of its band, and scale the bands of the paths with it."""
+    assert predictor.bands is not None
+    factors = np.ones(len(found))
+    if band.rate is not None:
+        now = np.array([instant["t"] for instant in found])
+        reach = np.array([instant["reach"] for instant in found])
+        ends = now + predictor.physics.horizon * predictor.physics.step
+        factors = along_run(reach, ends, now, band, predictor.bands.table(band.kind))
+    for instant, points, factor in zip(found, paths, factors, strict=True):
+        instant["factor"] = float(factor)
+        points[["band_along", "band_across"]] *= factor
 
 
 def known_at(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame) -> Instants:
@@ -132,9 +175,12 @@ def known_at(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame) -> Inst
 
 
 def _judged(
-    predictor: Predictor, rows: pd.DataFrame, i: int, predicted: Array, alone: Array
-) -> tuple[pd.DataFrame, float]:
-    """Points of a path in north-east with their errors, and the error at the end; NaN where the log has ended."""
+    predictor: Predictor, rows: pd.DataFrame, i: int, predicted: Array, alone: Array, region: Region | None
+) -> tuple[pd.DataFrame, float, float]:
+    """Points of a path in north-east with errors and band, the error at the end, and the greatest over the band.
+
+    What the log does not hold is not a number.
+    """
     physics, t = predictor.physics, rows["t"].to_numpy()
     ahead = physics.step * np.arange(1, physics.horizon + 1)
     origin = tuple(float(rows[name].iloc[i]) for name in ("north", "east", "psi"))
@@ -143,11 +189,16 @@ def _judged(
         table[f"{prefix}north"], table[f"{prefix}east"] = from_frame(path[:, 0], path[:, 1], *origin)
     later = t[i] + ahead
     there = later <= t[-1] + clock_slack(t)
-    error = np.full(physics.horizon, np.nan)
+    missed = np.full((physics.horizon, 2), np.nan)
     if there.any():
-        true = true_path(rows, i, later[there], physics.path)
-        error[there] = np.hypot(*(predicted[there] - true).T)
-    return pd.DataFrame({**table, "error": error}), float(error[-1])
+        missed[there] = true_path(rows, i, later[there], physics.path) - predicted[there]
+    error, reach = np.hypot(*missed.T), np.nan
+    if region is not None:
+        course = np.arctan2(region.ahead[:, 0, 1], region.ahead[:, 0, 0]) + origin[2]
+        table |= {"band_along": region.along[:, 0], "band_across": region.across[:, 0]}
+        table["band_course"] = np.mod(course, 2 * np.pi)
+        reach = float(region.reach(missed[:, None]).max())
+    return pd.DataFrame({**table, "error": error}), float(error[-1]), reach
 
 
 def true_path(rows: pd.DataFrame, i: int, later: Array, path: str) -> Array:
@@ -165,7 +216,7 @@ def true_path(rows: pd.DataFrame, i: int, later: Array, path: str) -> Array:
 def write(played: Played, file: Path) -> None:
     """Write every point with the alarm and the latency of its instant."""
     check_table(file)
-    kept = played.instants.drop(columns="error")
+    kept = played.instants.drop(columns=["error", "reach"], errors="ignore").rename(columns={"factor": "band_factor"})
     write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
 
 
@@ -185,10 +236,10 @@ def summary(played: Played) -> list[str]:
     lines.append(f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms")
     lines.append(f"alarm: at {outside.sum()} of {len(outside)} instants ({outside.mean():.0%}) outside of the training")
     lines += _spans(instants)
+    lines += _promise(played)
     lines.append("error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm")
     merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
-    ahead = np.unique(points["ahead"])
-    for moment in ahead[np.unique(np.linspace(0, len(ahead) - 1, AHEAD).round().astype(int))]:
+    for moment in _moments(points):
         here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
         if len(here):
             error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
@@ -198,6 +249,57 @@ def summary(played: Played) -> list[str]:
                 f"{inside:>10}"
             )
     return lines
+
+
+def _promise(played: Played) -> list[str]:
+    """How often the band held whole paths: one sentence, and its size over the horizon."""
+    band, bands, instants = played.band, played.bands, played.instants
+    if band is None or bands is None:
+        return []
+    reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
+    judged, promised = np.isfinite(reach), np.isfinite(reach) & ~outside
+    lines = []
+    if judged.any():
+        held = reach <= instants["factor"].to_numpy()
+        of = "" if band.kind is None else f" of the kind {band.kind!r}"
+        adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
+        inside = f"{held[promised].mean():.0%} of the {promised.sum()}" if promised.any() else "none of the 0"
+        lines.append(
+            f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
+            f"paths that can be judged, {inside} without alarm, where it is promised"
+        )
+        usual = at_level(bands.table(band.kind), band.level)
+        shares = []
+        for level in (*STANDARD, band.level) if band.rate is None else ():
+            if bands.promises(level, band.kind) and usual > 0:
+                wider = float(at_level(bands.table(band.kind), level) / usual)
+                shares.append((level, float((reach[promised] <= wider).mean()) if promised.any() else np.nan))
+        if shares and promised.any():
+            said = ", ".join(f"{level:.0%} held {share:.0%}" for level, share in sorted(dict(shares).items()))
+            lines.append(f"  by level, without alarm: {said}")
+    else:
+        lines.append(f"band of {band.level:.0%}: no whole path can be judged, the log ends before")
+    if band.rate is not None:
+        factors = instants["factor"].to_numpy()
+        last = ", ".join(
+            f"{run} {value:.2f}" for run, value in instants.groupby("run", sort=False)["factor"].last()[:5].items()
+        )
+        lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
+    points = played.points
+    for moment in _moments(points):
+        here = points[points["ahead"] == moment]
+        along, across = here["band_along"].to_numpy(), here["band_across"].to_numpy()
+        lines.append(
+            f"  {moment:g} s ahead: {np.median(along):.2f} m along the track, {np.median(across):.2f} m across (median)"
+        )
+    return lines
+
+
+def _moments(points: pd.DataFrame) -> Array:
+    """Some moments of the horizon, from the first to the last."""
+    ahead = np.unique(points["ahead"])
+    moments: Array = ahead[np.unique(np.linspace(0, len(ahead) - 1, AHEAD).round().astype(int))]
+    return moments
 
 
 def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:

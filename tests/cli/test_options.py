@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, ShipidError
 
 
 def test_changes_are_toml_or_text() -> None:
@@ -45,3 +45,20 @@ def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(sys, "argv", ["/usr/bin/shipid", "manoeuvre", "my ship.toml", "zigzag"])
     assert shlex.split(command_line()) == ["shipid", "manoeuvre", "my ship.toml", "zigzag"]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((None, "zigzag", None), "give --level too"),
+        ((None, None, 0.1), "give --level too"),
+        ((0.9, None, 0.0), "--adaptive: 0 is no rate"),
+        ((0.9, None, float("nan")), "--adaptive: nan is no rate"),
+    ],
+)
+def test_a_band_needs_a_level_and_a_rate(given: tuple[float | None, str | None, float | None], message: str) -> None:
+    from shipid.cli.options import check_band
+
+    check_band(0.9, "zigzag", 0.02)
+    with pytest.raises(ShipidError, match=message):
+        check_band(*given)

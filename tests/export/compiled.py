@@ -75,3 +75,15 @@ def paths(
         for i in range(len(instants))
     ]
     return found.swapaxes(0, 1), np.array(results)
+
+
+def bands(
+    loaded: ctypes.CDLL, name: str, model: Model, instants: Instants, path: np.ndarray, *asked: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (T, S, 4) of the band around paths (T, S, 2) for level, pointwise, kind, and results (S,)."""
+    now = np.ascontiguousarray(model.inputs(instants)["now"], dtype=float)
+    function, around = getattr(loaded, f"{name}_band"), np.ascontiguousarray(path.swapaxes(0, 1))
+    function.argtypes = [ctypes.c_void_p] * 2 + [ctypes.c_double] + [ctypes.c_int] * 2 + [ctypes.c_void_p]
+    found = np.zeros((len(instants), model.layout.horizon, 4))
+    results = [function(pointer(now[i]), pointer(around[i]), *asked, pointer(found[i])) for i in range(len(instants))]
+    return found.swapaxes(0, 1), np.array(results)

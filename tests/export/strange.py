@@ -8,6 +8,7 @@ import numpy as np
 
 from shipid.data.windows import Instants
 from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.bands import Bands
 from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
@@ -30,6 +31,7 @@ KINDS = (
     *("alone", "calibrator", "forest", "hankel-dmd", "learned-force", "modules"),
     *("one-step", "path-drawn", "path-trained", "recurrent"),
 )
+STEPPED = ("hankel-dmd", "modules", "one-step")  # corrected by step: they refuse an observer
 NEEDS_PHYSICS = ("alone", "calibrator", "learned-force", "modules")
 
 
@@ -54,7 +56,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     slow = 1.0 if ship is None else pace(ship)
     model = None if ship is None else dynamics(ship)
     three = model is not None and model.num_dof == 3 and not model.hidden
-    observer = Observer(fade=12.0) if three and kind not in ("modules",) and rng.random() < 0.3 else None
+    observer = Observer(fade=12.0) if three and kind not in STEPPED and rng.random() < 0.3 else None
     physics = Physics(
         ship,
         int(rng.integers(3, 16)),
@@ -76,9 +78,32 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     corrector = _corrector(kind, rng, physics, inputs, instants, slow)
     limits = {key: tuple(np.quantile(instants.columns[key], [0.05, 0.95])) for key in (*MOTIONS, *commands, "V_w")}
     predictor = Predictor(
-        physics, kind, corrector, limits, {"seed": seed, "odd": 'a "quote", a */ and ??('}, "known" if known else "held"
-    )
+        physics, kind, corrector, limits, {"seed": seed, "odd": 'a "quote", a */ and ??('},
+        "known" if known else "held",
+        bands=bands_of(np.random.default_rng([seed, 77]), physics, instants, tuple(limits), slow),
+    )  # fmt: skip
     return Strange(predictor, instants)
+
+
+def bands_of(rng, physics, instants, names, slow):
+    """Bands that nobody has calibrated: tables that rise, points of training of which some are instants."""
+    horizon, count = physics.horizon, len(instants)
+    seen = np.stack([instants.columns[name] for name in names], axis=1)
+    near = rng.integers(count, size=int(rng.integers(1, 40)))
+    centres = seen[near] * rng.choice([1.0, 1.1], (len(near), 1))
+    along = slow * np.cumsum(rng.uniform(0.01, 1, horizon))
+    across = along if rng.random() < 0.3 else slow * np.cumsum(rng.uniform(0.01, 1, horizon))
+    kinds = {name: int(rng.integers(1, 30)) for name in ("turning", 'odd "kind"')[: int(rng.integers(0, 3))]}
+    middle = np.array([0.0, 0.5, 0.0, 0.5, 0.3]) + rng.normal(0, 0.1, 5)
+    spread = rng.uniform(0.5, 2, 5)
+    return Bands(
+        runs=int(rng.integers(3, 60)), along=along, across=across,
+        whole=np.cumsum(rng.exponential(0.03, 99)), steps=np.cumsum(rng.exponential(0.02, (99, horizon)), axis=0),
+        names=names, centres=centres, spread=np.maximum(seen.std(axis=0), 1e-3), far=float(rng.uniform(0.2, 2)),
+        middle=middle, deviation=rng.uniform(0.2, 1, 5), low=middle - spread, high=middle + spread,
+        slopes=rng.normal(0, 0.3, 5), length=float(slow * physics.step * horizon * 4),
+        kinds=kinds, by_kind=np.cumsum(rng.exponential(0.03, (len(kinds), 99)), axis=1),
+    )  # fmt: skip
 
 
 def _instants(rng, physics, commands, count, steps, slow, known):

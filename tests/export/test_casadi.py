@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -21,7 +23,7 @@ from tests.export.strange import drawn
 @pytest.mark.parametrize("kind", ["hankel-dmd", "modules", "path-drawn"])
 def test_a_predictor_is_one_function(kind, tmp_path):
     strange = drawn(kind, 5, count=4, vessel="mariner")
-    file, names = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
+    file, names, *_ = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
     given = model(strange.predictor).inputs(strange.instants)
     expected = strange.predictor.predict(strange.instants)
@@ -43,14 +45,15 @@ def hybrid(horizon):
     corrector = found.corrector
     heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
     physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
-    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known")
+    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None)
 
 
+@pytest.mark.slow
 def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
     """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard."""
     horizon = 8
     predictor = hybrid(horizon)
-    file, names = predictor.export("casadi", tmp_path / "ship.casadi")
+    file, names, *_ = predictor.export("casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
     entries = {key: [entry["name"] for entry in rows] for key, rows in listed["inputs"].items()}
     rudder = entries["planned"].index("rudder.delta")
@@ -81,34 +84,15 @@ def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
     assert abs(ship["east"] - 20) < 8
 
 
-def test_a_loop_is_closed_with_a_vessel(tmp_path):
-    """A receding horizon holds a course 20 m to starboard: the file is all that the controller knows."""
-    vessel = load_vessel("mariner")
-    file, names = export_vessel(vessel, "casadi", tmp_path / "ship.casadi")
-    step, listed = ca.Function.load(str(file)), json.loads(names.read_text())
-    at = [entry["name"] for entry in listed["inputs"]["carry"]]
-    assert [entry["name"] for entry in listed["inputs"]["commands"]] == ["propeller.n", "rudder.delta"]
-    values, loads, dt, ahead = listed["defaults"]["parameters"], np.zeros(3), 10.0, 8
-    x = np.zeros(len(at))
-    x[at.index("u")] = 7.7
-    x[at.index("actual.rudder.delta")] = 0.0
-
-    def after(state, rudder):
-        return step(state, ca.vertcat(1.3, rudder), [], loads, values, dt)
-
-    for _ in range(12):
-        problem = ca.Opti()
-        orders = problem.variable(ahead)
-        state, cost = ca.MX(ca.DM(x)), 0
-        for k in range(ahead):
-            state = after(state, orders[k])
-            cost += (state[at.index("east")] - 20) ** 2 + 2e3 * orders[k] ** 2 + 1e4 * state[at.index("psi")] ** 2
-        problem.minimize(cost)
-        problem.subject_to(problem.bounded(-0.6, orders, 0.6))
-        problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 50})
-        x = np.array(after(x, problem.solve().value(orders[0]))).ravel()
-    assert abs(x[at.index("east")] - 20) < 8
-    assert abs(x[at.index("psi")]) < 0.1
+@pytest.mark.slow
+def test_the_example_of_the_docs_keeps_a_course(tmp_path, monkeypatch, capsys):
+    """It runs as it is printed: a receding horizon brings a vessel 20 m to starboard."""
+    text = (Path(__file__).parents[2] / "docs/export-casadi.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    export_vessel(load_vessel("mariner"), "casadi", tmp_path / "mariner.casadi")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "docs/export-casadi.md", "exec"), {})
+    assert abs(float(capsys.readouterr().out.split()[-1]) - 20) < 8
 
 
 @pytest.mark.slow

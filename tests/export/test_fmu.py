@@ -7,6 +7,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.export.compiled import FLAGS, compiler
+from tests.export.strange import drawn
 
 SECONDS = 60.0
 
@@ -244,3 +246,41 @@ def test_ten_thousand_cycles_leave_no_memory_behind(ship, folder):
         if i in (1000, 9999):
             used.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     assert used[1] - used[0] < 2000  # kB
+
+
+@pytest.mark.slow
+def test_the_band_of_a_predictor_is_that_of_python(tmp_path):
+    """Its level is a parameter; one that cannot be promised gives a status and no band."""
+    fmpy = pytest.importorskip("fmpy")
+    strange = drawn("alone", 6, vessel="mariner")
+    physics = Physics(load_vessel("mariner"), strange.predictor.physics.horizon, 5.0, "rk4")
+    bands = replace(strange.predictor.bands, runs=10)
+    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 8.0)}, {}, "held", bands=bands)
+    file = tmp_path / "banded.fmu"
+    assert write_fmu(predictor_unit(model(predictor), "banded"), file)
+    assert pytest.importorskip("fmpy.validation").validate_fmu(str(file)) == []
+    t = np.arange(0.0, 21.0)
+    u, delta = 6 + np.sin(t / 10), np.full_like(t, 0.1)
+    signals = np.rec.fromarrays([t, u, delta, np.full_like(t, 1.2)], names="time,u,rudder.delta,propeller.n")
+    last = physics.horizon
+    names = [f"{key}[{k}]" for key in ("along", "across", "ahead_x", "ahead_y") for k in (1, last)]
+    for level in (0.9, 0.3, 0.95):
+        found = fmpy.simulate_fmu(
+            str(file), stop_time=20.0, step_size=1.0, output_interval=1.0, input=signals,
+            output=[*names, "instant", "status"], start_values={"level": level},
+        )  # fmt: skip
+        if level == 0.95:
+            assert (found["status"] == 32).all()
+            assert np.isnan(found["along[1]"]).all()
+            continue
+        at = np.round(found["instant"]).astype(int)
+        zero = np.zeros(len(at))
+        columns = {"u": u[at], "v": zero, "r": zero, "psi": zero, "rudder.delta": delta[at], "V_w": zero}
+        columns["propeller.n"] = np.full(len(at), 1.2)
+        region = predictor.predict(Instants(columns), level=level).region
+        for k in (1, last):
+            np.testing.assert_allclose(found[f"along[{k}]"], region.along[k - 1], rtol=1e-10)
+            np.testing.assert_allclose(found[f"across[{k}]"], region.across[k - 1], rtol=1e-10)
+            np.testing.assert_allclose(found[f"ahead_x[{k}]"], region.ahead[k - 1, :, 0], rtol=0, atol=1e-10)
+            np.testing.assert_allclose(found[f"ahead_y[{k}]"], region.ahead[k - 1, :, 1], rtol=0, atol=1e-10)
+        assert not found["status"].any()

@@ -20,6 +20,7 @@ from shipid.hybrid.bands import (
     nearest,
     needed,
     track,
+    traits,
 )
 from tests.hybrid.runs import HORIZON, made
 
@@ -150,3 +151,17 @@ def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() ->
     for _ in range(2000):
         state = adapted(state, False)
     assert factor(state, table) == 0.0
+
+
+def test_a_band_of_one_instant_does_not_know_the_others() -> None:
+    """A ship that hardly moves beside one that goes fast; and one that comes to rest does not turn."""
+    made_, bands = STRANGE[0]
+    paths = made_.paths * np.where(np.arange(made_.paths.shape[1]) == 0, 1e-14, 1.0)[:, None]
+    whole = bands.region(paths, made_.columns, 1.0, 0.8)
+    alone = bands.region(paths[:, :1], {name: values[:1] for name, values in made_.columns.items()}, 1.0, 0.8)
+    np.testing.assert_allclose(whole.ahead[:, :1], alone.ahead, rtol=1e-12)
+    np.testing.assert_allclose(whole.along[:, :1], alone.along, rtol=1e-12)
+    stops = np.full((9, 2, 2), -1.0)
+    stops[:, 1] *= np.linspace(1, 1.01, 9)[:, None]
+    turns = traits(stops, {"r": np.zeros(2)}, 1.0, np.zeros(2), 1.0)[:, 1:3]
+    np.testing.assert_allclose(turns, 0, atol=1e-12)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +15,7 @@ from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.study.aboard import play, summary, write
 from shipid.vessel.load import load_vessel
+from tests.export.strange import bands_of, drawn
 
 STEP = 5.0
 
@@ -27,6 +30,22 @@ def log(seed=0, rows=60):
     frame["east"] = np.cumsum(np.r_[0, 35.0 * np.sin(psi[1:])])
     frame["propeller.n"], frame["rudder.delta"] = 1.3, np.repeat(rng.uniform(-0.2, 0.2, rows // 10), 10)
     return frame
+
+
+@pytest.fixture(scope="module")
+def banded(tmp_path_factory):
+    """Physics alone whose band ten runs calibrated, as if they were like the logs of this file."""
+    physics = Physics(load_vessel("mariner"), 4, STEP, "rk4")
+    rng = np.random.default_rng(0)
+    instants = drawn("alone", 6, vessel="mariner").instants
+    names = ("u", "r", "rudder.delta")
+    bands = bands_of(rng, physics, instants, names, 1.0)
+    bands = replace(bands, runs=10, kinds={"zigzag": 4}, by_kind=2 * bands.whole[None], far=100.0, slopes=np.zeros(5))
+    found = Predictor(
+        physics, "alone", Unchanged({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
+        bands=replace(bands, along=50.0 * np.arange(1, 5), across=30.0 * np.arange(1, 5)),
+    )  # fmt: skip
+    return found, found.save(tmp_path_factory.mktemp("cell") / "banded.npz")
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +87,73 @@ def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
     assert any("alarm" in line for line in lines)
     write(played, tmp_path / "seen.csv")
     assert {"ahead", "north", "outside", "latency"} <= set(pd.read_csv(tmp_path / "seen.csv").columns)
+
+
+def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tmp_path):
+    _, file = banded
+    frame = log()
+    played = play(file, saved(frame, tmp_path), level=0.9)
+    assert (played.instants["factor"] == 1).all()
+    instants, points = played.instants, played.points
+    turned = np.hypot(points["north"], points["east"]).notna()
+    assert turned.all()
+    held = []
+    for i in range(len(instants)):
+        t = instants["t"][i]
+        path = points[points["t"] == t]
+        course = path["band_course"].to_numpy()
+        true = frame[frame["t"].isin(path["t"] + path["ahead"])]
+        if len(true) < 4:
+            assert np.isnan(instants["reach"][i])
+            continue
+        off = true[["north", "east"]].to_numpy() - path[["north", "east"]].to_numpy()
+        along = off[:, 0] * np.cos(course) + off[:, 1] * np.sin(course)
+        across = off[:, 1] * np.cos(course) - off[:, 0] * np.sin(course)
+        reach = np.hypot(along / path["band_along"], across / path["band_across"]).max()
+        assert instants["reach"][i] == pytest.approx(reach, rel=1e-9)
+        held.append(reach <= 1)
+    (line,) = (line for line in summary(played) if line.startswith("band of 90%"))
+    assert f"held {np.mean(held):.0%} of the {len(held)} whole paths" in line
+    assert any("50% held" in line and "95%" not in line for line in summary(played))  # ten runs do not promise 95 %
+    write(played, tmp_path / "seen.csv")
+    assert {"band_along", "band_across", "band_course", "band_factor"} <= set(
+        pd.read_csv(tmp_path / "seen.csv").columns
+    )
+
+
+def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
+    _, file = banded
+    whole = log()
+    changed = whole.copy()
+    later = changed["t"] > 150
+    changed.loc[later, "north"] += 5000.0
+    (tmp_path / "b").mkdir()
+    first, second = (
+        play(file, saved(f, d), level=0.5, rate=0.3) for f, d in ((whole, tmp_path), (changed, tmp_path / "b"))
+    )
+    early = first.instants["t"] <= 150
+    pd.testing.assert_series_equal(first.instants["factor"][early], second.instants["factor"][early])
+    assert second.instants["factor"][~early].max() > first.instants["factor"][~early].max()
+    assert first.instants["factor"].iloc[:4].eq(1).all()  # no path has ended yet
+    for played in (first, second):
+        held = (played.instants["reach"] <= played.instants["factor"])[played.instants["reach"].notna()].mean()
+        assert any(f"adapting at 0.3: it held {held:.0%}" in line for line in summary(played))
+        assert any("times the calibrated one" in line for line in summary(played))
+
+
+def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
+    _, file = banded
+    target = saved(log(), tmp_path)
+    with pytest.raises(DataError, match="needs 19 runs or more"):
+        play(file, target, level=0.95)
+    with pytest.raises(DataError, match="of the kind 'zigzag'"):
+        play(file, target, level=0.9, kind="zigzag")
+    with pytest.raises(DataError, match="has no band"):
+        play(predictor, target, level=0.9)
+    wider, usual = (play(file, target, every=50.0, level=0.5, kind=kind).points for kind in ("zigzag", None))
+    np.testing.assert_allclose(wider["band_along"], 2 * usual["band_along"])
+    short = play(file, saved(log().iloc[:4], tmp_path), level=0.5)
+    assert any("no whole path can be judged" in line for line in summary(short))
 
 
 def test_a_wrong_interval_is_refused(predictor, tmp_path):
