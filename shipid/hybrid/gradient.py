@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from math import inf, isfinite, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 import optuna
@@ -16,11 +17,13 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.journal import distributions, frozen
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
-from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.training import Settings, train
 from shipid.hybrid.trials import best_of
+
+if TYPE_CHECKING:
+    from shipid.hybrid.path_trained import PathTrained
 
 Parameters = dict[str, float]
 

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -25,10 +25,12 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
+
+if TYPE_CHECKING:
+    from shipid.hybrid.path_drawn import PathDrawn
 
 SPARE = 4  # further trials whose errors without each run are kept
 

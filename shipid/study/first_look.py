@@ -21,7 +21,7 @@ from tomlkit.items import KeyType, SingleKey
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DocumentError
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Physics, check_columns
 from shipid.metrics import position_error
 from shipid.physics.signals import is_shaft, steers
 from shipid.simulation.approach import acceleration
@@ -180,6 +180,7 @@ def first_look(
     ------
     DataError : no run is as long as the horizon, or a command of the vessel is missing.
     """
+    check_columns(vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(vessel.file))
     chosen = set(runs)
     frame = dataset.frame[dataset.frame["run"].isin(chosen)].reset_index(drop=True)
     part = replace(dataset, frame=frame)
