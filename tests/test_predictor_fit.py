@@ -14,7 +14,7 @@ from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
-from shipid.hybrid.method import Method
+from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
@@ -98,6 +98,9 @@ def test_held_commands_are_never_those_of_the_plan() -> None:
 
 class Shared(Method):
     """A method that holds out a fifth of the runs."""
+
+    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+        return {}
 
 
 def test_folds_are_by_run() -> None:
