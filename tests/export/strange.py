@@ -56,7 +56,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     slow = 1.0 if ship is None else pace(ship)
     model = None if ship is None else dynamics(ship)
     three = model is not None and model.num_dof == 3 and not model.hidden
-    observer = Observer(fade=12.0) if three and kind not in STEPPED and rng.random() < 0.3 else None
+    observer = Observer(fade=12.0) if three and rng.random() < 0.3 and kind not in STEPPED else None
     physics = Physics(
         ship,
         int(rng.integers(3, 16)),
