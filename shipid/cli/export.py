@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.options import check_band
+from shipid.cli.options import check_band, command_line
+from shipid.errors import ShipidError
 
 
 def export(
@@ -45,6 +46,7 @@ def aboard(
         float | None, typer.Option(help="seconds between predictions; default the predictor's step")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="table of every point: .parquet or .csv")] = None,
+    html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
     level: Annotated[
         float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: shows it")
     ] = None,
@@ -58,6 +60,8 @@ def aboard(
     from shipid.study.aboard import play, summary, write
 
     check_band(level, kind, adaptive)
+    if html is not None and html.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
     played = play(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
     if out is not None:
         write(played, out)
@@ -65,3 +69,18 @@ def aboard(
         typer.echo(line)
     if out is not None:
         typer.echo(f"{len(played.points)} points -> {out}")
+    if html is not None:
+        from shipid.report.aboard import AboardContent, write_aboard
+        from shipid.version import __version__
+
+        content = AboardContent(
+            title=f"{log.stem}, played as if at sea",
+            name=predictor.stem,
+            said=summary(played),
+            instants=played.instants,
+            points=played.points,
+            track=played.track,
+            provenance={"Log": str(log), "Predictor": str(predictor), "shipid": __version__},
+            command=command_line(),
+        )
+        typer.echo(f"page -> {write_aboard(content, html)}")

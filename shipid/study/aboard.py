@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from shipid.study.apply import Band, along_run
 from shipid.study.prepare import states_along
 
 Array = np.ndarray
+TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
@@ -41,6 +42,7 @@ class Played:
     assumed : what the vessel feels and the log does not hold; it is 0.
     plan : whether orders were taken as held where the predictor knows a plan.
     band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
+    track : run, t [s], north, east [m] as measured, for a page.
     """
 
     instants: pd.DataFrame
@@ -52,6 +54,7 @@ class Played:
     plan: bool
     band: Band | None = None
     bands: Bands | None = None
+    track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
 
 
 def play(
@@ -97,7 +100,7 @@ def play(
     missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(
         pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
-        predictor.commands == "known", band, predictor.bands,
+        predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK],
     )  # fmt: skip
 
 

@@ -1,0 +1,168 @@
+"""The page of a log played as if at sea: what an officer would have seen, and how it went on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import Finding, Floats, Sentence
+from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line, plane
+from shipid.report.page import page, write
+from shipid.report.palette import INK, category
+from shipid.report.section import Section
+from shipid.report.selection import spread
+
+SAILED, PATH, PHYSICS, BAND, ALARM = "as it went", "predicted path", "physics alone", "band", "alarm"
+COLOURS = {SAILED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
+DASHES = {PHYSICS: "dash", BAND: "dot"}
+MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
+
+
+@dataclass(frozen=True, eq=False)
+class AboardContent:
+    """Everything the page shows.
+
+    Parameters
+    ----------
+    title, name : in words, and the predictor.
+    said : the lines of the summary; the first ones are the answer.
+    instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
+    points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
+        [m] and band_course [rad, clockwise from north].
+    track : run, t [s], north, east [m], as measured.
+    """
+
+    title: str
+    name: str
+    said: Sequence[str]
+    instants: pd.DataFrame
+    points: pd.DataFrame
+    track: pd.DataFrame
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
+    study_document: str = ""
+    findings: Sequence[Finding] = ()
+
+    @property
+    def answer(self) -> list[Sentence]:
+        """What was predicted, how often the alarm was raised, and whether the band kept its promise."""
+        kept = [text for text in self.said if text.startswith(("alarm:", "band of")) or " predictions in " in text]
+        return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in kept]
+
+    @property
+    def runs(self) -> list[str]:
+        """Runs to choose from, at even distances if there are many."""
+        return spread([str(run) for run in pd.unique(self.instants["run"])], MOST_RUNS)
+
+    @property
+    def banded(self) -> bool:
+        """Whether a band was asked for."""
+        return "band_along" in self.points
+
+
+def write_aboard(content: AboardContent, file: Path) -> Path:
+    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
+    return write(page(content, SECTIONS, "aboard"), file)
+
+
+def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
+    """East and north [m] of the ellipses of a band around the points of a path, with a gap between two."""
+    turn = np.append(np.linspace(0, 2 * np.pi, corners), np.nan)
+    along = points["band_along"].to_numpy()[:, None] * np.cos(turn)
+    across = points["band_across"].to_numpy()[:, None] * np.sin(turn)
+    course = points["band_course"].to_numpy()[:, None]
+    north = points["north"].to_numpy()[:, None] + along * np.cos(course) - across * np.sin(course)
+    east = points["east"].to_numpy()[:, None] + along * np.sin(course) + across * np.cos(course)
+    return east.ravel(), north.ravel()
+
+
+def seen(content: AboardContent) -> Figure:
+    """The track of a run with the paths, and bands, that were shown at some instants."""
+    drawn = [SAILED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
+    drawn += [BAND] if content.banded else []
+    return Figure(
+        id="seen",
+        title="What was seen",
+        takeaway=content.answer[-1].text,
+        how=f"Paths of {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as drawn."
+        + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
+        alternative="The measured track, with the paths predicted along it and those of the physics alone.",
+        height=520,
+        views={str(i): [Panel(_map(content, run))] for i, run in enumerate(content.runs)},
+        controls=[Control("run", content.runs)],
+        chips=[Chip(name, name, COLOURS[name], DASHES.get(name, "solid")) for name in drawn],
+    )
+
+
+def _map(content: AboardContent, run: str) -> go.Figure:
+    track = content.track[content.track["run"] == run]
+    points = content.points[content.points["run"] == run]
+    times = points["t"].unique()
+    shown = times[np.unique(np.linspace(0, len(times) - 1, MOMENTS).round().astype(int))]
+    traces = [_trace(SAILED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
+    for t in shown:
+        mine = points[points["t"] == t]
+        traces.append(_trace(PATH, mine["east"].to_numpy(), mine["north"].to_numpy(), 2.4))
+        if mine["physics_north"].notna().any():
+            traces.append(_trace(PHYSICS, mine["physics_east"].to_numpy(), mine["physics_north"].to_numpy(), 1.4))
+        if content.banded:
+            few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
+            traces.append(_trace(BAND, *outline(few), 1.2))
+    return go.Figure(traces, plane("east [m]", "north [m]"))
+
+
+def _trace(name: str, x: Floats, y: Floats, width: float) -> go.Scatter:
+    look = {"color": COLOURS[name], "dash": DASHES.get(name, "solid"), "width": width}
+    return line(name, x, y, [name], line=look)
+
+
+def along(content: AboardContent) -> Figure:
+    """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
+    error = content.instants["error"].median()
+    said = f"The median error at the end of a path is {error:.2f} m."
+    return Figure(
+        id="along",
+        title="Along the run",
+        takeaway=said if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
+        how="Error at the end of the path predicted at each instant"
+        + (", with the half axes of the band there" if content.banded else "")
+        + "; marks are instants outside of the training, where nothing is promised.",
+        alternative="Error over time, with instants of alarm marked.",
+        height=300,
+        views={str(i): [Panel(_history(content, run))] for i, run in enumerate(content.runs)},
+        controls=[Control("run", content.runs)],
+        chips=[
+            Chip(PATH, "error", COLOURS[PATH]),
+            *([Chip(BAND, "band along and across", COLOURS[BAND], "dot")] if content.banded else []),
+            Chip(ALARM, "alarm", COLOURS[ALARM]),
+        ],
+    )
+
+
+def _history(content: AboardContent, run: str) -> go.Figure:
+    mine = content.instants[content.instants["run"] == run]
+    t = mine["t"].to_numpy() - float(mine["t"].iloc[0])
+    traces = [line("error", t, mine["error"].to_numpy(), [PATH], line={"color": COLOURS[PATH], "width": 2})]
+    if content.banded:
+        last = content.points[(content.points["run"] == run)].groupby("t", sort=False).last()
+        for column in ("band_along", "band_across"):
+            look = {"color": COLOURS[BAND], "dash": "dot", "width": 1.4}
+            traces.append(line(column.replace("_", " "), t, last[column].to_numpy(), [BAND], line=look))
+    alarm = mine["outside"].to_numpy(dtype=bool)
+    marks = {"color": COLOURS[ALARM], "size": 8, "symbol": "triangle-up"}
+    traces.append(line(ALARM, t[alarm], np.zeros(alarm.sum()), [ALARM], mode="markers", marker=marks))
+    up = axis("at the end of the path [m]", rangemode="tozero")
+    return go.Figure(traces, layout(axis("time in the run [s]"), up))
+
+
+SECTIONS: dict[str, Section] = {
+    "aboard": Section(
+        "As if at sea", lambda content: (seen(content), along(content)), needs=("instants",), anchors=("seen", "along")
+    ),
+}
+"""Sections of the page in order."""

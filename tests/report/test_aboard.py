@@ -1,0 +1,63 @@
+"""The page of a log played as if at sea."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.report.aboard import SECTIONS, AboardContent, along, outline, seen, write_aboard
+from shipid.report.section import drawn
+
+NASTY = "<b>run</b>"
+
+
+def content(banded: bool = True, physics: bool = True) -> AboardContent:
+    times, ahead = np.arange(0.0, 40.0, 4.0), np.arange(1.0, 6.0)
+    at, by = np.meshgrid(times, ahead, indexing="ij")
+    points = pd.DataFrame({"run": NASTY, "t": at.ravel(), "ahead": by.ravel()})
+    points["north"], points["east"] = 5 * (points["t"] + points["ahead"]), 0.1 * points["ahead"] ** 2
+    points["physics_north"] = points["north"] + 0.5 if physics else np.nan
+    points["physics_east"] = points["east"] if physics else np.nan
+    if banded:
+        points = points.assign(band_along=points["ahead"], band_across=0.5 * points["ahead"], band_course=0.3)
+    instants = pd.DataFrame({"run": NASTY, "t": times, "outside": times > 20, "latency": 0.01})
+    instants["error"] = np.where(times < 36, 1.0 + times / 10, np.nan)
+    track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
+    said = ["10 predictions in 1 run, 5 s ahead; 0 rows before there was a past", "alarm: at 4 of 10 instants"]
+    return AboardContent("played", "cell", [*said, "latency: 10 ms"], instants, points, track)
+
+
+def test_the_outline_of_a_band_is_its_ellipse() -> None:
+    """Every corner lies at distance 1 in half axes, turned by the course; a gap parts two ellipses."""
+    points = content().points.iloc[:3]
+    east, north = (values.reshape(3, -1) for values in outline(points, 12))
+    assert np.isnan(east[:, -1]).all()
+    away_n = north[:, :-1] - points["north"].to_numpy()[:, None]
+    away_e = east[:, :-1] - points["east"].to_numpy()[:, None]
+    ahead, aside = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
+    along_track = (away_n * ahead[0] + away_e * ahead[1]) / points["band_along"].to_numpy()[:, None]
+    across = (away_n * aside[0] + away_e * aside[1]) / points["band_across"].to_numpy()[:, None]
+    np.testing.assert_allclose(np.hypot(along_track, across), 1.0)
+
+
+@pytest.mark.parametrize("banded", [True, False])
+@pytest.mark.parametrize("physics", [True, False])
+def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None:
+    here = content(banded, physics)
+    names = [trace.name for trace in seen(here).views["0"][0].figure.data]
+    assert names.count("predicted path") == 6
+    assert names.count("physics alone") == 6 * physics
+    assert names.count("band") == 6 * banded
+    history = along(here).views["0"][0].figure.data
+    assert len(history) == 2 + 2 * banded
+    np.testing.assert_allclose(history[-1].x, here.instants["t"][here.instants["outside"]])
+    text = write_aboard(here, tmp_path / "seen.html").read_text()
+    assert "Alarm: at 4 of 10 instants." in text
+    assert NASTY not in text
+    assert "latency: 10 ms" not in text
+
+
+def test_every_item_is_declared() -> None:
+    for one in drawn(SECTIONS, content()):
+        assert [item.id for item in one.items] == list(SECTIONS[one.id].anchors)
