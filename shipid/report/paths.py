@@ -125,7 +125,8 @@ def _compared(content: ReportContent) -> list[str]:
     if len(physics) < 2:
         return []
     order = [str(name) for name in families(content).model]
-    return [middle[DATA_DRIVEN]] * (DATA_DRIVEN in middle) + sorted(physics, key=order.index)
+    pure = [middle[DATA_DRIVEN]] if DATA_DRIVEN in middle else []
+    return [*pure, *sorted(physics, key=order.index)]
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:

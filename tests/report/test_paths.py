@@ -130,3 +130,12 @@ def test_no_windows_no_browser(full_scale):
     empty = replace(full_scale, snapshots=[])
     assert browser(empty) is None
     assert snapshots(empty) is None
+
+
+def test_models_are_compared_where_no_path_without_physics_was_recorded(simulation):
+    shots = [
+        replace(shot, paths={key: path for key, path in shot.paths.items() if key[0] != "no model"})
+        for shot in simulation.snapshots
+    ]
+    figure = paths.snapshots(replace(simulation, snapshots=shots))
+    assert {window.model for window in figure.windows} == {"moderate-2", "high-2"}
