@@ -55,16 +55,16 @@ def test_the_difference_is_that_of_the_means() -> None:
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    """100 tables without and with an effect: 95 % intervals over test runs, give or take what chance allows."""
+    """40 tables without and with an effect: 95 % intervals over test runs, give or take what chance allows."""
     rng = np.random.default_rng(1)
     for effect in (0.0, -0.4):
         inside, free = 0, 0
-        for _ in range(100):
+        for _ in range(40):
             found = row(compared(cells(rng, effect), "drawn"))
             inside += found.low <= effect <= found.high
             free += found.high < 0
-        assert inside >= 86
-        assert free <= 9 if effect == 0 else free >= 90
+        assert inside >= 33
+        assert free <= 5 if effect == 0 else free >= 34
 
 
 def test_a_failed_cell_is_counted_and_not_averaged() -> None:
