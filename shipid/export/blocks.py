@@ -8,6 +8,7 @@ written once here, and the C and the CasADi that come from it say the same.
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -69,7 +70,7 @@ class Precision:
         return Dialect(ARITHMETIC | _OPERATIONS, "const real {0} = {1};", self.number, "(real){0}")
 
 
-class Block:
+class Block(ABC):
     """A function of vectors with one output vector.
 
     name : of the C function, with a number added where two share it.
@@ -81,17 +82,17 @@ class Block:
     size: int
 
     @property
+    @abstractmethod
     def function(self) -> ca.Function:
         """The block as a CasADi function; ShipidError where CasADi has no such function."""
-        raise NotImplementedError
 
     def parts(self) -> Sequence[Block]:
         """Blocks that this one calls."""
         return ()
 
+    @abstractmethod
     def statements(self, call: dict[int, str], precision: Precision) -> list[str]:
         """C statements that write `out[size]`; `call` names the C function of each block by its identity."""
-        raise NotImplementedError
 
     def numbers(self) -> int:
         """How many numbers its tables hold."""
