@@ -29,44 +29,19 @@ ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "main",
-    ]
+    """
+    auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main real
+    acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p
+    log2 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint
+    round lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin fma isnan isinf
+    isfinite signbit abort abs atexit atof atoi atol atoll bsearch calloc div exit free getenv labs ldiv llabs lldiv
+    malloc qsort rand realloc srand strtod strtof strtol system memchr memcmp memcpy memmove memset strcat strchr strcmp
+    strcpy strlen strncmp strncpy strstr printf fprintf sprintf snprintf scanf puts putchar getchar perror remove rename
+    rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary
+    """.split()
 )
+"""Keywords of C99 and names of its library: a file of such a name would not compile."""
 
 
 @dataclass(frozen=True)

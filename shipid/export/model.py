@@ -24,8 +24,8 @@ from shipid.vessel.dynamics import ETA, ETA_UNITS, NU
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
-MOST_NUMBERS = 95_000
-"""Numbers in the tables of an exported predictor, at most: about 2 MB of source, 0.8 MB compiled in double."""
+MOST_NUMBERS = 250_000
+"""Numbers in the tables of an exported predictor, at most: about 5 MB of source, 2 MB compiled in double."""
 
 
 class Exportable(Protocol):

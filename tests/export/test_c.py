@@ -276,6 +276,7 @@ def test_names_are_those_of_c():
     assert c_name("moderate-3+drawn-N0030-s0") == "moderate_3_drawn_n0030_s0"
     assert c_name("33.9 m") == "m_33_9_m"
     assert c_name("double") == "m_double"
+    assert c_name("exp") == "m_exp"  # of the library
     assert c_name("Ærø") == "r"
     assert c_name("øøø") == "model"
 
