@@ -26,7 +26,6 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
-from shipid.logs.admit import check_log
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, Progress, TextFormat, dated, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
@@ -73,7 +72,6 @@ def import_log(
     for kind in off:
         if kind not in REPAIRS:
             raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)
-    check_log(source)
     digest = digest_of(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(

@@ -12,7 +12,7 @@ from scipy.io import savemat
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import TextFormat, read_table, require_file, seconds
+from shipid.logs.readers import WIDEST, TextFormat, read_table, require_file, seconds, widest
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]
@@ -320,3 +320,15 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
     counted = [record["count"] for record in dataset.metadata["repairs"] if record["kind"] == "unreadable"]
     assert counted == ([2] if time == "fix" else [])
     assert dataset.metadata["origin"] == {"latitude": 63.45, "longitude": 10.4}
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "whitespace"])
+@pytest.mark.parametrize(("cells", "refused"), [(WIDEST, False), (WIDEST + 1, True), (10**6, True)])
+def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refused: bool) -> None:
+    mark = b" " if separator == "whitespace" else separator.encode()
+    head = b"t,u\n" + mark.join([b"a"] * cells) + b"\n"
+    if not refused:
+        widest(head, separator, Path("log.csv"))
+        return
+    with pytest.raises(DataError, match=f"a line of {cells} cells: a log has {WIDEST} columns at most"):
+        widest(head, separator, Path("log.csv"))
