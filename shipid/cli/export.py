@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.options import check_band, command_line
+from shipid.cli.options import Adaptive, Kind, check_band, command_line
 from shipid.errors import ShipidError
 
 
@@ -50,11 +50,8 @@ def aboard(
     level: Annotated[
         float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: shows it")
     ] = None,
-    kind: Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")] = None,
-    adaptive: Annotated[
-        float | None,
-        typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
-    ] = None,
+    kind: Kind = None,
+    adaptive: Adaptive = None,
 ) -> None:
     """Play a log as if at sea: every instant uses the past alone. Show what an officer would have seen."""
     from shipid.study.aboard import play, summary, write

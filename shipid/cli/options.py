@@ -51,6 +51,13 @@ def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
     return result
 
 
+Kind = Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")]
+Adaptive = Annotated[
+    float | None,
+    typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
+]
+
+
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
     """Raise ShipidError where --kind or --adaptive come without --level, or the rate is none."""
     if level is None and (kind is not None or adaptive is not None):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.options import Folder, check_band
+from shipid.cli.options import Adaptive, Folder, Kind, check_band
 
 
 def predict(
@@ -19,11 +19,8 @@ def predict(
     level: Annotated[
         float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: adds its columns")
     ] = None,
-    kind: Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")] = None,
-    adaptive: Annotated[
-        float | None,
-        typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
-    ] = None,
+    kind: Kind = None,
+    adaptive: Adaptive = None,
 ) -> None:
     """Write physics and cooperative paths in north-east for every instant of a log."""
     from shipid.study.apply import predict_log
