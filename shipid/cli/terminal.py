@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,6 @@ import typer
 from shipid.errors import visible
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
     from rich.table import Table
 
     from shipid.study.run import Event
@@ -75,15 +74,20 @@ def reading(log: Path) -> Iterator[Callable[[float], None]]:
             print(file=sys.stderr)
 
 
-def show_reasons(choices: list[tuple[str, str, str]]) -> None:
-    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+def show_reasons(choices: Iterable[Mapping[str, str]]) -> None:
+    """Print choices, each with its path, value and reason why: a table on a terminal, else a line each."""
     from rich.console import Console
 
     if Console().is_terminal:
-        show(table(["choice", "value", "because"], choices))
+        show(table(["choice", "value", "because"], (choice.values() for choice in choices)))
         return
-    for path, value, why in choices:
-        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
+    for choice in choices:
+        typer.echo(f"{choice['path']} = {choice['value']}" + (f"  # {choice['why']}" if choice["why"] else ""))
+
+
+def short(text: str, most: int) -> str:
+    """Shorten a text to so many characters, with dots in its middle."""
+    return text if len(text) <= most else f"{text[: most // 2 - 1]}...{text[-(most - most // 2 - 2) :]}"
 
 
 def digits(value: float) -> str:
@@ -127,16 +131,13 @@ def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
     return table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
 
 
-def write_measures(frame: DataFrame, file: Path) -> None:
-    """Write a table of measures as CSV or Parquet and say where."""
-    from shipid.files import write_table
+def counted(
+    blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = "interrupted: nothing was written"
+) -> Iterator[Any]:
+    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`.
 
-    write_table(file, frame)
-    typer.echo(f"measures -> {file}")
-
-
-def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`."""
+    interrupted : what Ctrl-C is answered with.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -149,8 +150,8 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterato
                 progress.advance(task, len(block))
                 yield block
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted: nothing was written\n")
-        raise
+        sys.stderr.write(f"{interrupted}\n")
+        sys.exit(130)
 
 
 @contextmanager
