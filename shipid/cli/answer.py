@@ -37,7 +37,7 @@ class Answer:
         elif text:
             typer.echo(text)
 
-    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[str, Any]], shown: Table | None) -> None:
+    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: Table | None) -> None:
         """Print a table, if there is one to be shown; for programs its rows under a name, SI and not rounded."""
         if self.as_json:
             self.found[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]

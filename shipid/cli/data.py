@@ -8,14 +8,24 @@ from typing import Annotated
 import typer
 
 from shipid.cli.answer import Answer, Json, answering
+from shipid.cli.completion import beginning, files
+from shipid.cli.options import MappingName
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 
 
+def _public(incomplete: str) -> list[str]:
+    from shipid.document import bundled
+
+    return beginning(incomplete, bundled("studies/mappings"))
+
+
 @app.command("fetch")
-def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
+def data_fetch(
+    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_public)],
+) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
     from shipid.logs.catalogue import fetch
 
@@ -24,7 +34,7 @@ def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as g
 
 @app.command("import")
 def data_import(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
+    mapping: MappingName = "",
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[
         Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: in this folder")
@@ -68,12 +78,15 @@ def data_import(
 
 
 def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) -> None:
-    from shipid.files import write_new
+    from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import draft_mapping
+    from shipid.schemas import with_schema
 
     guessed = guess(log, names)
-    file = write_new(draft_mapping(guessed), out or Path(f"{guessed.file.resolve().stem}.toml"))
+    file = out or Path(f"{guessed.file.resolve().stem}.toml")
+    check_new(file, "mapping")
+    write_new(with_schema(draft_mapping(guessed), file, "mapping"), file)
     columns = [
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
@@ -99,7 +112,7 @@ def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) 
 
 @app.command("segment")
 def data_segment(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    mapping: MappingName,
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[Path | None, typer.Option(help="TOML file to write; default: in this folder")] = None,
     as_json: Json = False,
@@ -125,7 +138,9 @@ def data_segment(
 
 @app.command("check")
 def data_check(
-    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    dataset: Annotated[
+        Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=files(".parquet"))
+    ],
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
@@ -161,7 +176,7 @@ def data_check(
 
 @app.command("measures")
 def data_measures(
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)", autocompletion=files(".parquet"))],
     manoeuvre: Annotated[
         str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
     ] = None,

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.options import command_line, pairs, parsed, stem
+from shipid.cli.completion import files
+from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.terminal import digits, iterations, table
 from shipid.errors import ShipidError
 
@@ -21,11 +22,11 @@ if TYPE_CHECKING:
 
 
 def identify(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    vessel: VesselName,
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     parameters: Annotated[
         list[str] | None,
-        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...[order >= 3]"'),
+        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...\\[order >= 3]"'),
     ] = None,
     fixed: Annotated[list[str] | None, typer.Option(help="paths to leave out of --parameters")] = None,
     together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,

@@ -8,14 +8,15 @@ from typing import Annotated
 import typer
 
 from shipid.cli.answer import Json, answering
-from shipid.cli.options import command_line, stem
+from shipid.cli.completion import files
+from shipid.cli.options import VesselName, command_line, stem
 from shipid.cli.terminal import digits, table
 from shipid.errors import ShipidError
 
 
 def replay(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    vessel: VesselName,
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     runs: Annotated[
         list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
     ] = None,

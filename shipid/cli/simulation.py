@@ -8,13 +8,19 @@ from typing import Annotated, Any
 import typer
 
 from shipid.cli.answer import Json, answering
-from shipid.cli.options import Changes, command_line, parsed, stem
+from shipid.cli.completion import bundled_or_file
+from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
 from shipid.cli.terminal import criterion_table, measure_table, table
 from shipid.errors import DocumentError, ShipidError
 
 
 def simulate(
-    study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
+    study: Annotated[
+        str,
+        typer.Argument(
+            help="bundled name or path of a study with a \\[truth]", autocompletion=bundled_or_file("studies")
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet in this folder")
     ] = None,
@@ -54,7 +60,7 @@ def _limits(row: Any) -> str:
 
 
 def manoeuvre(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    vessel: VesselName,
     name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
     angles: Annotated[
         list[float] | None,

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.options import Changes, Device, Folder, Scheduler, Workers, parsed, stem
+from shipid.cli.completion import bundled_or_file, files
+from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.terminal import counted, digits, draw, short, show_reasons, table
 from shipid.errors import DocumentError
 
@@ -37,7 +39,12 @@ def study_list(as_json: Json = False) -> None:
 
 @app.command("new")
 def study_new(
-    vessel: Annotated[list[str], typer.Option(help="bundled name, or path of a vessel or patch; may be repeated")],
+    vessel: Annotated[
+        list[str],
+        typer.Option(
+            help="bundled name, or path of a vessel or patch; may be repeated", autocompletion=bundled_or_file("models")
+        ),
+    ],
     data: Annotated[
         Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
     ] = None,
@@ -50,12 +57,13 @@ def study_new(
     import shlex
 
     from shipid.files import check_new, write_new
+    from shipid.schemas import with_schema
     from shipid.study.new import draft_study
 
     file = out or Path(f"{stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
-    write_new(draft.text, file, "study")
+    write_new(with_schema(draft.text, file, "study"), file, "study")
     with answering(as_json) as answer:
         choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
         answer.say(choices=choices)
@@ -79,7 +87,7 @@ def study_new(
 
 @app.command("variants")
 def study_variants(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     save: Annotated[Path | None, typer.Option(help="folder for one patch document per variant")] = None,
     accuracy: Annotated[bool, typer.Option(help="also simulate or import the data, and show A")] = True,
     changes: Changes = None,
@@ -125,7 +133,7 @@ def _factors(row: dict[str, Any]) -> list[str]:
 
 @app.command("screen")
 def study_screen(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     family: Annotated[str | None, typer.Argument(help="family; default: all that draw factors from a range")] = None,
     members: Annotated[int, typer.Option(min=2, max=100000, help="members of each family")] = 1000,
     out: Annotated[
@@ -164,7 +172,7 @@ def study_screen(
 
 @app.command("rotate")
 def study_rotate(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     tests: Annotated[list[str], typer.Option(help="runs that test in turn, * for any part of a name; may be repeated")],
     out: Annotated[
         Path | None,
@@ -217,7 +225,7 @@ def study_rotate(
 
 @app.command("run")
 def study_run(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     workers: Workers = None,
     scheduler: Scheduler = None,
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
@@ -266,7 +274,10 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
 
 @app.command("compare")
 def study_compare(
-    folders: Annotated[list[Path], typer.Argument(help="two or more folders of runs; the first is what others meet")],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="two or more folders of runs; the first is what others meet", autocompletion=files()),
+    ],
     pair: Annotated[
         list[str] | None,
         typer.Option(help="FIRST=OTHER: a family or method of the first run and its counterpart; may be repeated"),
@@ -323,7 +334,7 @@ def _show_matched(found: Comparison, answer: Answer) -> DataFrame:
     return errors
 
 
-def _difference(row: dict[str, Any], banded: bool) -> list[str]:
+def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     """One row of a comparison as words."""
     interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if row["low"] == row["low"] else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
@@ -349,8 +360,8 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
     texts = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
-    several = errors.duplicated(["family", "N_D"]).any()
-    names = errors["family"] + (" + " + errors["method"]).where(several & (errors["N_D"] > 0), "")
+    several = bool(errors.duplicated(["family", "N_D"]).any())
+    names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
     wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
     wide = wide.reindex(names.unique()).fillna("-")
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from shipid.cli.answer import Json, answering
+from shipid.cli.options import VesselName
 from shipid.cli.terminal import criterion_table, table
 from shipid.errors import ShipidError
 
@@ -27,29 +28,17 @@ def vessel_list(as_json: Json = False) -> None:
 
 @app.command("show")
 def vessel_show(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")] = "",
-    schema: Annotated[
-        bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")
-    ] = False,
+    vessel: VesselName,
     as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    if schema:
-        import json
-
-        from shipid.vessel.schema import vessel_model
-
-        typer.echo(json.dumps(vessel_model().model_json_schema(), indent=1))
-        return
-    if not vessel:
-        raise ShipidError("name a vessel (see `shipid vessel list`), or ask for --schema")
     from shipid.vessel.load import load_vessel, sources
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
     ship = load_vessel(vessel)
     document = ship.document
     origin = sources(ship)
-    terms = [
+    terms: list[dict[str, Any]] = [
         {"term": path, "kind": key.split(".")[1], "off": off, "source": origin[path]}
         for off in (False, True)
         for path, key, _ in term_blocks(document, off)
@@ -107,6 +96,8 @@ def vessel_new(
         raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
     if out.exists():
         raise ShipidError("exists already: choose another name", file=out)
+    from shipid.files import write_text
+    from shipid.schemas import with_schema
     from shipid.simulation.measured import trials
     from shipid.vessel.template import Particulars, first_guess
 
@@ -115,7 +106,7 @@ def vessel_new(
         propeller_diameter, rudder_area, rudder_span, rudder_rate, tunnel_thruster, scale, density,
     )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
-    out.write_text(guessed.text, encoding="utf-8")
+    write_text(out, with_schema(guessed.text, out, "vessel"))
     with answering(as_json) as answer:
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)

@@ -26,6 +26,7 @@ from shipid.study.results import Results, read_results
 from shipid.study.verdict import manoeuvres, shown, too_few
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 ALONE = "alone"
 """Method of the rows of A, which no data improve; their N_D is 0."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
@@ -113,7 +114,8 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
         raise DocumentError(
             f"{wrong!r} is no family or method of the first run: {choices(wrong, known)}", path="--pair"
         )
-    notes, called = [], {}
+    notes: list[str] = []
+    called: dict[str, str] = {}
     for key in ("family", "method"):
         matched, words = _counterparts(mine[key], theirs[key], pairs)
         called |= matched
@@ -198,11 +200,11 @@ def _label(part: pd.DataFrame, key: str) -> str:
     return str(here) if here == there else f"{here} ~ {there}"
 
 
-def _windows(first: Results, other: Results) -> tuple[Array, Array, bool, list[str]]:
+def _windows(first: Results, other: Results) -> tuple[Index, Index, bool, list[str]]:
     """Places of the windows that are judged in each run, whether they are pairs, and a note on it."""
     place = {key: k for k, key in enumerate(_moments(other.test))}
-    here = np.array([k for k, key in enumerate(_moments(first.test)) if key in place], dtype=int)
-    there = np.array([place[key] for key in _moments(first.test) if key in place], dtype=int)
+    here = np.array([k for k, key in enumerate(_moments(first.test)) if key in place], dtype=np.int64)
+    there = np.array([place[key] for key in _moments(first.test) if key in place], dtype=np.int64)
     if len(here) and (_same_recording(first.test, other.test, here, there) or _same_draws(first.plan, other.plan)):
         common = manoeuvres(len(set(first.test.run[here])))
         all_of = len(here) == len(first.test) == len(other.test)
@@ -217,7 +219,7 @@ def _moments(test: Windows) -> list[tuple[str, float]]:
     return [(str(run), round(float(t), 4)) for run, t in zip(test.run, test.t, strict=True)]
 
 
-def _same_recording(one: Windows, two: Windows, here: Array, there: Array) -> bool:
+def _same_recording(one: Windows, two: Windows, here: Index, there: Index) -> bool:
     """Whether windows of the same name and moment hold the same measured motion."""
     names = [name for name in MEASURED if name in one.columns and name in two.columns]
     return all(
@@ -241,7 +243,7 @@ class _Side:
     training: Array
 
 
-def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: Array) -> _Side:
+def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: Index) -> _Side:
     """Mean error of each group of cells in every test manoeuvre, on some windows."""
     test = results.test
     order, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
@@ -254,7 +256,9 @@ def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: 
     errors, training = np.zeros((len(groups), len(order))), np.zeros(len(groups))
     for row, part in enumerate(groups):
         cells = part.rename(columns={f"{name}_{side}": name for name in ("cell", "foundation", "H", "trained")})
-        paths = (results.physics[r.foundation] if r.N_D == 0 else results.paths[r.cell] for r in cells.itertuples())
+        paths = (
+            results.physics[str(r.foundation)] if r.N_D == 0 else results.paths[str(r.cell)] for r in cells.itertuples()
+        )
         errors[row] = np.mean([by_run(path) for path in paths], axis=0)
         if not cells["trained"].all():
             continue

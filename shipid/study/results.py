@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -76,10 +77,8 @@ class Results:
 
         Cells that are not there, or have no result, are NaN; `units` and the study's name are attributes.
         """
-        try:
-            import xarray  # noqa: F401  pandas makes the dataset
-        except ImportError:
-            raise ShipidError("needs xarray, which is not installed: pip install xarray") from None
+        if find_spec("xarray") is None:  # pandas makes the dataset
+            raise ShipidError("needs xarray, which is not installed: pip install xarray")
         keys = ["foundation", "method", "N_D", "seed"]
         dataset = self.cells.set_index(keys)[list(store.METRICS)].to_xarray()
         for name, unit in store.UNITS.items():
