@@ -42,7 +42,7 @@ def files(*endings: str) -> Offer:
 
 def cells(context: typer.Context, incomplete: str) -> list[str]:
     """Offer the cells of the folder that the command names."""
-    folder = context.params.get("folder")
+    folder = context.params.get("folder") or next(iter(context.args), None)  # not parsed while the line is not whole
     return beginning(incomplete, sorted(file.stem for file in Path(folder, "cells").glob("*.npz"))) if folder else []
 
 

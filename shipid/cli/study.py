@@ -402,9 +402,11 @@ def _before_work(
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:
     from shipid.study import run
     from shipid.study.contents import ANSWER, write_pages
+    from shipid.study.progress import Watch
 
+    events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
     try:
-        draw(run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device))
+        draw(events, Watch(plan, folder))
     except KeyboardInterrupt:
         sys.stderr.write(f"interrupted; what is finished is kept. Continue with: shipid study resume {folder}\n")
         sys.exit(130)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,9 +16,11 @@ from shipid.errors import visible
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from shipid.study.progress import Watch
     from shipid.study.run import Event
 
 
+SILENCE, LOOK = 30.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
 HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
 
@@ -167,19 +170,66 @@ def iterations() -> Iterator[Any]:
         yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
 
 
-def draw(events: Iterable[Event]) -> None:
-    """Show the events of a run: live progress on a terminal, else one plain line per finished cell."""
+@contextmanager
+def looking(look: Callable[[], None], every: float) -> Iterator[None]:
+    """Call a function every so many seconds, in a thread beside the block."""
+    from threading import Event, Thread
+
+    ended = Event()
+
+    def go() -> None:
+        while not ended.wait(every):
+            look()
+
+    thread = Thread(target=go, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+class Quiet:
+    """Plain lines of a run: when nothing has been said for a while, how far the searches are."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch = watch
+        self.done: set[str] = set()
+        self.last = time.monotonic()
+
+    def say(self, line: str) -> None:
+        """Print a line."""
+        typer.echo(visible(line))
+        self.last = time.monotonic()
+
+    def look(self) -> None:
+        """Print the search that moved last, if it is time to."""
+        if time.monotonic() - self.last >= SILENCE and (found := self.watch.look(self.done)):
+            more = f" ({len(found)} searches go on)" if len(found) > 1 else ""
+            self.say(f"... {found[0].words}{more}")
+
+
+def draw(events: Iterable[Event], watch: Watch) -> None:
+    """Show the events of a run: live progress on a terminal, else one plain line per finished cell.
+
+    watch : what says how far searches are, so that there is news within long cells, too.
+    """
     from rich.console import Console
 
     from shipid.study.start import event_line
 
     console = Console()
     if not console.is_terminal:
-        for event in events:
-            line = event_line(event)
-            if line:
-                typer.echo(visible(line))
+        quiet = Quiet(watch)
+        with looking(quiet.look, min(SILENCE, 5.0)):
+            for event in events:
+                quiet.done.update([event.row["cell"]] if event.kind == "cell" else ())
+                line = event_line(event)
+                if line:
+                    quiet.say(line)
         return
+    from rich.markup import escape
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -198,8 +248,18 @@ def draw(events: Iterable[Event]) -> None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    with Progress(*columns, console=console, refresh_per_second=2) as progress:  # drawing takes time from workers
-        task = progress.add_task("cells", total=None)
+    finished: set[str] = set()
+    progress = Progress(*columns, console=console, refresh_per_second=2)  # drawing takes time from workers
+    task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
+
+    def look() -> None:
+        found = watch.look(finished)
+        progress.update(inner, visible=bool(found))
+        if found:
+            said = escape(visible(found[0].words))
+            progress.update(inner, description=said, completed=found[0].done, total=found[0].count)
+
+    with progress, looking(look, LOOK):
         for event in events:
             if event.kind == "note":
                 progress.console.print(visible(event.text), markup=False, highlight=False)
@@ -207,6 +267,7 @@ def draw(events: Iterable[Event]) -> None:
                 progress.update(task, total=event.total, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
+                finished.add(row["cell"])
                 if row["status"] == "ok":
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])
