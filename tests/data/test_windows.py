@@ -18,6 +18,7 @@ from shipid.data.windows import (
     from_frame,
     nested_runs,
     part_folds,
+    run_folds,
     split_folds,
     split_runs,
     to_frame,
@@ -257,6 +258,24 @@ def test_held_out_share(share: float, seed: int) -> None:
     assert abs(len(held) - share * 17) <= 1
     assert rest
     assert held
+
+
+@pytest.mark.parametrize(
+    ("validation", "num_folds", "expected"),
+    [("runs", 1, [1] * 10), ("share", 1, [2]), ("runs", 3, [3, 3, 4]), ("share", 4, [2, 2, 3, 3])],
+)
+def test_few_runs_validate_and_all_others_train(validation: str, num_folds: int, expected: list[int]) -> None:
+    """Every run in turn; a fifth of them; or dealt into folds: the second indices are those that judge."""
+    windows = runs_at(*((100.0 * k, 100.0 * k + 30.0) for k in range(10)), clock="run")
+    judges = []
+    for training, judged in run_folds(windows, validation, 3, num_folds):
+        names = set(windows.run[judged])
+        judges.append(sorted(names))
+        assert names.isdisjoint(windows.run[training])
+        np.testing.assert_array_equal(np.sort(np.concatenate([training, judged])), np.arange(len(windows)))
+    assert sorted(map(len, judges)) == expected
+    if len(judges) > 1:
+        assert sorted(name for names in judges for name in names) == sorted(windows.spans)
 
 
 def test_splits_depend_on_the_seed() -> None:
