@@ -24,7 +24,6 @@ from shipid.data.windows import (
     to_frame,
 )
 from shipid.errors import DataError
-from shipid.hybrid.features import planned_means
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 60.5, 0.5)
@@ -304,17 +303,6 @@ def test_impossible_splits() -> None:
         nested_runs(NAMES, [3, 18], 0)
     with pytest.raises(DataError, match="two runs"):
         split_runs(["a"], 0.2, 0)
-
-
-def test_planned_means_by_hand() -> None:
-    """Seven steps in three parts of 3, 2 and 2; what is planned to stay adds nothing."""
-    planned = {"port.n": np.array([2.0, 2, 2, 5, 6, 8, 9])[:, None], "port.alpha": np.full((7, 1), 0.3)}
-    means = planned_means({"port.n": np.array([2.0]), "port.alpha": np.array([0.3])}, planned)
-    assert {name: float(value[0]) for name, value in means.items()} == pytest.approx(
-        {"port.planned-1.n": 0.0, "port.planned-2.n": 3.5, "port.planned-3.n": 6.5}
-        | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
-    )
-    assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]
 
 
 @given(st.integers(10, 60), st.integers(1, 12))
