@@ -92,6 +92,19 @@ def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.Capt
     ]
 
 
+def test_an_interruption_says_what_is_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    from shipid.cli.terminal import counted
+
+    def blocks() -> Iterator[list[int]]:
+        yield [1]
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as end:
+        list(counted(blocks(), 3, "cells", "what is finished is kept"))
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "what is finished is kept\n"
+
+
 def test_counted_passes_every_block_on() -> None:
     from shipid.cli.terminal import counted
 

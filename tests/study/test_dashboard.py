@@ -16,7 +16,11 @@ import pytest
 
 from shipid.study.store import TRIALS, read_rows
 
-START = "from importlib.metadata import entry_points as e; e(group='console_scripts', name='optuna-dashboard')['optuna-dashboard'].load()()"
+START = """
+from importlib.metadata import entry_points
+(script,) = entry_points(group="console_scripts", name="optuna-dashboard")
+script.load()()
+"""
 
 
 @pytest.fixture
