@@ -15,18 +15,12 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, create_model
 
 from shipid.errors import DocumentError, choices
 from shipid.files import write_json
-from shipid.hybrid.methods import METHODS
-from shipid.identification.outcome import Settings
-from shipid.identification.settings import Identify
 from shipid.logs.mapping import UNITS, Clock, Column, File
 from shipid.logs.mapping import Mapping as LogMapping
 from shipid.logs.readers import READERS
 from shipid.logs.repairs import REPAIRS
-from shipid.observer import Observer
 from shipid.simulation.draw import SHARED, Draw, takes_many
 from shipid.simulation.manoeuvre import KINDS
-from shipid.simulation.truth import Truth
-from shipid.study.plan import MethodBlock, Study
 from shipid.vessel.load import Patch
 from shipid.vessel.perturb import Family, perturbation_model
 from shipid.vessel.schema import TABLE, vessel_model
@@ -59,6 +53,12 @@ def with_schema(text: str, file: Path, name: str) -> str:
 
 
 def _study() -> Schema:
+    from shipid.hybrid.methods import METHODS  # with PyTorch, which a draft of a vessel or a mapping needs not
+    from shipid.identification.settings import Identify
+    from shipid.observer import Observer
+    from shipid.simulation.truth import Truth
+    from shipid.study.plan import MethodBlock, Study
+
     shared = {name: (field.annotation, field) for name, field in MethodBlock.model_fields.items()}
     methods = [_of_kind("method", kind, method, shared) for kind, method in METHODS.items()]
     blocks: dict[str, Any] = {
@@ -75,6 +75,12 @@ def _study() -> Schema:
         "method": (Annotated[list[_either(methods)], *Study.model_fields["method"].metadata], []),  # type: ignore[misc]
     }
     return _schema_of(create_model("study", __base__=Study, **fields))
+
+
+def _settings() -> Schema:
+    from shipid.identification.outcome import Settings
+
+    return _schema_of(Settings)
 
 
 def _draws() -> Iterator[type[BaseModel]]:
@@ -106,8 +112,8 @@ def _mapping() -> Schema:
     texts = [_of_kind("format", kind, reader.options, default="text") for kind, reader in READERS.items()]
     format_: Any = _either(texts)
     repairs: Any = _either([_of_kind("repair", kind, pair[0]) for kind, pair in REPAIRS.items()])
-    every: Any = Literal[tuple(dict.fromkeys(unit for units in UNITS.values() for unit in units))]  # type: ignore[valid-type]
-    of_time: Any = Literal[tuple(UNITS["s"])]  # type: ignore[valid-type]
+    every: Any = Literal[tuple(dict.fromkeys(unit for units in UNITS.values() for unit in units))]
+    of_time: Any = Literal[tuple(UNITS["s"])]
     column = create_model("column", __base__=Column, unit=(every, ...))
     clock = create_model("clock", __base__=Clock, unit=(of_time, "s"))
     file = create_model("file", __base__=File, format=(format_, None))
@@ -217,6 +223,6 @@ SCHEMAS: dict[str, Callable[[], Schema]] = {
     "vessel": _vessel,
     "study": _study,
     "mapping": _mapping,
-    "settings": lambda: _schema_of(Settings),
+    "settings": _settings,
 }
 """Kind of document -> what makes its schema."""
