@@ -403,8 +403,8 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
     from shipid.study.contents import ANSWER, write_pages
     from shipid.study.progress import Watch
 
-    events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
     try:
+        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
         draw(events, Watch(plan, folder))
     except KeyboardInterrupt:
         sys.stderr.write(f"interrupted; what is finished is kept. Continue with: shipid study resume {folder}\n")

@@ -212,7 +212,8 @@ def test_results_over_their_keys(read: Results) -> None:
     assert data["H"].dims == ("foundation", "method", "N_D", "seed")
     assert data["H"].attrs["units"] == "m"
     for row in read.cells.itertuples():
-        there = data.sel(foundation=row.foundation, method=row.method, N_D=row.N_D, seed=row.seed)
+        keys = {"foundation": row.foundation, "method": row.method, "N_D": row.N_D, "seed": row.seed}
+        there = data.sel(keys)  # as a dict: `method` is an argument of sel
         assert float(there["H"]) == row.H
 
 
