@@ -44,8 +44,8 @@ def python_page() -> str:
     lines = [
         "# Python reference",
         "",
-        "Made from the types and docstrings of the code. Arrays are time first, channel last. Units are SI and radians;",
-        "shafts turn in rev/s. [From Python](../python.md) shows the names at work.",
+        "Made from the types and docstrings of the code. Arrays are time first, channel last. Units are SI and",
+        "radians; shafts turn in rev/s. [From Python](../python.md) shows the names at work.",
         "",
     ]
     for heading, group in groups.items():
@@ -132,7 +132,7 @@ def documents_page() -> str:
     lines = [
         "# Keys of the documents",
         "",
-        "Made from the models that check the documents. For what a key means in a study, a vessel or a log, and for examples,",
+        "Made from the models that check the documents. For what a key means, and for examples,",
         "read the [study](../reference-study-document.md), [vessel](../reference-vessel-document.md) and",
         "[mapping](../reference-mapping-document.md) documents.",
         "",

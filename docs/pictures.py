@@ -1,6 +1,6 @@
 """The pictures of the documentation: plotly figures as SVG, drawn by Chromium with the plotly that the reports use.
 
-`python docs/pictures.py RUN` draws those of the readme and of the gallery; RUN is the folder of the finished study `quick`.
+`python docs/pictures.py RUN` draws those of the readme and of the gallery. RUN is the folder of the study `quick`.
 The pictures are stored beside the pages, so building the site needs neither this script nor a browser.
 """
 
@@ -59,7 +59,10 @@ def svg(figure: go.Figure) -> str:
 def pictures(run: Path) -> Iterator[tuple[str, go.Figure]]:
     """Name and figure of every picture of the readme and the gallery."""
     results = shipid.figures.content_of(shipid.read_results(run))
-    yield "question", shipid.figures.prediction(results, N_D=10)
+    question = shipid.figures.prediction(results, N_D=10)
+    words = "The true path of one turn, and what each model says. Each had 10 runs of data."
+    title = f"Where will she be in 30 s?<br><sup>{words}</sup>"
+    yield "question", question.update_layout(title_text=title)
     yield "answer", shipid.figures.error_map(results)
     yield "gain", shipid.figures.gain(results)
     yield "error-over-horizon", shipid.figures.error_over_horizon(results)

@@ -1,6 +1,7 @@
 """Execute notebooks and store them with their results: `python docs/notebooks/execute.py [NAME.ipynb ...]`.
 
-A figure is stored as SVG, so that every reader of notebooks shows it without a network. Needs the extra `docs` and Chromium.
+A figure is stored as SVG, so that every reader of notebooks shows it without a network.
+Needs the extra `docs` and Chromium.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ def executed(file: Path, folder: Path) -> nbformat.NotebookNode:
     notebook = nbformat.read(file, as_version=4)
     os.environ["PLOTLY_RENDERER"] = "plotly_mimetype"
     os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # of a progress bar that needs a widget
     NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(folder)}}).execute()
     return notebook
 
