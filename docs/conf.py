@@ -1,7 +1,8 @@
-"""How Sphinx builds the site. Nothing is fetched: equations are MathML, fonts are those of the system."""
+"""How Sphinx builds the site. Nothing is fetched: equations are MathML with a font in `_static`."""
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -40,11 +41,16 @@ pygments_style = "default"
 pygments_dark_style = "github-dark"
 
 
+DOT = re.compile(r'<mover accent="true">(\s*<mi>[^<]*</mi>\s*<mo stretchy="false">\u02d9<)')
+"""A dot over a letter: as an accent it would touch the letter."""
+
+
 def mathml(translator: object, node: nodes.math | nodes.math_block) -> None:
     """Write an equation as MathML, which browsers typeset themselves."""
     block = isinstance(node, nodes.math_block)
     try:
         text = tex2mathml(node.astext(), as_block=block)
+        text = DOT.sub(r"<mover>\1", text)
     except MathError as error:
         logging.getLogger(__name__).warning("equation: %s: %s", error, node.astext(), location=node)
         text = translator.encode(node.astext())

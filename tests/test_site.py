@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -103,6 +104,11 @@ def test_a_notebook_is_stored_with_its_figures_and_light(file: Path) -> None:
     outputs = [output for cell in code for output in cell["outputs"]]
     assert not [one for one in outputs if one["output_type"] == "error" or one.get("name") == "stderr"]
     assert file.stat().st_size < 300_000
+
+
+def test_the_font_of_the_equations_is_the_one_that_is_declared() -> None:
+    font = hashlib.sha256((DOCS / "_static" / "math.woff2").read_bytes()).hexdigest()
+    assert font in (DOCS / "_static" / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_readme_is_short_and_its_files_are_there() -> None:
