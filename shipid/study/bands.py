@@ -88,8 +88,8 @@ def groups_frame(results: Results) -> pd.DataFrame:
     """Coverage at the level of the study at the largest N_D, by kind of manoeuvre, time ahead and speed.
 
     Columns: model, by (`kind`, `ahead`, `speed`), group, coverage, low, high, width [m], runs (test runs in the group),
-    note (a kind that too few runs calibrated). The band of a kind is the one for all kinds: the coverage says what a
-    ship meets that is not told what manoeuvre it is in. By time ahead: share of the positions at that step alone.
+    note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
+    of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, found = results.plan.study.bands.level, results.test, []
     largest = results.cells["N_D"].max()
