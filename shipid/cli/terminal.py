@@ -166,19 +166,19 @@ def iterations() -> Iterator[Any]:
         yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
 
 
-def draw(events: Iterable[Event]) -> None:
-    """Show the events of a run: live progress on a terminal, else one plain line per finished cell."""
+def draw(events: Iterable[Event]) -> Event | None:
+    """Show the events of a run: live progress on a terminal, else one plain line per finished cell; return the last."""
     from rich.console import Console
 
     from shipid.study.start import event_line
 
-    console = Console()
+    console, event = Console(), None
     if not console.is_terminal:
         for event in events:
             line = event_line(event)
             if line:
                 typer.echo(visible(line))
-        return
+        return event
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -204,6 +204,8 @@ def draw(events: Iterable[Event]) -> None:
                 progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
+            elif event.kind == "others":
+                progress.update(task, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
                 if row["status"] == "ok":
@@ -215,6 +217,7 @@ def draw(events: Iterable[Event]) -> None:
                     else "cells"
                 )
                 progress.update(task, completed=event.done, description=label)
+    return event
 
 
 def log_to_stderr(verbose: bool) -> None:

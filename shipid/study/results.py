@@ -80,7 +80,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check(folder)
-    cells = store.read_rows(folder)
+    cells = store.read_rows(folder, plan)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)

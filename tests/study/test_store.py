@@ -11,7 +11,7 @@ import pytest
 
 from shipid.errors import ResultError
 from shipid.study import seals, store
-from shipid.study.plan import Batch
+from shipid.study.plan import Batch, Unit
 from tests.study.tiny import tiny_plan
 
 
@@ -50,13 +50,13 @@ def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
 
 
 def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
-    batches = [Batch(4, 1), Batch(4, 0), Batch(2, 0)]
-    row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right"}
-    for batch in batches[:2]:
-        file = store.batch_file(tmp_path, batch)
+    batches = [Unit(batch, (("right", "drawn"),), batch.key) for batch in (Batch(4, 1), Batch(4, 0), Batch(2, 0))]
+    row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right", "method": "drawn"}
+    for unit in batches[:2]:
+        file = store.rows_file(tmp_path, unit.key)
         file.parent.mkdir(exist_ok=True)
-        file.write_text(json.dumps([{**row, "N_D": batch.N_D, "seed": batch.seed, "H": None}]))
-        seals.write_seal(tmp_path, batch.key, [file])
+        file.write_text(json.dumps([{**row, "N_D": unit.batch.N_D, "seed": unit.batch.seed, "H": None}]))
+        seals.write_seal(tmp_path, unit.key, [file])
     assert store.finished(tmp_path, batches) == batches[:2]
     rows = store.read_rows(tmp_path)
     assert rows["seed"].tolist() == [0, 1]

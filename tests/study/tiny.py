@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
-from shipid.study import run
-from shipid.study.plan import Batch, Plan, read_plan
+from shipid.study import run, store
+from shipid.study.plan import Plan, Unit, read_plan
 from shipid.study.prepare import Prepared
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -33,9 +33,9 @@ def run_here(plan: Plan, folder: Path) -> list[run.Event]:
 def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
     """The same, event by event."""
 
-    def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *rest: Any) -> Iterator[Any]:
-        for batch in batches:
-            yield batch, run.run_batch(plan, prepared, batch, "cpu", rest[-1])
+    def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
+        for unit in units:
+            yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
 
     with patch.object(run, "_compute", compute):
         yield from run.run_study(plan, folder)
