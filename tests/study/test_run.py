@@ -22,9 +22,9 @@ from shipid.study import store
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import read_results
-from shipid.study.run import run_batch, run_study
+from shipid.study.run import run_batch, run_study, run_unit
 from shipid.vessel.load import load_vessel
-from tests.study.tiny import run_here, tiny_plan
+from tests.study.tiny import mixed_plan, run_here, tiny_plan
 
 
 def numbers(folder: Path) -> list[dict[str, Any]]:
@@ -88,6 +88,29 @@ def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> No
         twin = wider[row["cell"]]
         assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round in their own way
         assert twin["A"] == pytest.approx(row["A"], nan_ok=True) if row["A"] is not None else twin["A"] is None
+
+
+def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
+    """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
+    plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
+    prepared = prepare(plan, obtain(plan))
+    whole = {row["cell"]: (row, one) for row, one in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    found = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
+    assert len(found) == len(whole) == plan.cells
+    for row, predictor in found:
+        expected, other = whole[row["cell"]]
+        assert _plain(row) == _plain(expected)
+        assert predictor is not None
+        assert other is not None
+        predictor.save(tmp_path / "one.npz")
+        other.save(tmp_path / "other.npz")
+        assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+
+
+def _plain(row: dict[str, Any]) -> str:
+    """A row without what a clock measured."""
+    trials = [{key: value for key, value in trial.items() if key != "seconds"} for trial in row["trials"]]
+    return repr({**row, "trials": trials, "seconds": 0})
 
 
 def test_seeds_change_the_numbers(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.study import run, store
-from shipid.study.plan import Plan, Unit, read_plan
+from shipid.study.plan import Plan, Unit, build_plan, read_plan
 from shipid.study.prepare import Prepared
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -23,6 +23,35 @@ def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     file = folder / "tiny.toml"
     file.write_text(TINY.read_text())
     return read_plan(file, changes)
+
+
+MIXED = [
+    {"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4},
+    {"name": "trained", "kind": "path-trained", "trials": 2, "epochs": 3, "units": [4, 5], "layers": [1, 2]},
+    {
+        "name": "stacked",
+        "kind": "path-trained",
+        "trials": 1,
+        "epochs": 3,
+        "units": 4,
+        "layers": 1,
+        "families": ["wrong"],
+    },
+    {"name": "step", "kind": "one-step", "trials": 1, "units": 8, "families": ["wrong"]},
+    {"name": "alone", "kind": "alone"},
+]
+FITTED = {
+    "name": "fitted",
+    "extends": "right",
+    "identify": {"parameters": ["hull.derivatives.N_ur"], "weights": {"u": 0.01, "v": 0.01, "r": 0.001}},
+}
+
+
+def mixed_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
+    """A tiny study whose work is cut into several units: six methods, one family identified."""
+    document = tiny_plan(folder).document
+    document |= {"method": MIXED, "grid": {"N_D": [4]}, "family": [*document["family"], FITTED], **(changes or {})}
+    return build_plan(document, folder / "tiny.toml")
 
 
 def run_here(plan: Plan, folder: Path) -> list[run.Event]:
