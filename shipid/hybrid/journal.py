@@ -140,12 +140,13 @@ def merge(files: Iterable[Path], target: Path) -> None:
 
 
 def _entries(file: Path) -> Iterator[dict[str, Any]]:
-    """The whole lines of a journal."""
+    """The whole lines of a journal; what is none is left out."""
     with file.open("rb") as stream:
         for line in stream:
-            if line.endswith(b"\n"):
-                with suppress(ValueError):
-                    yield json.loads(line)
+            with suppress(ValueError):
+                log = json.loads(line)
+                if isinstance(log, dict) and "op_code" in log and line.endswith(b"\n"):
+                    yield log
 
 
 def _moved(log: dict[str, Any], studies: int, trials: int) -> dict[str, Any]:

@@ -27,7 +27,7 @@ FOLDER = "claims"
 RENEWED, LATE = 10.0, 60.0  # s: how often a claim is renewed, and after how long without it may be taken over
 WAIT, LONGEST_WAIT = 1.0, 15.0  # s between looks at what others finish: it grows
 SHORT_WAIT = 0.05  # s, for what takes others a moment
-LISTED = 2.0  # s for which a listing of the folder is used
+MISSED = 8  # claims that are refused until the folder is listed anew
 
 
 class Claims:
@@ -94,25 +94,29 @@ class Claims:
         while True:
             done, claimed = finished(), set(held(self._root))
             left = [unit for unit in left if unit not in done]
-            free, begun, reach = [unit for unit in left if unit not in claimed], time.monotonic(), 1
+            free = [unit for unit in left if unit not in claimed]
             if not free:
                 break
-            while free and time.monotonic() - begun < LISTED:
+            reach, missed = 1, 0  # where many take from one list, they move apart
+            while free and missed <= max(MISSED, len(units) // 500):  # a list is used as long as most of it holds
                 unit = free.pop(random.randrange(min(reach, len(free))))
-                if self.take(unit):
-                    if is_finished(unit):  # by another process, since they were listed
-                        self.give_back(unit)
-                    else:
-                        yield unit
-                        left.remove(unit)
-                else:
-                    reach *= 2  # where many begin at once, they move apart
-        for unit in left:
-            if self.take(unit):  # the claim of a process that is gone
-                if is_finished(unit):
-                    self.give_back(unit)
-                else:
+                if self._takes(unit, is_finished):
                     yield unit
+                    left.remove(unit)
+                    reach = max(1, reach // 2)
+                else:
+                    reach, missed = 2 * reach, missed + 1
+        for unit in left:
+            if self._takes(unit, is_finished):  # the claim of a process that is gone
+                yield unit
+
+    def _takes(self, unit: str, is_finished: Callable[[str], bool]) -> bool:
+        if not self.take(unit):
+            return False
+        if is_finished(unit):  # by another process, since they were listed
+            self.give_back(unit)
+            return False
+        return True
 
     def once(self, name: str, is_done: Callable[[], bool], do: Callable[[], object]) -> None:
         """Do what is not done yet, unless another process does it: then wait for it."""

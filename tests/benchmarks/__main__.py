@@ -38,6 +38,7 @@ ASKED = {
     "bands": 1,
     "verdicts": 1,
     "guess": 1,
+    "sharing": 1,
 }  # the same, of what is no matter of time and takes minutes: only where named
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
