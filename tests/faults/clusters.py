@@ -26,8 +26,7 @@ def a_cluster(place: Path, workers: int = 1) -> Iterator[tuple[str, list[subproc
     with ExitStack() as stack:
         processes = [stack.enter_context(_process("scheduler", options, place))]
         address = _address(place / "scheduler.log")
-        for _ in range(workers):
-            processes.append(stack.enter_context(a_worker(address, place, "--no-nanny")))
+        processes += [stack.enter_context(a_worker(address, place, "--no-nanny")) for _ in range(workers)]
         yield address, processes
 
 

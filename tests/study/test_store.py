@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
+from shipid.files import read_json
 from shipid.study import seals, store
 from shipid.study.plan import Batch, Unit
 from tests.study.tiny import tiny_plan
@@ -91,3 +92,13 @@ def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path)
     (tmp_path / store.TEST).write_bytes(b"no archive")
     with pytest.raises(ResultError, match="damaged"):
         store.read_test(tmp_path)
+
+
+def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
+    """Two kinds of processors in turns, as the tasks of an array come: two entries, and a sentence at each change."""
+    folder = tmp_path / "run"
+    store.open_folder(folder, tiny_plan(tmp_path))
+    one, other = ({"shipid": "1", "processor": name, "packages": {"torch": "2"}} for name in ("one", "other"))
+    said = [store.note_session(folder, session) for session in (one, one, other, one, other)]
+    assert said == [[], [], ["processor was one, now other"], ["processor was other, now one"], []]
+    assert read_json(folder / store.PROVENANCE)["sessions"] == [one, other]

@@ -31,7 +31,8 @@ SBATCH = """#!{python}
 import os, re, subprocess, sys
 script = sys.argv[-1]
 text = open(script).read()
-array = [word for word in sys.argv[1:-1] if word.startswith("--array=")] or re.findall(r"^#SBATCH (--array=\\S+)", text, re.M)
+array = [word for word in sys.argv[1:-1] if word.startswith("--array=")]
+array = array or re.findall(r"^#SBATCH (--array=\\S+)", text, re.M)
 first, last = map(int, array[-1].removeprefix("--array=").split("-"))
 assert last - first < 5, "a test starts no more"
 tasks = []
@@ -116,7 +117,7 @@ def test_three_processes_one_killed_one_joining(study: Path, alone: Path, tmp_pa
 
 
 @pytest.mark.slow
-def test_the_documented_job_array(study: Path, alone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_documented_job_array(study: Path, alone: Path, tmp_path: Path) -> None:
     """The script of the page, submitted to a stand-in that runs the tasks of the array on this machine."""
     (script,) = re.findall(r"```bash\n(#!/bin/bash\n.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     work = tmp_path / "work"

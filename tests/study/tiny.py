@@ -59,7 +59,7 @@ def run_here(plan: Plan, folder: Path) -> list[run.Event]:
     return list(events_here(plan, folder))
 
 
-def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
+def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.Event]:
     """The same, event by event."""
 
     def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
@@ -67,7 +67,7 @@ def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
             yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
 
     with patch.object(run, "_compute", compute):
-        yield from run.run_study(plan, folder)
+        yield from run.run_study(plan, folder, leave=leave)
 
 
 def logged(runs: Mapping[str, Mapping[str, Any]], t: np.ndarray, **metadata: Any) -> Dataset:
