@@ -30,7 +30,7 @@ from shipid.files import (
 )
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.plan import Foundation, Plan, Unit, build_plan
+from shipid.study.plan import WITH, Foundation, Plan, Unit, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
@@ -179,7 +179,8 @@ def part_folder(folder: Path, part: str) -> Path:
 def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
     """Units whose results are stored whole: with a seal, or in a batch that was one unit to an earlier version."""
     sealed = seals.sealed(folder)
-    return [unit for unit in units if unit.key in sealed or unit.batch.key in sealed]
+    batches = {name for name in sealed - seals.FIRST.keys() if WITH not in name}
+    return [unit for unit in units if unit.key in sealed or (batches and unit.batch.key in batches)]
 
 
 def is_finished(folder: Path, unit: Unit) -> bool:
