@@ -46,8 +46,12 @@ def on_dask(
     ShipidError : the scheduler does not answer, or dies; a task has killed worker after worker. All other tasks are
         done before that.
     """
-    import dask
-    from dask.distributed import Client
+    try:
+        import dask
+        from dask.distributed import Client
+    except ImportError:
+        message = "a Dask scheduler needs the package dask: pip install 'shipid[dask]'"
+        raise ShipidError(message, path=f"--scheduler {scheduler}") from None
 
     with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
         warnings.simplefilter("ignore")

@@ -7,9 +7,10 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -424,7 +425,10 @@ def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array,
 
 def machine() -> dict[str, Any]:
     """What the results were computed with: interpreter, packages, machine."""
-    packages = {name: version(name) for name in PACKAGES}
+    packages = {}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):  # an extra that is not installed
+            packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
     return {**system, "processor": f"{processor()}, {vectors()}", "cores": os.cpu_count(), "packages": packages}
 
