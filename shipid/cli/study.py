@@ -11,7 +11,7 @@ import typer
 
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
-from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.terminal import counted, digits, draw, short, show_reasons, table
 from shipid.errors import DocumentError
 
@@ -231,6 +231,7 @@ def study_run(
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
     changes: Changes = None,
     device: Device = "cpu",
+    leave: Leave = False,
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
@@ -240,15 +241,21 @@ def study_run(
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or plan.folder, workers, scheduler, device)
+    _run(plan, out or plan.folder, workers, scheduler, device, leave)
 
 
 @app.command("resume")
-def study_resume(folder: Folder, workers: Workers = None, scheduler: Scheduler = None, device: Device = "cpu") -> None:
+def study_resume(
+    folder: Folder,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    device: Device = "cpu",
+    leave: Leave = False,
+) -> None:
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run(stored_plan(folder), folder, workers, scheduler, device)
+    _run(stored_plan(folder), folder, workers, scheduler, device, leave)
 
 
 @app.command("report")
@@ -398,18 +405,23 @@ def _before_work(
     return plan, file
 
 
-def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:
+def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
     from shipid.study import run
-    from shipid.study.contents import ANSWER, write_pages
+    from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
+    resume = f"shipid study resume {folder}"
     try:
-        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
-        draw(events, Watch(plan, folder))
+        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
+        end = draw(events, Watch(plan, folder))
     except KeyboardInterrupt:
-        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: shipid study resume {folder}\n")
+        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: {resume}\n")
         sys.exit(130)
-    report = write_pages(folder)
+    if end is not None and end.done < end.total:
+        left = f"{end.total - end.done} of {end.total} cells"
+        typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
+        return
+    report = share_pages(folder)
     for line in (folder / ANSWER).read_text(encoding="utf-8").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

@@ -210,8 +210,8 @@ class Quiet:
             self.say(f"... {found[0].words}{more}")
 
 
-def draw(events: Iterable[Event], watch: Watch) -> None:
-    """Show the events of a run: live progress on a terminal, else one plain line per finished cell.
+def draw(events: Iterable[Event], watch: Watch) -> Event | None:
+    """Show the events of a run: live progress on a terminal, else one plain line per finished cell. Return the last.
 
     watch : what says how far searches are, so that there is news within long cells, too.
     """
@@ -219,7 +219,7 @@ def draw(events: Iterable[Event], watch: Watch) -> None:
 
     from shipid.study.start import event_line
 
-    console = Console()
+    console, event = Console(), None
     if not console.is_terminal:
         quiet = Quiet(watch)
         with looking(quiet.look, min(SILENCE, 5.0)):
@@ -228,7 +228,7 @@ def draw(events: Iterable[Event], watch: Watch) -> None:
                 line = event_line(event)
                 if line:
                     quiet.say(line)
-        return
+        return event
     from rich.markup import escape
     from rich.progress import (
         BarColumn,
@@ -265,6 +265,8 @@ def draw(events: Iterable[Event], watch: Watch) -> None:
                 progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
+            elif event.kind == "others":
+                progress.update(task, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
                 finished.add(row["cell"])
@@ -277,6 +279,7 @@ def draw(events: Iterable[Event], watch: Watch) -> None:
                     else "cells"
                 )
                 progress.update(task, completed=event.done, description=label)
+    return event
 
 
 def log_to_stderr(verbose: bool) -> None:

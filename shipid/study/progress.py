@@ -9,10 +9,9 @@ from math import inf, isfinite
 from pathlib import Path
 
 from shipid.study.plan import WITH, Plan
-from shipid.study.store import TRIALS, part_folder
+from shipid.study.store import JOURNALS, part_folder
 
 BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attribute of it, a trial that ended
-JOURNALS = (TRIALS, f"{Path(TRIALS).stem}/*.log")  # of a run's folder
 
 
 @dataclass(frozen=True)
@@ -59,9 +58,8 @@ class Watch:
         """Return the searches that go on, those that were written to last first; without cells that are done."""
         self._looks += 1
         for folder, trials in self._trials.items():
-            for pattern in JOURNALS:
-                for file in folder.glob(pattern):
-                    self._read(file, trials)
+            for file in (folder / JOURNALS).glob("*.log"):
+                self._read(file, trials)
         finished = set(done)
         left = [one for cell, one in self._found.items() if cell not in finished and one.done != one.count]
         return sorted(left, key=lambda one: -self._last[one.cell])
@@ -73,7 +71,7 @@ class Watch:
             with file.open("rb") as stream:
                 stream.seek(begin)
                 text = stream.read()
-        except OSError:  # taken away, or merged with others
+        except OSError:  # taken away
             return
         text = text[: text.rfind(b"\n") + 1]
         self._ends[file] = begin + len(text)

@@ -99,7 +99,7 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frames = [
         store.read_rows(place).assign(condition=part.condition, part=name)
         for name, part in plan.parts.items()
-        if (place := store.part_folder(folder, name)).is_dir() and store.finished(place, part.plan.batches)
+        if (place := store.part_folder(folder, name)).is_dir() and store.finished(place, part.plan.units)
     ]
     if not frames:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
@@ -114,7 +114,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check(folder)
-    cells = store.read_rows(folder)
+    cells = store.read_rows(folder, plan)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)

@@ -16,12 +16,11 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, sweep, write_table
-from shipid.hybrid.journal import Journal
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
 from shipid.study.plan import NO_MODEL, Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 from shipid.study.verdict import Finding
 from shipid.version import __version__
 
@@ -82,16 +81,16 @@ def _computed(
     turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, done: Mapping[Batch, pd.DataFrame | None]
 ) -> pd.DataFrame:
     """Cells of a turn; those of its batches that are not done are computed, and kept."""
-    trials = None if kept is None else kept / f"{documents.digest(test)}.log"
+    trials = None if kept is None else kept / documents.digest(test)
     if trials is not None:
-        Journal(trials)
+        trials.mkdir(parents=True, exist_ok=True)
     prepared = prepare(turn, dataset, device)
     floor = float(prepared.naive.mean())
     frames = []
     for batch in turn.batches:
         frame = done.get(batch)
         if frame is None:
-            rows = [row for row, _ in run_batch(turn, prepared, batch, device, trials)]
+            rows = [row for row, _ in run_unit(turn, prepared, turn.whole(batch), device, trials)]
             frame = pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
             if kept is not None:
                 write_table(_file(kept, test, batch), frame)

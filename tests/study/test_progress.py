@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.settings import Span
 from shipid.study.progress import Searching, Watch
-from shipid.study.store import TRIALS
+from shipid.study.store import JOURNALS, TRIALS
 from tests.study.tiny import tiny_plan
 
 SPACE = {"units": Span(1, 100)}
@@ -27,7 +26,8 @@ def row(number: int, value: float) -> dict[str, Any]:
 
 def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.trials": 5})
-    watch, file = Watch(plan, tmp_path), tmp_path / TRIALS
+    watch, file = Watch(plan, tmp_path), tmp_path / JOURNALS / "unit.log"
+    file.parent.mkdir()
     assert watch.look() == []
     one, other = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
     journal = Journal(file)
@@ -47,7 +47,8 @@ def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
 
 def test_a_budget_says_its_number_when_it_knows_it(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.budget": 10.0})
-    watch, journal, cell = Watch(plan, tmp_path), Journal(tmp_path / TRIALS), "right+drawn-N0004-s0"
+    (tmp_path / JOURNALS).mkdir()
+    watch, journal, cell = Watch(plan, tmp_path), Journal(tmp_path / JOURNALS / "unit.log"), "right+drawn-N0004-s0"
     journal.decide([cell], 12)
     journal.add({cell: [row(0, 0.01)]}, SPACE)
     assert watch.look() == [Searching(cell, 1, 12, 0.01)]
@@ -55,7 +56,8 @@ def test_a_budget_says_its_number_when_it_knows_it(tmp_path: Path) -> None:
 
 def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.trials": 5})
-    watch, file, cell = Watch(plan, tmp_path), tmp_path / TRIALS, "right+drawn-N0004-s0"
+    (tmp_path / JOURNALS).mkdir()
+    watch, file, cell = Watch(plan, tmp_path), tmp_path / JOURNALS / "unit.log", "right+drawn-N0004-s0"
     Journal(file).add({cell: [row(0, 0.01)]}, SPACE)
     whole = file.read_bytes()
     for cut in (len(whole) - 5, len(whole)):
@@ -71,9 +73,8 @@ def test_journals_of_a_folder_that_has_several(tmp_path: Path) -> None:
     """One for each unit of work, in a folder; two runs may be numbered alike inside."""
     plan = tiny_plan(tmp_path, {"method.0.trials": 5})
     for name in ("one", "two"):
-        Journal(tmp_path / f"{name}.log").add({f"{name}+drawn-N0004-s0": [row(0, 1.0)]}, SPACE)
-        (tmp_path / "trials").mkdir(exist_ok=True)
-        shutil.move(tmp_path / f"{name}.log", tmp_path / "trials" / f"{name}.log")
+        (tmp_path / JOURNALS).mkdir(exist_ok=True)
+        Journal(tmp_path / JOURNALS / f"{name}.log").add({f"{name}+drawn-N0004-s0": [row(0, 1.0)]}, SPACE)
     watch = Watch(plan, tmp_path)
     assert {search.cell for search in watch.look()} == {"one+drawn-N0004-s0", "two+drawn-N0004-s0"}
 

@@ -16,7 +16,7 @@ from shipid.study import rotate as rotate_module
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.rotate import rotate, spread, turn_findings, turns
-from shipid.study.run import run_batch
+from shipid.study.run import run_batch, run_unit
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -81,9 +81,9 @@ def test_an_interrupted_rotation_goes_on_to_the_same_digits(
         begun.append(arguments)
         if len(begun) == after:
             raise KeyboardInterrupt
-        return run_batch(*arguments)
+        return run_unit(*arguments)
 
-    monkeypatch.setattr(rotate_module, "run_batch", counted)
+    monkeypatch.setattr(rotate_module, "run_unit", counted)
     with pytest.raises(KeyboardInterrupt):
         list(rotate(plan, dataset, ["a", "b"], kept=kept))
     again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=kept)))
