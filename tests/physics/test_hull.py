@@ -20,11 +20,11 @@ def test_derivatives_sum_on_their_axes() -> None:
     np.testing.assert_allclose(wrench, [-10 * u * u, 3 * u * v - 4 * v * abs(v), 0, 2 * v, 0, 7 * r])
 
 
-def cross_flow(strips: int, v: float, r: float) -> np.ndarray:
+def cross_flow(strips: int, v: float, r: float, **other: float) -> np.ndarray:
     """Wrench of the bundled formula, all strips summed."""
     columns = hull.strips(strips=strips)
     nu_r = ca.SX(ca.DM([1.0, v, 0, 0, 0, r]))
-    numbers_of = {"C_d": 1.2, "x_aft": -15.0, "x_fwd": 18.0, "T": 2.6, "rho": 1025.0}
+    numbers_of = {"C_d": 1.2, "x_aft": -15.0, "x_fwd": 18.0, "T": 2.6, "rho": 1025.0, **other}
     rows = zip(columns["fraction"], columns["share"], strict=True)
     return sum(numbers(hull.cross_flow(nu_r, fraction, share, **numbers_of)) for fraction, share in rows)
 
@@ -47,6 +47,35 @@ def test_cross_flow_converges_to_the_integral() -> None:
     assert errors[2] < 2e-4
 
 
+def test_cross_flow_along_the_hull_gives_force_and_moment_their_own_coefficients() -> None:
+    """Pure sway: the force is that of C_d, its centre k_fwd L / 6 forward. Pure yaw about the middle: 1 + k_ends / 2."""
+    uniform, along = (cross_flow(400, 0.5, 0.0, **more) for more in ({}, {"k_fwd": 0.4, "k_ends": 0.6}))
+    assert along[1] == pytest.approx(uniform[1], rel=1e-4)
+    assert along[5] / along[1] == pytest.approx(1.5 + 0.4 * 33.0 / 6, rel=1e-4)
+    ends = {"x_aft": -16.5, "x_fwd": 16.5}
+    plain, strong = (cross_flow(400, 0.0, 0.04, k_ends=k, **ends)[5] for k in (0.0, 0.6))
+    assert strong / plain == pytest.approx(1.3, rel=1e-3)
+
+
+def test_cross_flow_of_neutral_shape_is_the_uniform_one() -> None:
+    """To the last digit, and as the same expression: bundled vessels do not change."""
+    numbers_of = {name: ca.SX.sym(name) for name in ("C_d", "x_aft", "x_fwd", "T", "rho")}
+    nu_r, row = ca.SX.sym("nu", 6), (ca.SX.sym("fraction"), ca.SX.sym("share"))
+    plain, neutral = (hull.cross_flow(nu_r, *row, **numbers_of, **more) for more in ({}, {"k_fwd": 0.0, "k_ends": 0.0}))
+    assert str(plain) == str(neutral)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cross_flow_of_any_shape_takes_energy_and_is_mirrored(seed: int) -> None:
+    """Also of shapes that would be negative somewhere along the hull."""
+    rng = np.random.default_rng(seed)
+    v, r = rng.uniform(-2, 2), rng.uniform(-0.2, 0.2)
+    shape = {"k_fwd": rng.uniform(-3, 3), "k_ends": rng.uniform(-3, 3)}
+    wrench = cross_flow(11, v, r, **shape)
+    assert wrench[1] * v + wrench[5] * r <= 0
+    np.testing.assert_allclose(cross_flow(11, -v, -r, **shape), -wrench, rtol=1e-12)
+
+
 def test_strips_cover_the_length_once() -> None:
     columns = hull.strips(strips=7)
     assert columns["share"].sum() == pytest.approx(1.0)
@@ -59,6 +88,19 @@ def test_resistance_polynomial() -> None:
     for u, sign in ((5.0, -1), (-5.0, 1)):
         wrench = numbers(hull.resistance(ca.SX(ca.DM([u, 0.3, 0, 0, 0, 0])), R_0=677.85, R_4=0.65505))
         np.testing.assert_allclose(wrench, [sign * expected, 0, 0, 0, 0, 0])
+
+
+def test_astern_the_hull_has_more_resistance() -> None:
+    """k_astern times that ahead, continuous at rest, always against the motion."""
+    mmg = {"R_0": 0.02, "L_pp": 7.0, "T": 0.46, "rho": 1000.0}
+    kinds = (lambda nu, **k: hull.mmg(nu, **mmg, **k), lambda nu, **k: hull.resistance(nu, R_0=70.0, R_2=3.0, **k))
+    for kind in kinds:
+        ahead, astern = (numbers(kind(ca.SX(ca.DM([u, 0.1, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (0.8, -0.8))
+        assert astern == pytest.approx(-1.4 * ahead)
+        assert ahead < 0 < astern
+        assert ahead == numbers(kind(ca.SX(ca.DM([0.8, 0.1, 0, 0, 0, 0]))))[0]
+        near = [numbers(kind(ca.SX(ca.DM([u, 0, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (-1e-6, 1e-6)]
+        assert np.abs(near).max() < 1e-3
 
 
 def test_prime_derivatives_are_si_ones_at_their_speed() -> None:
