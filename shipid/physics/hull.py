@@ -157,9 +157,9 @@ def cross_flow(
 ) -> SX:
     """Wrench (6) of cross-flow drag on one strip of the hull: dY = -1/2 rho T C(x) (v + x r)|v + x r| dx, dN = x dY.
 
-    C(x) = C_d (1 + k_fwd s + k_ends (3 s^2 - 1) / 2), at least 0, with s = -1 aft and 1 forward. Its mean is C_d for any
-    k: C_d is the coefficient of the force in pure sway; k_fwd moves its centre forward by k_fwd / 6 of the length; the
-    moment of pure yaw goes as 1 + k_ends / 2. So force and moment have coefficients of their own, and the drag still
+    C(x) = C_d (1 + k_fwd s + k_ends (3 s^2 - 1) / 2), at least 0, with s = -1 aft and 1 forward. Its mean is C_d for
+    any k: C_d is the coefficient of the force in pure sway; k_fwd moves its centre forward by k_fwd / 6 of the length;
+    the moment of pure yaw goes as 1 + k_ends / 2. So force and moment differ in their coefficients, and the drag still
     never adds energy. x_aft, x_fwd, T [m].
 
     Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7); coefficients that vary along the hull: Hooft (1994),

@@ -102,12 +102,13 @@ def propeller(
     """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
 
     n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift (see `inflow`). For n < 0
-    X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the same polynomial as
+    X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the polynomial of
     ahead. Yasukawa and Yoshimura (2015).
 
     Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `beyond`: a stopped screw by
-    k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment about the
-    origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, whose stern goes to port, Y_astern < 0 < N_astern.
+    k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment about
+    the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port,
+    Y_astern < 0 < N_astern.
     """
     u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     sense = ca.if_else(n >= 0, 1, -k_astern)
@@ -147,10 +148,10 @@ def wash(
 ) -> SX:
     """Propeller slipstream at a rudder behind it, (3): inflow u_P [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)). Astern the race goes
-    forward, and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less k_suction
-    times the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. Just before the disc that share
-    is 1/2 or less (Carlton 2018, ch. 8); without k_suction a screw astern does not reach the rudder.
+    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)). Astern the race
+    goes forward, and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less
+    k_suction times the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory
+    that share is 1/2 at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
     """
     u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
@@ -235,7 +236,14 @@ def controllable_wash(
 
 
 def quadratic_thrust(
-    u_P: SX, n: SX, T_nn: SX, T_nu: SX | float, T_uu: SX | float, k_astern: SX | float, k_u: SX | float, k_driven: SX | float
+    u_P: SX,
+    n: SX,
+    T_nn: SX,
+    T_nu: SX | float,
+    T_uu: SX | float,
+    k_astern: SX | float,
+    k_u: SX | float,
+    k_driven: SX | float,
 ) -> SX:
     """Thrust [N] of a screw: T_nn n|n| - T_nu |n| u_P - T_uu u_P|u_P|; for n < 0 k_astern T_nn and k_u T_nu.
 

@@ -54,10 +54,10 @@ def rudder(
     N = -(x + a_H x_H) F_N cos(delta). Along: u_R = epsilon sqrt(eta (u_P + kappa (u_race - u_P))^2 + (1 - eta) u_P^2),
     eta = D_p / H_R at most 1. Across: v_R = gamma_R (U beta - ell_R r), gamma_R_plus if U beta - ell_R r > 0.
 
-    With s = sin(alpha_R), F_N is multiplied by 1 + f_angle |s| + f_side sign(s) + f_angle_side s: f_angle is the loss (or
-    gain) that grows with the angle on both sides, f_side makes starboard helm stronger than port helm at all angles,
-    f_angle_side does so in proportion to the angle. So F_N has odd and even parts, as the force behind one turning
-    screw has; gamma_R_plus and gamma_R_minus of the MMG method are such a difference in the flow across alone.
+    With s = sin(alpha_R), F_N is multiplied by 1 + f_angle |s| + f_side sign(s) + f_angle_side s: f_angle is the loss
+    (or gain) that grows with the angle on both sides, f_side makes starboard helm stronger than port helm at all
+    angles, f_angle_side does so in proportion to the angle. So F_N has odd and even parts, as the force behind one
+    turning screw has; gamma_R_plus and gamma_R_minus of the MMG method are such a difference in the flow across alone.
     """
     u_P, u_race, D_p = wash[0], wash[1], wash[2]
     U, beta = drift(nu_r)
@@ -75,9 +75,7 @@ def rudder(
     return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
 
 
-def _forces(
-    F_N: SX, delta: SX, x: SX, y: SX | float, z: SX | float, t_R: SX, a_H: SX, x_H: SX
-) -> SX:
+def _forces(F_N: SX, delta: SX, x: SX, y: SX | float, z: SX | float, t_R: SX, a_H: SX, x_H: SX) -> SX:
     """Wrench (6) of a normal force F_N on rudder and hull (Yasukawa and Yoshimura 2015, eq. 18)."""
     X, Y = -(1 - t_R) * F_N * ca.sin(delta), -(1 + a_H) * F_N * ca.cos(delta)
     return vector(X, Y, 0, -z * Y, z * X, -(x + a_H * x_H) * F_N * ca.cos(delta) - y * X)
@@ -133,8 +131,8 @@ def rudder_coefficients(
     """Wrench (6) of named rudder coefficients on the square of the flow at the rudder: 1/2 rho L^2 value x monomial.
 
     Moments with L_pp^3. Factors c = u_P + kappa (u_race - u_P) [m/s] from the `wash` of the screw ahead, twice in each
-    name (`Y_|c|cdelta` turns with the flow), delta [rad], and beta = atan(-v / |u|), the drift angle. A coefficient even
-    in delta (`Y_cc|delta|`) makes one side stronger. van Berlekom and Goddard (1972); Skjetne et al. (2004).
+    name (`Y_|c|cdelta` turns with the flow), delta [rad], and beta = atan(-v / |u|), the drift angle. A coefficient
+    even in delta (`Y_cc|delta|`) makes one side stronger. van Berlekom and Goddard (1972); Skjetne et al. (2004).
     """
     _, beta = drift(nu_r)
     factors = {"c": wash[0] + kappa * (wash[1] - wash[0]), "beta": beta, "delta": delta}

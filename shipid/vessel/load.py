@@ -19,6 +19,7 @@ from shipid.errors import DocumentError, choices
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
 from shipid.vessel.ranges import UNUSUAL, out_of_range
@@ -294,6 +295,8 @@ def _check_sense(vessel: Vessel) -> None:
         if group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0] and value > 0:
             message = f"{value:g}: added mass is on the force side, so {name} is negative"
             raise DocumentError(message, file=vessel.file, path=path)
+        if ".actuator." in path and name in ("low", "high"):
+            _check_limit(path, value, values.get(f"{group}.low", -np.inf), vessel.file)
         if name == "x_fwd" and value <= values.get(f"{group}.x_aft", -np.inf):
             raise DocumentError(f"{value:g}: must be ahead of x_aft", file=vessel.file, path=path)
     sizes = vessel.document.get("particulars", {})
@@ -303,6 +306,15 @@ def _check_sense(vessel: Vessel) -> None:
         if not LEAST_BLOCK < share < MOST_BLOCK:
             message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which no ship is: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
+
+
+def _check_limit(path: str, value: float, low: float, file: str) -> None:
+    """DocumentError for limits of an actuator that leave no range, or for an angle in degrees."""
+    row = row_of(path.rsplit(".", 2)[-2])
+    if row is not None and row.angle and abs(value) > MOST_RADIANS:
+        raise DocumentError(f"{value:g}: is in rad, and that is more than a full turn", file=file, path=path)
+    if path.endswith(".high") and value <= low:
+        raise DocumentError(f"{value:g}: must be above low, {low:g}", file=file, path=path)
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:

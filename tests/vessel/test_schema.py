@@ -38,8 +38,9 @@ def test_parameters_are_read_off_the_signature() -> None:
 
 
 def test_kinds_of_a_group() -> None:
-    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "service_speed"]
-    assert kinds("thruster") == [*driving, "rudder", "rudder_derivatives"]
+    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "quadratic", "service_speed"]
+    rudders = ["rudder", "rudder_polynomial", "rudder_coefficients", "rudder_derivatives"]
+    assert kinds("thruster") == [*driving, *rudders]
     assert kinds("wind") == ["table", "blendermann"]
     assert kinds("rocket") == []
 
@@ -105,5 +106,5 @@ def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
     memory = ACTUATORS[kind]
     assert signals(memory.output) == ("state",)
     assert signals(memory.advance) == ("command", "state", "dt")
-    numbers = {p.name: 1.0 for p in parameters(memory.advance)}
+    numbers = {p.name: 1.0 for p in parameters(memory.advance) if p.default is None}
     assert float(memory.advance(ca.SX(0.7), ca.SX(0.7), ca.SX(0.5), **numbers)) == pytest.approx(0.7)

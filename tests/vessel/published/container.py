@@ -30,9 +30,7 @@ rhh       -0.001368  0.00003569   0.0024195
 """
 
 
-def accelerations(
-    *, u: float, v: float, p: float, r: float, phi: float, delta: float, rpm: float
-) -> np.ndarray:
+def accelerations(*, u: float, v: float, p: float, r: float, phi: float, delta: float, rpm: float) -> np.ndarray:
     L, rho, g, nabla, D, GM = 175.0, 1025.0, 9.81, 21222.0, 6.533, 0.3
     U = np.hypot(u, v)
     u, v, p, r, n = u / U, v / U, p * L / U, r * L / U, rpm / 60

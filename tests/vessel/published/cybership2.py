@@ -33,9 +33,7 @@ def lift(T: float, u: float, delta: float) -> float:
     return (first * delta - second * abs(delta) * delta) * abs(flow) * flow
 
 
-def accelerations(
-    *, u: float, v: float, r: float, n1: float, n2: float, n3: float, d1: float, d2: float
-) -> np.ndarray:
+def accelerations(*, u: float, v: float, r: float, n1: float, n2: float, n3: float, d1: float, d2: float) -> np.ndarray:
     m, I_z, x_g = 23.8, 1.760, 0.046
     X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot = -2.0, -10.0, 0.0, 0.0, -1.0
     M = np.array([[m - X_udot, 0, 0], [0, m - Y_vdot, m * x_g - Y_rdot], [0, m * x_g - N_vdot, I_z - N_rdot]])

@@ -1,8 +1,8 @@
 """Multipurpose naval vessel, 51.5 m, with roll: Blanke and Christensen (1993), 10th Ship Control Systems Symposium.
 
-Numbers of Perez for the vessel of ADI-Limited, as in the MSS toolbox (navalvessel.m). N_{phi|uv|} multiplies phi|uv|, as
-its name and its siblings in sway and roll have it; navalvessel.m multiplies it by phi|u phi|. The hull alone: the source
-takes the forces of screws and rudders from outside, here as X, Y, K, N in N and N m.
+Numbers of Perez for the vessel of ADI-Limited, as in the MSS toolbox (navalvessel.m). N_{phi|uv|} multiplies phi|uv|,
+as its name and its siblings in sway and roll have it; navalvessel.m multiplies it by phi|u phi|. The hull alone: the
+source takes the forces of screws and rudders from outside, here as X, Y, K, N in N and N m.
 """
 
 from __future__ import annotations

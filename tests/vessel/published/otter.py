@@ -39,7 +39,9 @@ def accelerations(*, u: float, v: float, r: float, n1: float, n2: float) -> np.n
     C_A[3:, 3:] = -cross(M_A[3:, 3:] @ nu[3:])
     C_A[5, :2] = 0  # no Munk moment in yaw
     M = H.T @ M_CG @ H + M_A
-    thrust = [(0.02216 / 2 if n > 0 else 0.01289 / 2) * n * abs(n) for n in (n1, n2)]
+    k = (0.02216 / 2, 0.01289 / 2)
+    most, least = np.sqrt(0.5 * 24.4 * g / k[0]), -np.sqrt(0.5 * 13.6 * g / k[1])
+    thrust = [(k[0] if n > 0 else k[1]) * n * abs(n) for n in np.clip([n1, n2], least, most)]
     tau = np.array([sum(thrust), 0, 0, 0, 0, y_pontoon * (thrust[0] - thrust[1])])
     X_u, N_r = -24.4 * g / (6 * 0.5144), -M[5, 5] / 1.0
     tau += np.array([X_u * u, 0, 0, 0, 0, N_r * r + 10 * N_r * abs(r) * r])

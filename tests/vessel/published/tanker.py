@@ -1,7 +1,7 @@
 """Esso 190,000 dwt tanker, 304.8 m: van Berlekom and Goddard (1972), Trans. SNAME 80, 264-298.
 
-Bis system of acceleration; coefficients as in the MSS toolbox (tanker.m) and PythonVehicleSimulator (tanker.py, MIT), in
-deep water (z = 0). delta > 0 is to port there. u and the shaft speed are positive.
+Accelerations in the bis system; coefficients as in the MSS toolbox (tanker.m) and PythonVehicleSimulator (tanker.py,
+MIT), in deep water (z = 0). delta > 0 is to port there. u and the shaft speed are positive.
 """
 
 from __future__ import annotations
