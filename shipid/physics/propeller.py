@@ -13,6 +13,8 @@ from shipid.physics.grammar import POSITIVE, THRUST
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, polynomial
 
+ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
+
 
 def drift(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
@@ -25,8 +27,8 @@ def drift(nu_r: SX) -> tuple[SX, SX]:
 
 
 def signed_root(square: SX) -> SX:
-    """sign(q) sqrt(|q|) [m/s] of a signed square q [m^2/s^2]; linear, with finite slope, below 0.01 m/s."""
-    return square / ca.sqrt(ca.fmax(ca.fabs(square), SPEED_FLOOR**2))
+    """sign(q) sqrt(|q|) [m/s] of a signed square q [m^2/s^2]; linear, with finite slope, below ROOT_FLOOR."""
+    return square / ca.sqrt(ca.fmax(ca.fabs(square), ROOT_FLOOR**2))
 
 
 def inflow(
@@ -286,7 +288,7 @@ def quadratic(
     See `quadratic_thrust`; n [rev/s], u_P = (1 - w_P0) u. Y_T and N_T are the side force and the moment of one turning
     screw. Norrbin (1970), van Berlekom and Goddard (1972); with T_uu = 0 the bilinear thrust of Blanke (1981).
     """
-    u_P = (1 - w_P0) * (nu_r[0] - nu_r[5] * y)
+    u_P = (1 - w_P0) * nu_r[0]
     thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, k_u, k_driven)
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
@@ -295,7 +297,6 @@ def quadratic_wash(
     nu_r: SX,
     n: SX,
     *,
-    y: Annotated[SX | float, "m"] = 0.0,
     T_nn: Annotated[SX, "kg m", POSITIVE],
     T_nu: Annotated[SX | float, "kg"] = 0.0,
     T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
@@ -315,7 +316,7 @@ def quadratic_wash(
     u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it. A screw astern takes at most all flow of a ship
     that goes ahead; on a ship that goes astern it adds none.
     """
-    u_P = (1 - w_P0) * (nu_r[0] - nu_r[5] * y)
+    u_P = (1 - w_P0) * nu_r[0]
     still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
     if given(D_p, 0.0):
         thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, k_u, k_driven)

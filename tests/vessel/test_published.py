@@ -13,7 +13,7 @@ import pytest
 
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
-from tests.vessel.published import supply
+from tests.vessel.published import container, cybership2, naval, otter, supply, tanker
 
 RPM, RADIAN = 1 / 60, 1 / (2 * math.pi)  # rev/s
 STATES = 200
@@ -34,6 +34,17 @@ VESSELS = {
     "supply-vessel": Published(
         supply,
         {"bow.n": ("n1", RPM), "bow_aft.n": ("n2", RPM), "starboard.n": ("n3", RPM), "port.n": ("n4", RPM)},
+    ),
+    "esso-190k": Published(tanker, {"propeller.n": ("rpm", RPM), "rudder.delta": ("delta", -1.0)}),
+    "container-175": Published(container, {"propeller.n": ("rpm", RPM), "rudder.delta": ("delta", 1.0)}),
+    "naval-51": Published(naval),
+    "otter": Published(otter, {"port.n": ("n1", RADIAN), "starboard.n": ("n2", RADIAN)}),
+    "cybership2": Published(
+        cybership2,
+        {
+            **{"port.n": ("n1", 1.0), "starboard.n": ("n2", 1.0), "bow.n": ("n3", 1.0)},
+            **{"port_rudder.delta": ("d1", -1.0), "starboard_rudder.delta": ("d2", -1.0)},
+        },
     ),
 }
 
