@@ -227,10 +227,22 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
             message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
             message = "missing"
+        elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            path, message = _of_no_kind(path, first)
         else:
             shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
             message = shown + first["msg"].removeprefix("Value error, ")
         raise DocumentError(message, file=file, path=path) from None
+
+
+def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
+    """Path of the key that chooses between kinds of a block, and what is wrong with it."""
+    key = problem["ctx"]["discriminator"].strip("'")
+    if problem["type"] == "union_tag_not_found":
+        return f"{path}.{key}", "missing"
+    tag = problem["ctx"]["tag"]
+    valid = [name.strip("' ") for name in problem["ctx"]["expected_tags"].split(",")]
+    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(str(tag), valid)}"
 
 
 def _place(data: Any, location: tuple[int | str, ...]) -> Iterator[str]:

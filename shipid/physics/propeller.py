@@ -244,16 +244,16 @@ def quadratic_thrust(
     T_nu: SX | float,
     T_uu: SX | float,
     k_astern: SX | float,
-    k_u: SX | float,
+    dT_nu: SX | float,
     k_driven: SX | float,
 ) -> SX:
-    """Thrust [N] of a screw: T_nn n|n| - T_nu |n| u_P - T_uu u_P|u_P|; for n < 0 k_astern T_nn and k_u T_nu.
+    """Thrust [N] of a screw: T_nn n|n| - T_nu |n| u_P - T_uu u_P|u_P|; for n < 0 with k_astern T_nn and T_nu + dT_nu.
 
     The part against the sense of the shaft, of a screw that the water drives, is multiplied by k_driven.
     """
     ahead = n >= 0
     thrust = T_nn * ca.if_else(ahead, 1, k_astern) * n * ca.fabs(n)
-    thrust -= T_nu * ca.if_else(ahead, 1, k_u) * ca.fabs(n) * u_P + T_uu * u_P * ca.fabs(u_P)
+    thrust -= (T_nu + ca.if_else(ahead, 0, dT_nu)) * ca.fabs(n) * u_P + T_uu * u_P * ca.fabs(u_P)
     if not given(k_driven, 1.0):
         return thrust
     sense = ca.if_else(ahead, 1, -1)
@@ -271,7 +271,7 @@ def quadratic(
     T_nu: Annotated[SX | float, "kg"] = 0.0,
     T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
     k_astern: Annotated[SX | float, "-"] = 1.0,
-    k_u: Annotated[SX | float, "-"] = 1.0,
+    dT_nu: Annotated[SX | float, "kg"] = 0.0,
     k_driven: Annotated[SX | float, "-"] = 1.0,
     t_P: Annotated[SX | float, "-"] = 0.0,
     w_P0: Annotated[SX | float, "-"] = 0.0,
@@ -289,7 +289,7 @@ def quadratic(
     screw. Norrbin (1970), van Berlekom and Goddard (1972); with T_uu = 0 the bilinear thrust of Blanke (1981).
     """
     u_P = (1 - w_P0) * nu_r[0]
-    thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, k_u, k_driven)
+    thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
 
@@ -301,7 +301,7 @@ def quadratic_wash(
     T_nu: Annotated[SX | float, "kg"] = 0.0,
     T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
     k_astern: Annotated[SX | float, "-"] = 1.0,
-    k_u: Annotated[SX | float, "-"] = 1.0,
+    dT_nu: Annotated[SX | float, "kg"] = 0.0,
     k_driven: Annotated[SX | float, "-"] = 1.0,
     w_P0: Annotated[SX | float, "-"] = 0.0,
     D_p: Annotated[SX | float, "m"] = 0.0,
@@ -319,7 +319,7 @@ def quadratic_wash(
     u_P = (1 - w_P0) * nu_r[0]
     still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
     if given(D_p, 0.0):
-        thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, k_u, k_driven)
+        thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
         still, driven = u_P * ca.fabs(u_P), driven + 8 * thrust / (ca.pi * rho * D_p**2)
     square = ca.if_else(u_P >= 0, ca.fmax(still + driven, 0), still + ca.fmax(driven, 0))
     return vector(u_P, signed_root(square), D_p)

@@ -192,8 +192,8 @@ def test_quadratic_thrust_by_hand() -> None:
     T = 3.6e-3 * 400 - 1.5e-4 * 20 * u - 0.2 * u**2
     found = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2)
     np.testing.assert_allclose(found, [0.9 * T, 0.04 * T, 0, 0, 0, -0.3 * T - 0.2 * 0.9 * T], atol=1e-12)
-    astern = quadratic_wrench(u, -n, k_astern=1.4, k_u=3.0)[0]
-    assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 3.0 * 1.5e-4 * 20 * u)
+    astern = quadratic_wrench(u, -n, k_astern=1.4, dT_nu=3e-4)[0]
+    assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 4.5e-4 * 20 * u)
 
 
 def test_a_driven_screw_gives_its_share_against_its_sense() -> None:
