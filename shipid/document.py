@@ -270,9 +270,15 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
                 inner += _alternatives(field.annotation) if field else []
             elif get_args(kind):
                 inner += _alternatives(get_args(kind)[-1])
-        kinds = inner or kinds  # the name of a union member is no key
+        kinds = inner or _of_kind(kinds, part) or kinds  # the name of a union member is no key
     models = [kind for kind in kinds if hasattr(kind, "model_fields")]
     return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
+
+
+def _of_kind(models: list[Any], tag: int | str) -> list[Any]:
+    """The models whose key `kind` is the tag."""
+    fields = [(model, getattr(model, "model_fields", {}).get("kind")) for model in models]
+    return [model for model, field in fields if field is not None and get_args(field.annotation) == (tag,)]
 
 
 def _alternatives(annotation: Any) -> list[Any]:

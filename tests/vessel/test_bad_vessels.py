@@ -50,6 +50,7 @@ BROKEN = {
     "thruster-is-a-number": ("thruster.stern", "must be a table with a `kind`"),
     "off-is-a-word": ("thruster.stern.off", "valid boolean"),
     "unknown-actuator": ("thruster.stern.actuator.n.kind", "first_order"),
+    "lag-of-a-rate-limit": ("thruster.stern.actuator.n.T", "valid: high, kind, low, off, rate"),
     "actuator-of-no-command": ("thruster.stern.actuator.alpha", "valid: n"),
     "current-without-kind": ("current.kind", "missing"),
     "empty": ("name", "missing"),
