@@ -90,6 +90,7 @@ TERMS: dict[str, Term] = {
     "thruster.tunnel": Term(thruster.tunnel),
     "thruster.propeller": Term(propeller.propeller, gives={"wash": propeller.wash}),
     "thruster.controllable_pitch": Term(propeller.controllable_pitch, gives={"wash": propeller.controllable_wash}),
+    "thruster.four_quadrant": Term(propeller.four_quadrant, gives={"wash": propeller.four_quadrant_wash}),
     "thruster.quadratic": Term(propeller.quadratic, gives={"wash": propeller.quadratic_wash}),
     "thruster.service_speed": Term(propeller.service_speed),
     "thruster.rudder": Term(rudder.rudder),

@@ -12,6 +12,7 @@ from shipid.physics.frames import force_at, given, vector
 from shipid.physics.grammar import POSITIVE, THRUST
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, polynomial
+from shipid.physics.wind import interpolate
 
 ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 
@@ -313,16 +314,87 @@ def quadratic_wash(
     """Slipstream of a screw with a quadratic law of thrust, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
 
     Its signed square is c_uu u_P|u_P| + c_un n u_P + c_nn n|n| (van Berlekom and Goddard 1972), and with a diameter
-    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it. A screw astern takes at most all flow of a ship
-    that goes ahead; on a ship that goes astern it adds none.
+    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream`.
     """
     u_P = (1 - w_P0) * nu_r[0]
     still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
     if given(D_p, 0.0):
         thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
         still, driven = u_P * ca.fabs(u_P), driven + 8 * thrust / (ca.pi * rho * D_p**2)
-    square = ca.if_else(u_P >= 0, ca.fmax(still + driven, 0), still + ca.fmax(driven, 0))
-    return vector(u_P, signed_root(square), D_p)
+    return vector(u_P, slipstream(u_P, still, driven), D_p)
+
+
+def slipstream(u_P: SX, still: SX, driven: SX) -> SX:
+    """Speed [m/s] of a slipstream of signed square `still` and what the screw adds to it, `driven` [m^2/s^2].
+
+    A screw astern takes at most all flow of a ship that goes ahead; on a ship that goes astern it adds none.
+    """
+    return signed_root(ca.if_else(u_P >= 0, ca.fmax(still + driven, 0), still + ca.fmax(driven, 0)))
+
+
+def four_quadrant_thrust(u_P: SX, n: SX, D_p: SX, beta_deg: list[SX], C_T: list[SX]) -> SX:
+    """Thrust over rho [m^4/s^2]: 1/2 C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2, linear between the entries."""
+    tip = 0.7 * ca.pi * n * D_p
+    square = u_P**2 + tip**2
+    beta = ca.atan2(u_P, ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, tip))
+    coefficient = interpolate(beta * (180 / ca.pi), ca.vertcat(*beta_deg), ca.vertcat(*C_T))
+    return ca.pi / 8 * D_p**2 * square * coefficient
+
+
+def four_quadrant(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    beta_deg: Annotated[list[SX], "deg"],
+    C_T: Annotated[list[SX], "-"],
+    t_P: Annotated[SX | float, "-"] = 0.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of a propeller from its open-water test in four quadrants: X = (1 - t_P) T (Oltmann and Sharma 1984).
+
+    T = 1/2 rho C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2 with the advance angle at 0.7 of the radius, beta =
+    atan2(u_P, 0.7 pi n D_p): 0 to 90 deg ahead, 90 to 180 the screw astern while the ship goes ahead (crash stop), -90
+    to 0 the screw ahead while she goes astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
+    in `inflow`.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
+    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+
+
+def four_quadrant_wash(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    beta_deg: Annotated[list[SX], "deg"],
+    C_T: Annotated[list[SX], "-"],
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+) -> SX:
+    """Slipstream of a propeller in four quadrants, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
+
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    driven = 8 / ca.pi * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T) / D_p**2
+    return vector(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
 
 def service_speed(

@@ -11,6 +11,8 @@ import pytest
 from shipid.physics.propeller import (
     controllable_pitch,
     controllable_wash,
+    four_quadrant,
+    four_quadrant_wash,
     propeller,
     quadratic,
     quadratic_wash,
@@ -170,6 +172,35 @@ def test_a_screw_astern_draws_water_past_the_rudder() -> None:
     np.testing.assert_array_equal(washed([1.0, 0, 0, 0, 0, 0], 9.0, k_suction=0.4), washed([1.0, 0, 0, 0, 0, 0], 9.0))
     near = [washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4) for n in (-1e-5, 1e-5)]
     np.testing.assert_allclose(*near, atol=1e-3)
+
+
+def in_four_quadrants(u: float, n: float, **other: Any) -> tuple[float, np.ndarray]:
+    """Surge force and slipstream of KVLCC2's screw, whose polynomial is laid on the quadrants n > 0."""
+    beta = np.linspace(-180, 180, 721)
+    J = np.clip(0.7 * np.pi * np.tan(np.radians(beta)), -1.0, 1.5)
+    K = 0.2931 - 0.2753 * J - 0.1385 * J**2
+    ahead = np.cos(np.radians(beta)) ** 2 * 8 / np.pi * K / (0.7 * np.pi) ** 2
+    C_T = np.where(np.abs(beta) < 90, ahead, -0.8 * ahead[::-1])
+    C_T[0] = C_T[-1] = -0.1
+    given = {**WAKE, "x": -3.36, "D_p": 0.216, "beta_deg": list(ca.SX(beta).nz), "C_T": list(ca.SX(C_T).nz), **other}
+    nu_r = ca.SX(np.array([u, 0, 0, 0, 0, 0]))
+    force = float(ca.evalf(four_quadrant(nu_r, ca.SX(n), t_P=0.22, rho=RHO, **given))[0])
+    return force, np.array(ca.evalf(four_quadrant_wash(nu_r, ca.SX(n), **given))).ravel()
+
+
+@pytest.mark.parametrize(("u", "n"), [(1.179, 10.4), (0.0, 8.0), (-0.4, 9.0), (1.0, 5.0)])
+def test_a_screw_in_four_quadrants_is_its_polynomial_ahead(u: float, n: float) -> None:
+    force, flow = in_four_quadrants(u, n)
+    assert force == pytest.approx(thrust(u, n)[0], rel=1e-3)
+    if u >= 0:
+        np.testing.assert_allclose(flow, washed([u, 0, 0, 0, 0, 0], n), rtol=1e-3)
+
+
+def test_a_screw_in_four_quadrants_is_continuous_and_finite_at_rest() -> None:
+    for u in (1.0, -1.0):
+        sides = [in_four_quadrants(u, n)[0] for n in (-1e-6, 1e-6)]
+        assert sides[0] == pytest.approx(sides[1], abs=1e-2)
+    assert in_four_quadrants(0.0, 0.0)[0] == 0
 
 
 QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4, "rho": 1014.0}

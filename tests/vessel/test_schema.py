@@ -38,7 +38,7 @@ def test_parameters_are_read_off_the_signature() -> None:
 
 
 def test_kinds_of_a_group() -> None:
-    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "quadratic", "service_speed"]
+    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "four_quadrant", "quadratic", "service_speed"]
     rudders = ["rudder", "rudder_polynomial", "rudder_coefficients", "rudder_derivatives"]
     assert kinds("thruster") == [*driving, *rudders]
     assert kinds("wind") == ["table", "blendermann"]
