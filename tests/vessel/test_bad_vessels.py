@@ -36,7 +36,7 @@ BROKEN = {
     "rudder-derivative-in-the-hull": ("hull.abkowitz", "belongs in a rudder"),
     "hull-derivative-of-a-rudder": ("thruster.rudder", "belongs in [hull.abkowitz]"),
     "unknown-coriolis": ("added_mass.coriolis", "'full', 'mmg' or 'none'"),
-    "missing-kind": ("thruster.stern.kind", "valid: azimuth, controllable_pitch, propeller"),
+    "missing-kind": ("thruster.stern.kind", "valid: azimuth, controllable_pitch, four_quadrant, propeller"),
     "unequal-wind-columns": ("wind", "gamma_deg 3, C_X 3, C_Y 4, C_N 3"),
     "wind-angles-not-rising": ("wind.gamma_deg", "must rise"),
     "wind-table-of-one": ("wind.gamma_deg", "at least 2"),
