@@ -267,8 +267,10 @@ def _check_degrees(path: str, block: Mapping[str, Any], file: str) -> None:
 
 def _check_numbers(vessel: Vessel) -> None:
     """Checks of the values of a document whose names are valid."""
-    for path, _, block in term_blocks(vessel.document):
+    for path, key, block in term_blocks(vessel.document):
         _check_order(path, block, vessel.file)
+        if key == "thruster.four_quadrant":
+            _check_circle(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
     fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
@@ -335,6 +337,17 @@ def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
     for key, value in block.items():
         if isinstance(value, list) and key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
             raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
+
+
+def _check_circle(path: str, block: Mapping[str, Any], file: str) -> None:
+    """DocumentError for a propeller in four quadrants whose table has a gap at 180 deg."""
+    beta, thrust = block["beta_deg"], block["C_T"]
+    if (beta[0], beta[-1]) != (-180, 180):
+        message = f"goes from {beta[0]:g} to {beta[-1]:g}: must go from -180 to 180"
+        raise DocumentError(message, file=file, path=f"{path}.beta_deg")
+    if thrust[0] != thrust[-1]:
+        message = f"{thrust[0]:g} at -180 deg and {thrust[-1]:g} at 180 deg: must be equal"
+        raise DocumentError(message, file=file, path=f"{path}.C_T")
 
 
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:

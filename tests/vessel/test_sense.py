@@ -33,3 +33,19 @@ def test_limits_of_an_actuator_leave_a_range() -> None:
     with pytest.raises(DocumentError, match="above low") as caught:
         load_vessel("kvlcc2-l7").with_values(limits)
     assert caught.value.path == "thruster.rudder.actuator.delta.high"
+
+
+@pytest.mark.parametrize(
+    ("beta", "thrust", "key", "remedy"),
+    [
+        ([0.0, 90.0, 180.0], [0.5, -0.6, -0.3], "beta_deg", "from -180 to 180"),
+        ([-180.0, 20.0, 180.0], [-0.4, 0.5, -0.3], "C_T", "must be equal"),
+    ],
+)
+def test_a_screw_in_four_quadrants_has_the_whole_circle(
+    beta: list[float], thrust: list[float], key: str, remedy: str
+) -> None:
+    block = {"kind": "four_quadrant", "x": -3.4, "D_p": 0.2, "beta_deg": beta, "C_T": thrust}
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        load_vessel("kvlcc2-l7").with_values({"thruster.propeller": block})
+    assert caught.value.path == f"thruster.propeller.{key}"
