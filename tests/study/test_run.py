@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -188,6 +189,12 @@ def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(dask.distributed, "Client", unreachable)
     with pytest.raises(ShipidError, match="no Dask scheduler answers there"):
+        list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
+
+
+def test_a_scheduler_without_dask_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(ShipidError, match=r"pip install 'shipid\[dask\]'"):
         list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
 
 
