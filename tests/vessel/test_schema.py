@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import casadi as ca
@@ -64,7 +65,8 @@ def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str
             continue
         found: list[str] = []
         for key, entry in value.items():
-            inner = declared.get(key, extra)
+            by_name = [inner for name, inner in option.get("patternProperties", {}).items() if re.search(name, key)]
+            inner = declared.get(key, by_name[0] if by_name else extra)
             if inner is False:
                 found.append(f"{path}.{key}")
             elif isinstance(inner, dict):
