@@ -64,6 +64,13 @@ def manoeuvre(
     side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
     step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    approach: Annotated[
+        str | None,
+        typer.Option(
+            help="steady (helm amidships), helmsman (holds the course) or rest; default: steady, and the helmsman for a "
+            "ship that does not go straight"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
     log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
@@ -71,15 +78,17 @@ def manoeuvre(
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from shipid.data.dataset import Dataset, write_dataset
     from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import manoeuvre_content, measure_standard
+    from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
     if log is not None and log.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
     ship = load_vessel(vessel)
-    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
-    title, rpm = done.standard.title, done.standard.manoeuvre.n_rpm
-    typer.echo(f"{ship.name}: {title}, approach at {done.standard.speed:.3g} m/s ({rpm:.4g} rpm)")
+    done = measure_standard(
+        ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
+    )
+    title = done.standard.title
+    typer.echo(f"{ship.name}: {title}, {approached(done.standard)}")
     show(measure_table(done.measures, []))
     if done.criteria:
         show(criterion_table(done.criteria, []))

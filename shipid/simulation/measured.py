@@ -17,6 +17,7 @@ from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.simulation.approach import NotStraight
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, length_of, standard
 from shipid.version import __version__
@@ -57,15 +58,35 @@ def measure_standard(
     side: str = "starboard",
     duration: float | None = None,
     step: float | None = None,
+    approach: str | None = None,
 ) -> Measured:
-    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`."""
-    chosen = standard(vessel, name, angles, speed=speed, side=side, duration=duration, step=step)
-    frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`.
+
+    approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.
+    """
+    how: dict[str, Any] = {"speed": speed, "side": side, "duration": duration, "step": step}
+    chosen = standard(vessel, name, angles, **how, approach=approach or "steady")
+    try:
+        frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    except NotStraight:
+        if approach is not None:
+            raise
+        chosen = standard(vessel, name, angles, **how, approach="helmsman")
+        frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
     frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
     record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
     measures, length = MEASURES[chosen.kind](record), length_of(vessel)
     judged = criterion_rows(criteria(chosen.kind, measures, length))
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
+
+
+def approached(chosen: Standard) -> str:
+    """The approach in words."""
+    n_rpm = chosen.manoeuvre.n_rpm
+    if chosen.manoeuvre.approach == "rest":
+        return f"from rest, {n_rpm:.4g} rpm"
+    held = ", held on course by a helmsman" if chosen.manoeuvre.approach == "helmsman" else ""
+    return f"approach at {chosen.speed:.3g} m/s ({n_rpm:.4g} rpm){held}"
 
 
 def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
@@ -102,7 +123,7 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
-            "Approach": f"{chosen.speed:.4g} m/s at {chosen.manoeuvre.n_rpm:.5g} rpm, calm deep water, no wind",
+            "Approach": f"{approached(chosen)}, calm deep water, no wind",
             "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
             "shipid": __version__,
         },
