@@ -67,8 +67,8 @@ def manoeuvre(
     approach: Annotated[
         str | None,
         typer.Option(
-            help="steady (helm amidships), helmsman (holds the course) or rest; default: steady, and the helmsman for a "
-            "ship that does not go straight"
+            help="steady (helm amidships), helmsman (holds the course) or rest; default: steady, and the helmsman for "
+            "a ship that does not go straight"
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,

@@ -166,6 +166,19 @@ def iterations() -> Iterator[Any]:
         yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
 
 
+@contextmanager
+def steps() -> Iterator[Callable[[str], object] | None]:
+    """Give a function that shows the step of a long calculation, in one line; None if not on a terminal."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status("") as status:
+        yield lambda step: status.update(visible(step))
+
+
 def draw(events: Iterable[Event]) -> None:
     """Show the events of a run: live progress on a terminal, else one plain line per finished cell."""
     from rich.console import Console

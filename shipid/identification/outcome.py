@@ -28,12 +28,8 @@ from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
 from shipid.interrupts import uninterrupted
-from shipid.measures import MEASURES
-from shipid.measures.recognise import record_of
-from shipid.measures.rows import measure_rows
 from shipid.physics.signals import is_shaft
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import length_of, standard
+from shipid.simulation.measured import measure_standard
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -343,7 +339,7 @@ def _banded(
     manoeuvres: pd.DataFrame, vessel: Vessel, solution: Solution, judged: Statistics, level: float
 ) -> tuple[pd.DataFrame, str]:
     """The measures with the band of each, `low` and `high`; or as they are, and why there is no band."""
-    why = refusal(solution, judged, _spacing(solution))
+    why = refusal(solution, judged, residual_spacing(solution))
     if why:
         return manoeuvres, why
 
@@ -365,14 +361,10 @@ def _banded(
 
 def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, dict[str, Any]]:
     """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
-    chosen = standard(vessel, kind, angles)
-    log = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    columns = {str(name): log[name].to_numpy() for name in log if name != "run" and not str(name).startswith("actual.")}
-    rows = measure_rows(MEASURES[kind](record_of(columns)), length_of(vessel))
-    return {row["measure"]: row for row in rows}
+    return {row["measure"]: row for row in measure_standard(vessel, kind, angles).measures}
 
 
-def _spacing(solution: Solution) -> float:
+def residual_spacing(solution: Solution) -> float:
     """Time between residuals of one signal [s]."""
     selected = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
     steps = np.diff(solution.times[selected])
@@ -386,7 +378,7 @@ def _longest(solution: Solution) -> float:
 
 
 def _colours(solution: Solution) -> pd.DataFrame:
-    labels, between, frames = np.array(solution.signals), _spacing(solution), []
+    labels, between, frames = np.array(solution.signals), residual_spacing(solution), []
     for name in dict.fromkeys(solution.signals):
         selected = labels == name
         rho = autocorrelation(
@@ -407,7 +399,7 @@ def _programme(
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
-    spread = {name: width * _level(judged, name) for name, width in settings.weights.items()}
+    spread = {name: width * residual_level(judged, name) for name, width in settings.weights.items()}
     contributions = design.informed(
         vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
         interval=settings.step,
@@ -416,7 +408,7 @@ def _programme(
     return design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
 
 
-def _level(judged: Statistics, signal: str) -> float:
+def residual_level(judged: Statistics, signal: str) -> float:
     """Standard deviation of the residuals of a signal, over the declared one."""
     columns = {"position": "north"}
     return judged.whiteness[columns.get(signal, signal)].level
@@ -482,7 +474,7 @@ def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
 
 def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
     """Warnings about the fit: coloured residuals, short horizon, untrusted errors, bounds, no test, worse free runs."""
-    warnings, between = [], _spacing(solution)
+    warnings, between = [], residual_spacing(solution)
     coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
     horizon = solution.settings.horizon
     if coloured:

@@ -8,7 +8,7 @@ error of its change of heading.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -30,9 +30,9 @@ COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning")
 
 
 def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
-    """Errors of free runs: `group`, `side` (`starboard`, `port`, ``), `rows`, RMS `u`, `v` [m/s], `r` [rad/s], `turning`.
+    """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
-    turning : relative error of the change of heading [1]; NaN where a group has no side.
+    u, v [m/s], r [rad/s]; turning : relative error of the change of heading [1], NaN where a group has no side.
 
     Parameters
     ----------
@@ -96,24 +96,24 @@ def _groups(
 def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
     """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate."""
     said = []
-    for group, rows in groups[groups["side"] != ""].groupby("group", sort=False):
-        of = rows.set_index("side")
+    rows = [row for row in groups.to_dict("records") if row["side"]]
+    for group in dict.fromkeys(row["group"] for row in rows):
+        of = [row for row in rows if row["group"] == group]
         if len(of) < len(("starboard", "port")):
             continue
         where = "" if group == "all" else f" at {group}"
-        turning = of["turning"].abs()
-        worse, better = str(turning.idxmax()), str(turning.idxmin())
-        if turning[worse] > max(WORSE * turning[better], LEAST):
+        better, worse = sorted(of, key=lambda row: abs(float(row["turning"])))
+        if abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             said.append(
-                f"the error of the turning{where} is {of['turning'][worse]:+.0%} to {worse} and "
-                f"{of['turning'][better]:+.0%} to {better}: the model lacks what makes the sides differ"
+                f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
+                f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ"
             )
             continue
-        worse, better = str(of["r"].idxmax()), str(of["r"].idxmin())
-        if of["r"][worse] > WORSE * of["r"][better]:
+        better, worse = sorted(of, key=lambda row: float(row["r"]))
+        if worse["r"] > WORSE * better["r"]:
             said.append(
-                f"the error of the yaw rate{where} is {of['r'][worse] / of['r'][better]:.1f} times as large to {worse} "
-                f"as to {better}"
+                f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
+                f"as to {better['side']}"
             )
     return tuple(said)
 
@@ -129,13 +129,8 @@ def shown(groups: pd.DataFrame) -> list[list[str]]:
             f"{row['r'] / DEGREE:.3g}",
             "" if row["turning"] != row["turning"] else f"{100 * row['turning']:+.1f}",
         ]
-        for row in _records(groups)
+        for row in groups.to_dict("records")
     ]
-
-
-def _records(groups: pd.DataFrame) -> Sequence[Mapping[str, float]]:
-    records: Sequence[Mapping[str, float]] = groups.to_dict("records")
-    return records
 
 
 HEADS = ("group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]")

@@ -88,7 +88,7 @@ REPLACED = ("mmg", "derivatives", "prime_derivatives", "abkowitz", "crossflow")
 class Exchanged:
     """A vessel with another hull. settings : with its coefficients free. misfit : axis -> RMS of the forces over those
     of the former hull, with the starting values.
-    """  # noqa: D205, D209
+    """  # noqa: D205
 
     vessel: Vessel
     settings: Identify
@@ -170,7 +170,7 @@ def _bare(
 
 
 def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, Array]:
-    """u, v, r and commands (N,): rows of the runs, and as many drawn from their ranges; those of v, r, helm are wider."""
+    """u, v, r and commands (N,): rows of the runs, and as many drawn from ranges; those of v, r and helm are wider."""
     names = ("u", "v", "r", *dynamics(vessel).commands)
     missing = next((name for name in names if name not in dataset.frame), None)
     if missing is not None:

@@ -96,7 +96,7 @@ def course_keeping(commands: tuple[str, ...]) -> Helmsman:
 
     def error(signals: Named, inputs: Named) -> SX:
         turn = inputs["course"] - signals["psi"]
-        return ca.atan2(ca.sin(turn), ca.cos(turn))
+        return SX(ca.atan2(ca.sin(turn), ca.cos(turn)))
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         omega = inputs["omega"]

@@ -136,9 +136,7 @@ class Approach:
     helm: dict[str, Array]
 
 
-def steady(
-    controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False
-) -> Approach:
+def steady(controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False) -> Approach:
     """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
     Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s, with the helm amidships,

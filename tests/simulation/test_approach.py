@@ -149,7 +149,6 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
     assert alone.state["u"][0] == found.state["u"][0]  # whatever the company
 
 
-
 def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:
     units = thrust_sharing(SHIP)
     effects = [
