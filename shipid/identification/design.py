@@ -178,7 +178,7 @@ def performed(
     interval: float | None = None,
     environment: Mapping[str, float] | None = None,
 ) -> pd.DataFrame:
-    """Log of all candidates, `run` 0000, 0001, ...; a helmsman holds the approach where the ship does not go straight."""
+    """Log of all candidates, `run` 0000, 0001, ...; by a helmsman's approach where the ship does not go straight."""
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     try:
         return perform(vessel, named, step=step, interval=interval, environment=environment or {})

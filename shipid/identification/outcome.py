@@ -425,7 +425,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
         limits = {**solution.settings.bounds, **held, name: (factor, factor)}
-        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None})
+        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None, "ranges": False})
         begin = dict(zip(solution.paths, start.tolist(), strict=True))
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors

@@ -2,7 +2,7 @@
 
 A structure names the coefficients of a hull. Its starting values follow from the hull of the vessel: both give the same
 forces, as nearly as a linear least-squares fit over the states of the data and beyond them can make it. The prior of a
-coefficient is wide in terms of force, so that no structure is favoured by the size of its starting values.
+coefficient has two parts: a share of its value, and a share of the hull's force, so that a small value is free to grow.
 
 Sources: MMG, Yasukawa and Yoshimura (2015); Abkowitz (1964); second-order modulus, Norrbin (1970), Fedyaevsky and
 Sobolev (1964).
@@ -30,8 +30,8 @@ from shipid.vessel.perturb import select
 Array = NDArray[np.float64]
 PRESENT = "present"
 """Name of the hull as the vessel has it, with the numbers that the settings leave free."""
-SHARE = 0.5  # of the hull's force, the standard deviation of the prior of a coefficient's force
-TINY = 1e-3  # of the hull's force: a coefficient whose force is smaller begins at 0
+OF_VALUE, SHARE = 0.3, 0.03  # standard deviation of a prior: of the value at the start, of the hull's force
+TINY = 1e-6  # of the hull's force: a coefficient whose force is smaller begins at 0
 SAMPLES, BEYOND, SEED = 1500, 1.2, 0  # states of the data, and as many drawn from the ranges, so much wider
 LEAST = 1e-3  # of the usual size: where a coefficient that must be positive begins at least
 AXES = ("X", "Y", "N")
@@ -258,7 +258,7 @@ def _settings(
 
     groups = [[path for path in kept(group) if path in free] for group in settings.together]
     zero = begun == 0
-    widths = np.where(zero, SHARE, SHARE * sizes / np.where(zero, 1.0, np.abs(begun)))
+    widths = np.where(zero, SHARE, np.hypot(OF_VALUE, SHARE * sizes / np.where(zero, 1.0, np.abs(begun))))
     update = {
         "parameters": [*free, *paths],
         "fixed": [],

@@ -88,7 +88,7 @@ def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
 
 @lru_cache
 def course_keeping(commands: tuple[str, ...]) -> Helmsman:
-    """PID control of the heading: the share of the largest helm is s = I + (omega^2 e - 2 omega r) / effect, e the error.
+    """PID control of the heading: share of the largest helm s = I + (omega^2 e - 2 omega r) / effect, e the error.
 
     dI/dt = omega^3 / 10 e / effect; s and I limited to -1..1. Inputs: each command with the largest helm to starboard;
     `course` [rad]; `omega` [rad/s], the natural frequency; `effect` [rad/s^2], yaw acceleration by the largest helm.

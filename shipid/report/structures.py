@@ -39,7 +39,7 @@ class StructuresContent:
     chosen: str
     cautions: Mapping[str, str]
     ahead: float
-    level: float
+    level: float | None
     provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     study_document: str = ""
@@ -123,7 +123,8 @@ def manoeuvres(content: StructuresContent) -> Table:
         two = [figure(wide[place][name], 3) if place in wide else text(None) for name in ("spread", "width")]
         rows.append([*map(text, place), *cells, *two, text(next(iter(by.values()))["unit"])])
     head = ["manoeuvre", "measure", *names, "between structures", "within one", "unit"]
-    takeaway = f"With {100 * content.level:g} % intervals. Between: range over the structures not shown to be worse; "
+    takeaway = "" if content.level is None else f"With {100 * content.level:g} % intervals. "
+    takeaway += "Between: range over the structures not shown to be worse; "
     takeaway += "within: the widest interval of one of them."
     cautions = [f"{name}: {why}" for name, why in content.cautions.items() if why]
     if cautions:

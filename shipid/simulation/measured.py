@@ -20,6 +20,7 @@ from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import NotStraight
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, length_of, standard
+from shipid.units import RPM
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
@@ -59,21 +60,51 @@ def measure_standard(
     duration: float | None = None,
     step: float | None = None,
     approach: str | None = None,
+    engine: str = "auto",
 ) -> Measured:
     """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`.
 
+    engine : of the rollout; `repeated` where many vessels of one structure follow.
     approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.
     """
-    how: dict[str, Any] = {"speed": speed, "side": side, "duration": duration, "step": step}
-    chosen = standard(vessel, name, angles, **how, approach=approach or "steady")
-    try:
-        frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    except NotStraight:
-        if approach is not None:
-            raise
-        chosen = standard(vessel, name, angles, **how, approach="helmsman")
-        frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
+    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step, "approach": approach}
+    return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]
+
+
+def measure_all(
+    vessel: Vessel,
+    wanted: Sequence[tuple[str, Sequence[float], str]],
+    *,
+    speed: float | None = None,
+    duration: float | None = None,
+    step: float | None = None,
+    approach: str | None = None,
+    engine: str = "auto",
+) -> list[Measured]:
+    """Simulate standard manoeuvres from one approach, each a name, angles [deg] and side; see `measure_standard`."""
+    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step}
+    for given in (approach,) if approach else ("steady", "helmsman"):
+        chosen = list[Standard]()
+        for name, angles, side in wanted:
+            n = chosen[0].manoeuvre.n_rpm * RPM if chosen else None
+            chosen.append(standard(vessel, name, angles, side=side, approach=given, n=n, **how))
+        runs = [one.manoeuvre.model_copy(update={"name": str(number)}) for number, one in enumerate(chosen)]
+        try:
+            log = perform(vessel, runs, step=chosen[0].step, interval=chosen[0].interval, engine=engine)
+        except NotStraight:
+            if approach is not None or given == "helmsman":
+                raise
+            continue
+        break
+    log = log[[column for column in log if not str(column).startswith("actual.")]]
+    return [
+        _read(vessel, one, log[log["run"] == run.name].reset_index(drop=True))
+        for one, run in zip(chosen, runs, strict=True)
+    ]
+
+
+def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
+    """The measures of one log."""
     record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
     measures, length = MEASURES[chosen.kind](record), length_of(vessel)
     judged = criterion_rows(criteria(chosen.kind, measures, length))

@@ -22,6 +22,7 @@ from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
+ROWS = 256  # orders of a helmsman that are evaluated at once
 
 
 def perform(
@@ -238,8 +239,14 @@ def _orders(
     memory = [path.names.index(f"actual.{name}") for name in model.memory]
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
     values = np.array(list(vessel.parameters.values()))
-    # record by record: a map of all is slow to build
-    rows = model.orders.map("rows", "serial", samples, [model.orders.n_in() - 1], [])
-    parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
-    ordered = np.array([np.array(rows(*(part[k].T for part in parts), values)) for k in range(records)])
-    return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
+    count = records * samples
+    each = min(count, ROWS)  # by pieces: a map of all is slow to build
+    rows = model.orders.map("rows", "serial", each, [model.orders.n_in() - 1], [])
+    padded = np.minimum(np.arange(-(-count // each) * each), count - 1)
+    parts = [part.reshape(count, -1)[padded].T for part in (states, path.states[:, 0][..., memory], given, felt)]
+    pieces = [
+        np.array(rows(*(part[:, first : first + each] for part in parts), values))
+        for first in range(0, len(padded), each)
+    ]
+    ordered = np.concatenate(pieces, axis=1)[:, :count].reshape(len(model.ordered), records, samples)
+    return {name: ordered[channel] + 0.0 for channel, name in enumerate(model.ordered)}

@@ -61,6 +61,7 @@ def standard(
     duration: float | None = None,
     step: float | None = None,
     approach: str = "steady",
+    n: float | None = None,
 ) -> Standard:
     """Define a standard manoeuvre for a vessel.
 
@@ -74,11 +75,12 @@ def standard(
         for a zigzag, 40 for a level of a spiral, 80 for a stop.
     step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
     approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
+    n : shaft speed [rev/s] of the approach; default: that which gives the speed.
 
     Raises
     ------
-    ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed gives, a time
-        that is not positive.
+    ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed
+        gives, a time that is not positive.
     """
     if name not in KINDS:
         raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
@@ -96,7 +98,7 @@ def standard(
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     asked = service_speed(vessel) if speed is None else speed
-    n_rpm = shaft_speed(Controls.of(vessel), asked) / RPM
+    n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else n) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = float(np.ceil(LEAD * passing / interval) * interval)

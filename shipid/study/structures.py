@@ -9,6 +9,7 @@ manoeuvres: those that are as good on the runs may differ there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
 from shipid.physics.signals import is_shaft
 from shipid.report.structures import StructuresContent
-from shipid.simulation.measured import Measured, measure_standard
+from shipid.simulation.measured import Measured, measure_all
 from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.new import proposed_horizon
 from shipid.version import __version__
@@ -86,7 +87,7 @@ class Compared:
     test: tuple[str, ...]
     digest: str
     ahead: float
-    level: float
+    level: float | None
     errors: pd.DataFrame
     table: pd.DataFrame
     chosen: str
@@ -162,7 +163,7 @@ def compare_structures(
     *,
     ahead: float | None = None,
     folds: int = FOLDS,
-    level: float = LEVEL,
+    level: float | None = LEVEL,
     say: Said | None = None,
 ) -> Compared:
     """Compare structures of the hull on the same runs.
@@ -173,7 +174,8 @@ def compare_structures(
     names : of `shipid.identification.structures.STRUCTURES`, or `present`.
     runs, held_out : names or patterns, as `pick_runs` takes them; runs held out choose nothing.
     ahead : length of the free runs [s], 0 for whole runs; default: the horizon that a new study would have.
-    folds : parts into which the runs are dealt. level : of the intervals on manoeuvres. say : called with each step.
+    folds : parts into which the runs are dealt. level : of the intervals on manoeuvres; None: none.
+    say : called with each step.
 
     Raises
     ------
@@ -212,7 +214,7 @@ def compare_structures(
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
     tell("standard manoeuvres")
     reach = reach_of(vessel, dataset, fitted)
-    manoeuvres, far = _manoeuvres(fits, chosen, reach, level)
+    manoeuvres, far = _manoeuvres(fits, chosen, reach, equal, level)
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
     tell("manoeuvres to run next")
     return Compared(
@@ -249,24 +251,26 @@ def _judged(
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 
     def fit(runs: Sequence[str], start: Solution | None = None) -> tuple[Vessel, Solution]:
+        tell(f"{name}: {len(runs)} of {len(fitted)} runs")
         solution = identify(other.vessel, dataset, runs, other.settings, start=start)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         return other.vessel.with_values(solution.values), solution
 
-    tell(f"{name}: all runs")
     other = exchange(vessel, name, dataset, fitted, settings)
     whole, solution = fit(fitted)
+    bare = Identify(
+        parameters=[next(iter(whole.parameters))], step=settings.step, method=settings.method, runs=settings.runs
+    )
     frames, series = [], []
-    for number, part in enumerate(parts):
-        tell(f"{name}: fold {number + 1} of {len(parts)}")
+    for part in parts:
         rest = [run for run in fitted if run not in part]
-        found = free_runs({name: fit(rest)[0]}, dataset, part, settings, ahead)
+        found = free_runs({name: fit(rest, solution)[0]}, dataset, part, bare, ahead)
         frames.append(found.errors[found.errors["run"] != ALL])
         series.append(found.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
-        test: FreeRuns = free_runs({name: whole}, dataset, tested, settings, ahead)
+        test: FreeRuns = free_runs({name: whole}, dataset, tested, bare, ahead)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
     judged = statistics(LinearFit.of(solution))
     caution = refusal(solution, judged, residual_spacing(solution))
@@ -336,46 +340,80 @@ def with_gear(vessel: Vessel) -> Vessel:
     return vessel.with_values(off) if off else vessel
 
 
-def _measures(vessel: Vessel, kind: str, angles: Sequence[float], side: str) -> Measured:
-    return measure_standard(with_gear(vessel), kind, angles, side=side)
+TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
+
+
+def _title(kind: str, angles: Sequence[float], side: str) -> str:
+    return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}"
+
+
+def _measured(vessel: Vessel) -> dict[str, Measured]:
+    """Title -> every standard manoeuvre."""
+    ship, titles = with_gear(vessel), [_title(*trial) for trial in TRIALS]
+    try:
+        return dict(zip(titles, measure_all(ship, TRIALS, engine="repeated"), strict=True))
+    except ShipidError:  # one of them: the others may be performed
+        done: dict[str, Measured] = {}
+        for trial, title in zip(TRIALS, titles, strict=True):
+            with suppress(ShipidError):
+                done[title] = measure_all(ship, [trial], engine="repeated")[0]
+        if not done:
+            raise
+        return done
 
 
 def _manoeuvres(
-    fits: Mapping[str, Fitted], chosen: str, reach: Reach, level: float
+    fits: Mapping[str, Fitted], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Measures of standard manoeuvres of every structure with intervals, and what the chosen one extrapolates."""
+    """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
     rows, far = list[dict[str, Any]](), list[str]()
-    trials = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
     for name, fit in fits.items():
-        units: dict[str, str] = {}
-        measures: list[tuple[str, Measure]] = []
-        for kind, angles, side in trials:
-            title = f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}"
-            try:
-                done = _measures(fit.vessel, kind, angles, side)
-            except ShipidError as error:
-                rows.append({"manoeuvre": title, "measure": "", "structure": name, "note": error.message})
-                continue
-            units |= {row["measure"]: row["unit"] for row in done.measures}
-            measures.append((title, _measure(kind, angles, side)))
-            if name == chosen:
-                far.append(beyond(title, of_log(fit.vessel, done.frame), reach))
-        found = bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level)
-        rows += [{**row, "structure": name, "unit": units.get(row["measure"], "")} for row in _records(found)]
+        try:
+            done = _measured(fit.vessel)
+        except ShipidError as error:
+            rows.append({"manoeuvre": "all", "measure": "", "structure": name, "note": error.message})
+            continue
+        units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
+        if name == chosen:
+            far += [beyond(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
+        if level is None or name not in equal:
+            found = [
+                {"manoeuvre": title, "measure": measure, "value": value}
+                for title, one in done.items()
+                for measure, value in _values(one).items()
+            ]
+        else:
+            known = {fit.vessel.digest: done}
+            measures = [(title, _measure(title, known)) for title in done]
+            found = _records(bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level))
+        missing = [_title(*trial) for trial in TRIALS if _title(*trial) not in done]
+        rows += [{"manoeuvre": title, "measure": "", "structure": name, "note": "diverges"} for title in missing]
+        rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in found]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
 
 
-def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
+def _values(one: Measured) -> dict[str, float]:
+    """The measures that are compared."""
+    found = {row["measure"]: float(row["value"]) for row in one.measures}
+    return {name: found[name] for name in MEASURES[one.standard.kind] if name in found}
 
 
-def _measure(kind: str, angles: Sequence[float], side: str) -> Measure:
+def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
+    """Measures of one manoeuvre; `known` holds all manoeuvres of vessels by digest, which come from one approach."""
+
     def measure(one: Vessel) -> dict[str, float]:
-        found = {row["measure"]: float(row["value"]) for row in _measures(one, kind, angles, side).measures}
-        return {name: found[name] for name in MEASURES[kind] if name in found}
+        if one.digest not in known:
+            known[one.digest] = _measured(one)
+        if title not in known[one.digest]:
+            raise ShipidError("diverges within the interval of the numbers")
+        return _values(known[one.digest][title])
 
     return measure
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
 
 
 def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
