@@ -33,6 +33,7 @@ PRESENT = "present"
 OF_VALUE, SHARE = 0.3, 0.03  # standard deviation of a prior: of the value at the start, of the hull's force
 TINY = 1e-6  # of the hull's force: a coefficient whose force is smaller begins at 0
 SAMPLES, BEYOND, SEED = 1500, 1.2, 0  # states of the data, and as many drawn from the ranges, so much wider
+DRAWN = 0.05  # weight of a drawn state: along a run forces nearly cancel, and small errors count
 LEAST = 1e-3  # of the usual size: where a coefficient that must be positive begins at least
 AXES = ("X", "Y", "N")
 
@@ -86,8 +87,8 @@ REPLACED = ("mmg", "derivatives", "prime_derivatives", "abkowitz", "crossflow")
 
 @dataclass(frozen=True, eq=False)
 class Exchanged:
-    """A vessel with another hull. settings : with its coefficients free. misfit : axis -> RMS of the forces over those
-    of the former hull, with the starting values.
+    """A vessel with another hull. settings : with its coefficients free. misfit : axis -> RMS over the rows of the data of what
+    the starting values miss, over the RMS of the forces of the former hull.
     """  # noqa: D205
 
     vessel: Vessel
@@ -219,14 +220,16 @@ def _fitted(
     without, slopes = _forces(bare, states, paths, True)
     target = wanted - without
     level = np.maximum(np.sqrt((target**2).mean(axis=1)), 1e-12)
-    scaled = (slopes / level[:, None, None]).reshape(-1, len(paths))
+    weight = np.where(np.arange(target.shape[1]) < target.shape[1] - SAMPLES, 1.0, DRAWN) / level[:, None]
+    scaled = (slopes * weight[:, :, None]).reshape(-1, len(paths))
     lengths = np.sqrt((scaled**2).sum(axis=0))
     lengths = np.where(lengths > 0, lengths, 1.0)
-    c = np.linalg.lstsq(scaled / lengths, (target / level[:, None]).ravel(), rcond=1e-8)[0] / lengths
-    own = np.sqrt((slopes**2).mean(axis=1))  # (3, n), force of a coefficient of 1
-    sizes = (level[:, None] / np.where(own > 0, own, np.inf)).max(axis=0)
-    left = np.sqrt(((slopes @ c - target) ** 2).mean(axis=1)) / level
-    return c, np.maximum(sizes, 1e-300), dict(zip(AXES, left.tolist(), strict=True))
+    c = np.linalg.lstsq(scaled / lengths, (target * weight).ravel(), rcond=1e-8)[0] / lengths
+    axis = [AXES.index(letter) if (letter := path.rsplit(".", 1)[-1][0]) in AXES else 0 for path in paths]  # R_0: X
+    unit = np.sqrt((slopes[axis, :, np.arange(len(paths))] ** 2).mean(axis=1))  # force of a coefficient of 1
+    sizes = level[axis] / np.where(unit > 0, unit, 1.0)
+    left = np.sqrt(((slopes @ c - target)[:, :-SAMPLES] ** 2).mean(axis=1)) / level
+    return c, sizes, dict(zip(AXES, left.tolist(), strict=True))
 
 
 def _settings(

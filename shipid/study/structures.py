@@ -210,7 +210,11 @@ def compare_structures(
         raise ShipidError("; ".join(f"{name}: {note}" for name, note in notes.items()))
     every = pd.concat(errors, ignore_index=True)
     table = _table(names, every, counts, notes, fitted)
-    chosen = str(table["structure"].iloc[int(np.nanargmin(table["position"].to_numpy()))])
+    if not np.isfinite(table["position"].iloc[0]):
+        raise ShipidError(
+            "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead"
+        )
+    chosen = str(table["structure"].iloc[0])
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
     tell("standard manoeuvres")
     reach = reach_of(vessel, dataset, fitted)
