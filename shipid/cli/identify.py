@@ -244,6 +244,8 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
 
 def _show_identified(outcome: Identified) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
+    from shipid.identification.sides import HEADS, shown
+
     solution = outcome.solution
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
@@ -283,6 +285,14 @@ def _show_identified(outcome: Identified) -> None:
         for row in outcome.manoeuvres.to_dict("records")
     ]
     show(table(["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"], compared))
+    for sentence in outcome.beyond:
+        typer.echo(f"extrapolated: {sentence}")
+    if len(outcome.groups):
+        typer.echo(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
+        show(table(list(HEADS), shown(outcome.groups)))
+    if outcome.solution.effective:
+        worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
+        typer.echo(f"residuals count as so many independent ones: {worth}")
     for curve in outcome.profiles:
         typer.echo(f"profile: {curve.sentence}")
     if outcome.programme is not None:

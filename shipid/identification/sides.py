@@ -9,6 +9,7 @@ error of its change of heading.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,13 +27,14 @@ LEVELS = (2.5, 7.5, 12.5, 17.5, 22.5, 27.5, 32.5)  # deg, between levels of helm
 TURNING = 0.1  # of the greatest yaw rate: slower rows turn to no side
 WORSE, LEAST = 2.0, 0.05  # a side is worse from this ratio of errors on, and from this error of the turning on
 FEWEST = 20  # rows that make a group
-COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning")
+SURE = 2.0  # standard errors of the difference of the sides
+COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning", "error")
 
 
 def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
-    u, v [m/s], r [rad/s]; turning : relative error of the change of heading [1], NaN where a group has no side.
+    u, v [m/s], r [rad/s]. turning, error : relative error of the change of heading [1], its standard error; NaN without a side.
 
     Parameters
     ----------
@@ -44,18 +46,28 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
     away = {name: mine[name].to_numpy() - log[name].to_numpy() for name in ("u", "v", "r")}
     seen = ~begin.to_numpy() & np.isfinite(away["r"])
     r, speed = log["r"].to_numpy(), np.hypot(log["u"].to_numpy(), log["v"].to_numpy())
+    pieces = log.groupby(["run", "piece"], sort=False).ngroup().to_numpy()
     rows = [
         {
             "group": group,
             "side": side,
             "rows": int(mask.sum()),
             **{name: float(np.sqrt((values[mask] ** 2).mean())) for name, values in away.items()},
-            "turning": float(away["r"][mask].sum() / r[mask].sum()) if side else float("nan"),
+            **(_turned(away["r"][mask], r[mask], pieces[mask]) if side else {"turning": np.nan, "error": np.nan}),
         }
         for group, side, mask in _groups(seen, r, helm, speed)
         if mask.sum() >= FEWEST
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
+    """Relative error of the change of heading, with its standard error from the pieces, which are independent."""
+    _, place = np.unique(pieces, return_inverse=True)
+    a, b = np.bincount(place, away), np.bincount(place, r)
+    share, count = float(a.sum() / b.sum()), len(a)
+    error = float(np.sqrt(count / (count - 1) * ((a - share * b) ** 2).sum()) / abs(b.sum())) if count > 1 else np.inf
+    return {"turning": share, "error": error}
 
 
 def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array:
@@ -103,14 +115,17 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
             continue
         where = "" if group == "all" else f" at {group}"
         better, worse = sorted(of, key=lambda row: abs(float(row["turning"])))
-        if abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
+        apart = abs(worse["turning"]) - abs(better["turning"])
+        sure = apart > SURE * float(np.hypot(worse["error"], better["error"]))
+        if sure and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             said.append(
                 f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
-                f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ"
+                f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
+                f"next: turns to both sides{where}"
             )
             continue
         better, worse = sorted(of, key=lambda row: float(row["r"]))
-        if worse["r"] > WORSE * better["r"]:
+        if np.isfinite([worse["error"], better["error"]]).all() and worse["r"] > WORSE * better["r"]:
             said.append(
                 f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
                 f"as to {better['side']}"
@@ -127,7 +142,7 @@ def shown(groups: pd.DataFrame) -> list[list[str]]:
             str(row["rows"]),
             *(f"{row[name]:.3g}" for name in ("u", "v")),
             f"{row['r'] / DEGREE:.3g}",
-            "" if row["turning"] != row["turning"] else f"{100 * row['turning']:+.1f}",
+            "" if row["turning"] != row["turning"] else f"{100 * row['turning']:+.1f} +-{100 * row['error']:.1f}",
         ]
         for row in groups.to_dict("records")
     ]

@@ -87,9 +87,11 @@ REPLACED = ("mmg", "derivatives", "prime_derivatives", "abkowitz", "crossflow")
 
 @dataclass(frozen=True, eq=False)
 class Exchanged:
-    """A vessel with another hull. settings : with its coefficients free. misfit : axis -> RMS over the rows of the data of what
-    the starting values miss, over the RMS of the forces of the former hull.
-    """  # noqa: D205
+    """A vessel with another hull.
+
+    settings : with its coefficients free. misfit : axis -> RMS over the rows of the data of what the starting values
+    miss, over the RMS of the forces of the former hull.
+    """
 
     vessel: Vessel
     settings: Identify

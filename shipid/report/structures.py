@@ -159,12 +159,13 @@ def group_table(frame: pd.DataFrame, takeaway: str) -> Table | None:
             figure(row["v"], 3),
             figure(degrees(row["r"]), 3),
             figure(100 * row["turning"], 1),
+            figure(100 * row["error"], 1),
         ]
         for row in _records(frame)
     ]
-    head = ["group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]"]
+    head = ["group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]", "standard error"]
     more = " Turning: predicted change of heading over the measured one, less 1."
-    return Table("sides", "Errors by side, helm and speed", takeaway + more, head, [False, False, *[True] * 5], rows)
+    return Table("sides", "Errors by side, helm and speed", takeaway + more, head, [False, False, *[True] * 6], rows)
 
 
 def programme(content: StructuresContent) -> Table:

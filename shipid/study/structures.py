@@ -263,18 +263,15 @@ def _judged(
 
     other = exchange(vessel, name, dataset, fitted, settings)
     whole, solution = fit(fitted)
-    bare = Identify(
-        parameters=[next(iter(whole.parameters))], step=settings.step, method=settings.method, runs=settings.runs
-    )
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        found = free_runs({name: fit(rest, solution)[0]}, dataset, part, bare, ahead)
+        found = free_runs({name: fit(rest, solution)[0]}, dataset, part, settings, ahead)
         frames.append(found.errors[found.errors["run"] != ALL])
         series.append(found.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
-        test: FreeRuns = free_runs({name: whole}, dataset, tested, bare, ahead)
+        test: FreeRuns = free_runs({name: whole}, dataset, tested, settings, ahead)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
     judged = statistics(LinearFit.of(solution))
     caution = refusal(solution, judged, residual_spacing(solution))
@@ -467,13 +464,15 @@ def _programme(
         interval = settings.step
         step = interval / steps_between(ship, interval)
         logs = {name: _logs(with_gear(fits[name].vessel), choice, step, interval) for name in good}
-    except ShipidError:
+    except ShipidError:  # no shaft speed gives these speeds, or the ship has no length
         return pd.DataFrame(columns=columns)
     if not deviations:
         return pd.DataFrame(columns=columns)
     pairs = [(a, b) for i, a in enumerate(good) for b in good[i + 1 :]]
     result = []
     for number, one in enumerate(choice):
+        if not all(logs[name][number] for name in good):
+            continue
         squares = [
             np.mean([((logs[a][number][s] - logs[b][number][s]) / sd) ** 2 for s, sd in deviations.items()])
             for a, b in pairs
@@ -484,8 +483,13 @@ def _programme(
 
 
 def _logs(vessel: Vessel, choice: Sequence[Candidate], step: float, interval: float) -> list[dict[str, Array]]:
-    """Motion of each candidate: u, v, r -> (N,)."""
-    log = performed(vessel, choice, step=step, interval=interval)
+    """Motion of each candidate: u, v, r -> (N,); nothing for one that the vessel cannot perform."""
+    try:
+        log = performed(vessel, choice, step=step, interval=interval)
+    except ShipidError:
+        if len(choice) == 1:
+            return [{}]
+        return [_logs(vessel, [one], step, interval)[0] for one in choice]
     return [{name: rows[name].to_numpy() for name in "uvr"} for _, rows in log.groupby("run", sort=False)]
 
 
