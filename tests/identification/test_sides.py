@@ -29,8 +29,9 @@ def compared(port: float, starboard: float, noise: float = 0.0) -> pd.DataFrame:
         ]
     )
     helm = np.where(t < 100, 10.0, 30.0) * DEGREE * side
-    frame = pd.DataFrame({"run": "A", "t": t, "rudder.delta": helm, "propeller.n": 10.0})
-    return by_group(series, "after", SHIP, Dataset(frame, {}))
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frame = pd.DataFrame({"run": "A", "t": t, **still, "rudder.delta": helm, "propeller.n": 10.0, "flags": 0})
+    return by_group(series, "after", SHIP, Dataset(frame, {"clock": "run", "flags": []}))
 
 
 def test_the_error_of_the_turning_is_that_of_each_side() -> None:

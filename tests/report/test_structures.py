@@ -12,6 +12,9 @@ from shipid.report.structures import SECTIONS, StructuresContent, group_table, w
 ROW = {"numbers": 18, "u": 0.01, "v": 0.01, "r": 0.001, "position": 0.1, "test": float("nan"), "note": ""}
 
 
+NEXT = [{"manoeuvre": "stop", "hours": 1.0, "apart": 3.0}]
+
+
 def content() -> StructuresContent:
     table = pd.DataFrame(
         [
@@ -28,7 +31,7 @@ def content() -> StructuresContent:
     spread = pd.DataFrame([{**same, "least": 20.0, "greatest": 20.0, "spread": 0.0, "width": 2.0}])
     return StructuresContent(
         title="a ship", name="ship", sentences=["a is best"], table=table, errors=errors, manoeuvres=manoeuvres,
-        spread=spread, groups=pd.DataFrame(), programme=pd.DataFrame([{"manoeuvre": "stop", "hours": 1.0, "apart": 3.0}]),
+        spread=spread, groups=pd.DataFrame(), programme=pd.DataFrame(NEXT),
         chosen="a <b>", cautions={"b": "short horizon"}, ahead=30.0, level=0.95,
     )  # fmt: skip
 
