@@ -23,7 +23,7 @@ def simulate(
     from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope, envelope_table
     from shipid.study.plan import read_plan
-    from shipid.study.prepare import obtain, partition
+    from shipid.study.prepare import obtain, partition, runs_by_amount
 
     if out is not None and out.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
@@ -32,7 +32,8 @@ def simulate(
         raise DocumentError("has no [truth]: its runs are recorded", file=plan.file)
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    ranges = envelope_table(envelope(plan, pool, test, dataset.commands), plan.study.published)
+    rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)
+    ranges = envelope_table(rows_of_sets, plan.study.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
         [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]

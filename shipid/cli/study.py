@@ -188,10 +188,9 @@ def study_run(
     if scheduler is None:
         import_for_workers()  # before this process imports for itself
     from shipid.study.plan import read_plan
-    from shipid.study.start import default_folder
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or default_folder(plan), workers, scheduler, device)
+    _run(plan, out or plan.folder, workers, scheduler, device)
 
 
 @app.command("resume")

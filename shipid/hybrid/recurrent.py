@@ -372,7 +372,7 @@ def _train(
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, method.epochs)
     seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
-    for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is told
+    for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is reported
         order = torch.randperm(len(outputs), generator=generator)
         for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
             optimiser.zero_grad()

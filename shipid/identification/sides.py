@@ -34,7 +34,7 @@ COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning", "error")
 def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
-    u, v [m/s], r [rad/s]. turning, error : relative error of the change of heading [1], its standard error; NaN: no side.
+    u, v [m/s], r [rad/s]. turning, error : relative error of the change of heading [1], its standard error.
 
     Parameters
     ----------

@@ -209,8 +209,8 @@ def _lowest(frame: pd.DataFrame) -> str:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
     return (
-        f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}. A band that is told the kind of "
-        "manoeuvre holds its share for that kind."
+        f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}. The band for this "
+        "kind (`--kind`) holds its share."
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.hybrid.bands import Region
+from shipid.predictor import NO_BAND
 from shipid.study.prepare import kinds_of_runs
 from shipid.study.results import Results
 from shipid.study.verdict import metres
@@ -88,8 +89,8 @@ def groups_frame(results: Results) -> pd.DataFrame:
     """Coverage at the level of the study at the largest N_D, by kind of manoeuvre, time ahead and speed.
 
     Columns: model, by (`kind`, `ahead`, `speed`), group, coverage, low, high, width [m], runs (test runs in the group),
-    note (a kind that too few runs calibrated). The band of a kind is the one for all kinds: the coverage says what a
-    ship meets that is not told what manoeuvre it is in. By time ahead: share of the positions at that step alone.
+    note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
+    of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, found = results.plan.study.bands.level, results.test, []
     largest = results.cells["N_D"].max()
@@ -136,7 +137,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     mine = frame[frame["level"].eq(level)]
     if mine.empty:
         reasons = refused_frame(results)["reason"].unique()
-        return [(f"No band is promised: {reasons[0]}.", "cells")] if len(reasons) else []
+        return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
     said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "

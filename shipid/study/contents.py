@@ -109,7 +109,7 @@ def _write_parts(plan: Plan, folder: Path) -> Path:
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
         study_document=plan.text(),
-        command=parts.command_of(plan),
+        command=plan.command,
     )
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     return write_comparison(content, folder / REPORT)

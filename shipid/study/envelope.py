@@ -11,19 +11,21 @@ import pandas as pd
 from shipid.data.windows import Windows
 from shipid.hybrid.features import choose_features, feature_table
 from shipid.physics.signals import read_unit, signal_of
-from shipid.study.plan import Plan, Published, published_keys
-from shipid.study.prepare import nested
+from shipid.study.plan import Published, published_keys
 
 LIMITS = ("min", "mean", "max")
 
 
-def envelope(plan: Plan, pool: Windows, test: Windows, commands: Sequence[str]) -> list[dict[str, Any]]:
-    """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test."""
-    seed = min(plan.study.grid.seeds)
+def envelope(
+    pool: Windows, test: Windows, runs: Mapping[int, Sequence[str]], commands: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test.
+
+    runs : N_D -> the runs of the pool that train with so many, in the order of the rows.
+    """
     tables = {"test": feature_table(test.columns, commands)}
-    for batch in reversed([batch for batch in plan.batches if batch.seed == seed]):
-        part = pool.select(np.isin(pool.run, nested(plan, pool, batch)))
-        tables[f"D_{batch.N_D}"] = feature_table(part.columns, commands)
+    for N_D, names in runs.items():
+        tables[f"D_{N_D}"] = feature_table(pool.select(np.isin(pool.run, names)).columns, commands)
     whole = feature_table(pool.columns, commands)
     alike = choose_features(whole) | {name: (name,) for name, values in whole.items() if np.ptp(values) == 0}
     return [

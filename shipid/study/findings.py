@@ -21,7 +21,7 @@ from shipid.metrics import position_error
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import contrasts
 from shipid.study.findings_simulation import simulation_findings
-from shipid.study.plan import NO_MODEL, Claims, Plan
+from shipid.study.plan import NO_MODEL, Claims
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     Finding,
@@ -161,7 +161,8 @@ def by_step(path: Array, future: Array, run: NDArray[np.str_]) -> Array:
 
 def _steps(results: Results, N_D: int) -> dict[str, Array]:
     """Errors by step of every predictor at an amount of data, mean over seeds, and of physics alone."""
-    aside, test = _aside(results.plan), results.test
+    aside = {one.name for one in results.plan.foundations if one.family in results.plan.aside}
+    test = results.test
     parts: dict[str, list[Array]] = {}
     cells = judged_cells(results)
     for row in cells[cells["N_D"] == N_D].itertuples():
@@ -171,7 +172,3 @@ def _steps(results: Results, N_D: int) -> dict[str, Array]:
         if model not in (NO_MODEL, *aside) and np.isfinite(path).all():
             parts[f"{model} alone"] = [by_step(path, test.future, test.run)]
     return {name: np.mean(errors, axis=0) for name, errors in parts.items()}
-
-
-def _aside(plan: Plan) -> set[str]:
-    return {one.name for one in plan.foundations if one.family in plan.aside}

@@ -33,10 +33,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
 from shipid.study.evidence import LEVEL, Contrasts, at_least, by_chance, contrasts
-from shipid.study.plan import NO_MODEL, Plan
+from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     Finding,
@@ -389,10 +390,9 @@ RULES: Mapping[str, Callable[[Grid], Finding]] = {"S1": _S1, "S2": _S2, "S3": _S
 """The rules that judge one table."""
 
 
-def smooth_by_construction(plan: Plan) -> bool:
-    """Whether the compensation of the judged method is a polynomial of time with fewer terms than steps."""
-    way = next(way for way in plan.methods if way.name == plan.judged)
-    return getattr(way.method, "terms", plan.study.prediction.horizon) < plan.study.prediction.horizon
+def smooth_by_construction(method: Method, steps: int) -> bool:
+    """Whether the compensation of a method is a polynomial of time with fewer terms than steps."""
+    return bool(getattr(method, "terms", steps) < steps)
 
 
 def _S7(results: Results, grid: Grid) -> Finding:
@@ -400,7 +400,8 @@ def _S7(results: Results, grid: Grid) -> Finding:
         return _without("S7", "physics")
     if results.test.horizon < 3:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
-    if smooth_by_construction(results.plan):
+    judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
+    if smooth_by_construction(judged, results.plan.study.prediction.horizon):
         evidence = (
             "the compensation is a polynomial of time, which is smooth whatever it learned; `path-trained` is not"
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -14,7 +14,7 @@ from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.plan import Foundation, Plan, Way
+from shipid.study.plan import Foundation, Way
 from shipid.study.results import Results, shown_runs, with_gaps
 
 Array = np.ndarray
@@ -45,23 +45,23 @@ class Pair:
     differs: tuple[str, ...] = ()
 
 
-def pairs(plan: Plan) -> list[Pair]:
+def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
     """Every pair of a study: the same foundation with and without memory, and every observed one with its original.
 
     Methods are compared with others of their kind alone: between kinds, memory is not all that differs.
     """
     found = []
-    for one in plan.foundations:
-        found += [_memory_pair(one, one, way, rival) for way, rival in _rivals(plan, one, one)]
-    for observed, original in _observed(plan):
+    for one in foundations:
+        found += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
+    for observed, original in _observed(foundations):
         if observed.identify is None:
             label = f"observer: {ALONE}"
             found.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
-        for way in plan.methods:
+        for way in ways:
             if observed.name in way.foundations and original.name in way.foundations:
                 label = f"observer: {way.name}"
                 found.append(Pair("observer", label, (original.name, way.name), (observed.name, way.name)))
-        found += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(plan, original, observed)]
+        found += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(ways, original, observed)]
     order: dict[Added, int] = {"memory": 0, "observer": 1, "both": 2}
     return sorted(found, key=lambda pair: order[pair.added])
 
@@ -76,13 +76,13 @@ def taken(way: Way, foundation: Foundation) -> frozenset[str]:
     return frozenset(found | ({"observer"} if memory.observer and foundation.observer is not None else set()))
 
 
-def _rivals(plan: Plan, original: Foundation, observed: Foundation) -> Iterator[tuple[Way, Way]]:
+def _rivals(ways: Sequence[Way], original: Foundation, observed: Foundation) -> Iterator[tuple[Way, Way]]:
     """Each method with memory on one foundation, and the method of its kind that takes least on the other."""
-    for way in plan.methods:
+    for way in ways:
         if observed.name not in way.foundations:
             continue
         mine = taken(way, observed)
-        others = [one for one in plan.methods if one.kind == way.kind and original.name in one.foundations]
+        others = [one for one in ways if one.kind == way.kind and original.name in one.foundations]
         fewer = [one for one in others if one is not way and taken(one, original) < mine]
         if original is not observed and not mine - {"observer"}:
             continue  # the observer alone: compared with the same method
@@ -103,12 +103,12 @@ def _differing(one: Way, other: Way) -> tuple[str, ...]:
     return tuple(name for name in mine if name not in NOT_COMPARED and mine[name] != theirs.get(name))
 
 
-def _observed(plan: Plan) -> Iterator[tuple[Foundation, Foundation]]:
+def _observed(foundations: Sequence[Foundation]) -> Iterator[tuple[Foundation, Foundation]]:
     """Every foundation with an observer and the same without one, where the study has it."""
-    for one in plan.foundations:
+    for one in foundations:
         if one.observer is None or one.variant is None:
             continue
-        for other in plan.foundations:
+        for other in foundations:
             same = other.variant is not None and other.variant.name == one.variant.name
             if same and other.observer is None and other.identify == one.identify:
                 yield one, other
@@ -146,7 +146,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
         sums = np.bincount(place, after - before)
         low, high = paired_interval(sums, counts)
         rows.append(
-            _names(results.plan, pair)
+            _names(pair, results.plan.label)
             | {"N_D": N_D, "A": _accuracy(results, pair.without[0], N_D)}
             | {"H_without": before.mean(), "H_with": after.mean(), "difference": (after - before).mean()}
             | {"low": low, "high": high, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
@@ -165,7 +165,7 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
     parts, largest = [], int(results.cells["N_D"].max())
     for pair, N_D, before, after, _ in _errors(results):
         if N_D in (0, largest):
-            names = {key: value for key, value in _names(results.plan, pair).items() if key != "added"}
+            names = {key: value for key, value in _names(pair, results.plan.label).items() if key != "added"}
             columns = {"run": results.test.run[shown], "t": results.test.t[shown]}
             columns |= {"error_without": before[shown], "error_with": after[shown]}
             parts.append(pd.DataFrame({**names, "N_D": N_D, **columns}))
@@ -174,9 +174,9 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
     return with_gaps(pd.concat(parts, ignore_index=True), ["comparison", "model", "without", "with", "N_D", "run"])
 
 
-def _names(plan: Plan, pair: Pair) -> dict[str, Any]:
+def _names(pair: Pair, label: Callable[[str, str], str]) -> dict[str, Any]:
     words = [
-        f"{name}, {ALONE}" if method == ALONE else plan.label(name, method)
+        f"{name}, {ALONE}" if method == ALONE else label(name, method)
         for name, method in (pair.without, pair.remembering)
     ]
     named = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
@@ -198,7 +198,7 @@ def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array, int]]:
             known[cell] = over_time(position_error(results.paths[cell], results.test.future))
         return known[cell]
 
-    for pair in pairs(results.plan):
+    for pair in pairs(results.plan.foundations, results.plan.methods):
         if pair.without[1] == ALONE:
             alone = [results.physics.get(name) for name, _ in (pair.without, pair.remembering)]
             finite = [path for path in alone if path is not None and np.isfinite(path).all()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -345,6 +346,18 @@ class Plan:
     def digest(self) -> str:
         """Digest of the document, every vessel, the data's sources and the methods in full: what results depend on."""
         return self._digest(self.document)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of a run that was not given one: `results/<study>-<first digits of the digest>`."""
+        return Path("results") / f"{self.name}-{self.digest[:8]}"
+
+    @property
+    def command(self) -> str:
+        """The command that runs this study, with its changes: by name if bundled, else by its file."""
+        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else self.file
+        changes = (f"--set '{path}={json.dumps(value)}'" for path, value in self.changes.items())
+        return " ".join(["shipid study run", name, *changes])
 
     @property
     def digest_in_any_world(self) -> str:

@@ -212,6 +212,12 @@ def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:
     return nested_runs(pool.spans, plan.study.grid.N_D, batch.seed)[batch.N_D]
 
 
+def runs_by_amount(plan: Plan, pool: Windows) -> dict[int, tuple[str, ...]]:
+    """Return the training and validation runs of each amount of data, most first, for the first seed."""
+    seed = min(plan.study.grid.seeds)
+    return {batch.N_D: nested(plan, pool, batch) for batch in reversed(plan.batches) if batch.seed == seed}
+
+
 def _place_in_run(windows: Windows) -> Array:
     """How many windows of the same run come before each, (S,)."""
     place = np.zeros(len(windows), dtype=int)

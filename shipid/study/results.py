@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid import document as documents
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError
@@ -391,17 +389,7 @@ def naive_summary(results: Results) -> dict[str, float]:
 
 def reproducing_command(results: Results) -> str:
     """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
-    return command_of(replace(results.plan, changes=results.provenance.get("changes", {})))
-
-
-def command_of(plan: Plan) -> str:
-    """Return the command that runs a study, with its changes."""
-    file = Path(plan.file)
-    name = plan.name if documents.bundled("studies").get(plan.name) == file else str(file)
-    changes = plan.changes
-    return " ".join(
-        ["shipid study run", name, *(f"--set '{path}={json.dumps(value)}'" for path, value in changes.items())]
-    )
+    return replace(results.plan, changes=results.provenance.get("changes", {})).command
 
 
 def _source_words(source: Any) -> str:

@@ -42,6 +42,7 @@ from shipid.study.prepare import (
     obtain,
     physics_of,
     prepare,
+    runs_by_amount,
     window_memory,
 )
 from shipid.study.workers import import_for_workers, on_workers
@@ -162,7 +163,10 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     """Store what all batches share, so that a report needs nothing else."""
     fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if one.identify is None}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
-    write_json(folder / store.ENVELOPE, envelope(plan, prepared.pool, prepared.test, prepared.commands))
+    write_json(
+        folder / store.ENVELOPE,
+        envelope(prepared.pool, prepared.test, runs_by_amount(plan, prepared.pool), prepared.commands),
+    )
     write_json(
         folder / store.FOUNDATIONS, [{**describe(one), **_accuracy(one, prepared)} for one in prepared.foundations]
     )

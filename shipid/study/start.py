@@ -9,7 +9,7 @@ from typing import Any
 
 from shipid.errors import ShipidError
 from shipid.study.contents import write_pages
-from shipid.study.plan import Plan, read_plan
+from shipid.study.plan import read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
 
@@ -68,14 +68,9 @@ def events(
     last event is that folder.
     """
     plan = read_plan(study, set)
-    folder = default_folder(plan) if out is None else Path(out)
+    folder = plan.folder if out is None else Path(out)
     log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
-
-
-def default_folder(plan: Plan) -> Path:
-    """Return the folder of a run that was not given one: `results/<study>-<first digits of the digest>`."""
-    return Path("results") / f"{plan.name}-{plan.digest[:8]}"
 
 
 def event_line(event: Event) -> str:

@@ -21,7 +21,7 @@ FEWEST_MODELS = 4  # for a line of H over A
 class Estimate:
     """A number with its 95 % interval over test manoeuvres; the interval is not a number where there are too few.
 
-    limits : least and greatest value that the study can tell; a value there is a bound.
+    limits : least and greatest value that the study covers; a value there is a bound.
     """
 
     value: float
@@ -31,17 +31,17 @@ class Estimate:
 
     @property
     def below(self) -> bool:
-        """Whether the value is at most the least that can be told."""
+        """Whether the value is at most the least value that the study covers."""
         return self.value <= self.limits[0]
 
     @property
     def above(self) -> bool:
-        """Whether the value is at least the greatest that can be told."""
+        """Whether the value is at least the greatest value that the study covers."""
         return self.value >= self.limits[1]
 
     @property
     def unknown(self) -> bool:
-        """Whether the interval covers all that can be told."""
+        """Whether the interval holds every value that the study covers."""
         return self.low <= self.limits[0] and self.high >= self.limits[1]
 
 

@@ -48,7 +48,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
     found: dict[str, set[str]] = {}
-    for pair in memory.pairs(results.plan):
+    for pair in memory.pairs(results.plan.foundations, results.plan.methods):
         found.setdefault(pair.comparison, set()).add(pair.without[0])
         assert pair.differs == ()
         same = pair.without[0] == pair.remembering[0]
@@ -59,13 +59,15 @@ def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
 def test_what_differs_beside_memory_is_named(tmp_path: Path) -> None:
     uneven = [CHANGES["method"][0], {**CHANGES["method"][1], "trials": 2}]
     plan = tiny_plan(tmp_path, {**CHANGES, "method": uneven})
-    assert {pair.differs for pair in memory.pairs(plan) if pair.added != "observer"} == {("trials",)}
+    assert {pair.differs for pair in memory.pairs(plan.foundations, plan.methods) if pair.added != "observer"} == {
+        ("trials",)
+    }
 
 
 def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
     other = [{"name": "trained", "kind": "path-trained", "trials": 1}, CHANGES["method"][1]]
     plan = tiny_plan(tmp_path, {**CHANGES, "method": other})
-    assert {pair.added for pair in memory.pairs(plan)} == {"observer"}
+    assert {pair.added for pair in memory.pairs(plan.foundations, plan.methods)} == {"observer"}
 
 
 def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:

@@ -29,6 +29,7 @@ from shipid.study.prepare import (
     instants_of,
     obtain,
     prepare,
+    runs_by_amount,
     window_memory,
 )
 from shipid.study.run import run_batch
@@ -369,7 +370,8 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
     """Per D_4, D_6 and test, from the windows that each sees."""
     plan, _, prepared = tiny
     rows = {
-        (row["set"], row["quantity"]): row for row in envelope(plan, prepared.pool, prepared.test, prepared.commands)
+        (row["set"], row["quantity"]): row
+        for row in envelope(prepared.pool, prepared.test, runs_by_amount(plan, prepared.pool), prepared.commands)
     }
     batches = {f"D_{batch.N_D}": batch for batch in plan.batches if batch.seed == min(plan.study.grid.seeds)}
     assert {name for name, _ in rows} == {*batches, "test"}

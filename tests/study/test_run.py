@@ -306,3 +306,19 @@ def test_the_plan_of_a_bundled_study_survives_the_folder(tmp_path: Path) -> None
     plan = read_plan("full-scale")
     store.open_folder(tmp_path / "run", plan)
     assert store.stored_plan(tmp_path / "run") == plan
+
+
+def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Weights are drawn anew for each seed of the grid, not the order of the runs alone."""
+    plan, seen = tiny_plan(tmp_path, {"grid.seeds": [3, 8], "grid.N_D": [4]}), []
+
+    def fit(_: PathDrawn, task: Task) -> dict[str, Fitted]:
+        seen.append(task.seed)
+        return {name: Fitted(None, [], 0.0) for name in task.cases}
+
+    monkeypatch.setattr(PathDrawn, "fit", fit)
+    prepared = prepare(plan, obtain(plan))
+    for batch in plan.batches:
+        run_batch(plan, prepared, batch, "cpu")
+    assert seen == [batch.seed for batch in plan.batches]
+    assert sorted(seen) == [3, 8]

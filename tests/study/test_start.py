@@ -10,7 +10,7 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.study.plan import read_plan
-from shipid.study.start import default_folder, events, run
+from shipid.study.start import events, run
 from tests.study.tiny import TINY
 
 
@@ -37,7 +37,7 @@ def test_run_logs_its_progress_and_returns_results(
 
 def test_the_folder_is_named_after_the_study() -> None:
     plan = read_plan(TINY)
-    assert default_folder(plan) == Path("results") / f"plain-{plan.digest[:8]}"
+    assert plan.folder == Path("results") / f"plain-{plan.digest[:8]}"
 
 
 def test_a_mistake_is_an_error_of_shipid() -> None:

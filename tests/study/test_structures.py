@@ -59,9 +59,9 @@ def data_of(structure: str) -> Dataset:
 def found() -> Compared:
     return compare_structures(
         SHIP,
-        data_of("modulus"),
+        data_of("abkowitz"),
         SETTINGS,
-        ["cubic", "modulus"],
+        ["modulus", "abkowitz"],
         held_out=["35_15_627"],
         ahead=20.0,
         folds=2,
