@@ -69,6 +69,7 @@ def found() -> Compared:
     )
 
 
+@pytest.mark.slow
 def test_the_structure_that_made_the_data_is_chosen(found: Compared) -> None:
     assert found.chosen == "abkowitz"
     assert list(found.table["structure"]) == ["abkowitz", "modulus"]
@@ -82,6 +83,7 @@ def test_the_structure_that_made_the_data_is_chosen(found: Compared) -> None:
     assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in found.beyond)
 
 
+@pytest.mark.slow
 def test_the_vessel_chosen_and_the_page_are_written(found: Compared, tmp_path: Path) -> None:
     again = load_vessel(str(write_chosen(found, tmp_path / "chosen.toml")))
     assert again.parameters == pytest.approx(found.fits[found.chosen].vessel.parameters)
