@@ -76,6 +76,13 @@ def manoeuvre(
     side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
     step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    approach: Annotated[
+        str | None,
+        typer.Option(
+            help="steady (helm amidships), helmsman (holds the course) or rest; default: steady, and the helmsman for "
+            "a ship that does not go straight"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
     log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
@@ -85,17 +92,18 @@ def manoeuvre(
     from shipid.data.dataset import Dataset, write_dataset
     from shipid.files import write_table
     from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import manoeuvre_content, measure_standard
+    from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
     if log is not None and log.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
     ship = load_vessel(vessel)
-    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
-    title, rpm = done.standard.title, done.standard.manoeuvre.n_rpm
+    done = measure_standard(
+        ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
+    )
+    title = done.standard.title
     with answering(as_json) as answer:
-        speed = done.standard.speed
-        answer.say(f"{ship.name}: {title}, approach at {speed:.3g} m/s ({rpm:.4g} rpm)", title=title, speed=speed)
+        answer.say(f"{ship.name}: {title}, {approached(done.standard)}", title=title, speed=done.standard.speed)
         answer.rows("measures", done.measures, measure_table(done.measures, []))
         answer.rows("criteria", done.criteria, criterion_table(done.criteria, []) if done.criteria else None)
         if csv is not None:

@@ -171,6 +171,19 @@ def iterations() -> Iterator[Any]:
 
 
 @contextmanager
+def steps() -> Iterator[Callable[[str], object] | None]:
+    """Give a function that shows the step of a long calculation, in one line; None if not on a terminal."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status("") as status:
+        yield lambda step: status.update(visible(step))
+
+
+@contextmanager
 def looking(look: Callable[[], None], every: float) -> Iterator[None]:
     """Call a function every so many seconds, in a thread beside the block."""
     from threading import Event, Thread
