@@ -57,7 +57,7 @@ def identify(
     """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
-    from shipid.identification.outcome import read_settings, run_identification, write_patch
+    from shipid.identification.outcome import check, read_settings, run_identification, write_patch
     from shipid.vessel.load import load_vessel
 
     file = out or Path(f"{stem(vessel)}-identified.toml")
@@ -76,6 +76,7 @@ def identify(
     options = {key: value for key, value in given.items() if value is not None}
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    check(ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or ())
     _look(ship, log, runs or (), test or ())
     try:
         with iterations() as progress:

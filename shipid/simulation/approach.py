@@ -6,8 +6,8 @@ All results come from numerical evaluation of the vessel's equations, so they ho
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit
 from shipid.physics.signals import is_shaft, neutral, steers
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -129,7 +129,26 @@ def steady(
     ------
     ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships.
     """
-    vessel, model = controls.vessel, dynamics(controls.vessel)
+    asked = _Approach(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), controls)
+    state, memory = _steady(asked, tuple(map(float, n)), step, method, engine)
+    return {name: values.copy() for name, values in state.items()}, {name: values.copy() for name, values in memory.items()}
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """Controls that are equal where the equations and their numbers are."""
+
+    model: Dynamics
+    values: tuple[float, ...]
+    controls: Controls = field(compare=False)
+
+
+@lru_cache(maxsize=64)  # manoeuvres of one vessel have one approach
+def _steady(
+    asked: _Approach, speeds: tuple[float, ...], step: float, method: Method, engine: str
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    controls, model, n = asked.controls, asked.model, np.array(speeds)
+    vessel = controls.vessel
     names, count = (*model.state, *model.hidden), len(n)
     state = {name: np.zeros(count) for name in names}
     orders = controls.orders(n, np.zeros(count))
