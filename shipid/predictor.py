@@ -140,7 +140,7 @@ class Predictor:
         """Return the bands; DataError, one sentence, where there are none of this level."""
         if self.bands is None:
             reason = self.provenance.get("no_band", "it was made without")
-            raise DataError(f"this predictor has no band: {reason}")
+            raise DataError(f"{NO_BAND}{reason}")
         self.bands.check(level, kind)
         return self.bands
 
@@ -342,7 +342,8 @@ def fit(
     return Predictor(physics, kind_of(method), corrector, limits, provenance, commands, bands=bands)
 
 
-NO_REFITS = "its errors on runs left out need further fits: set `refits`, such as 5"
+NO_BAND = "this predictor has no band: "
+NO_REFITS = "its errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
 
 
 def bands_of(

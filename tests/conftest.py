@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -118,3 +119,9 @@ def tiny_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tiny")
     run_here(tiny_plan(folder), folder / "run")
     return folder / "run"
+
+
+def pytest_configure() -> None:
+    """A job in the background of a shell ignores Ctrl-C; tests that raise it need the handler of Python."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

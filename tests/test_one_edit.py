@@ -31,6 +31,8 @@ from shipid.vessel import perturb, schema
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
+from tests import test_laws
+from tests.documented import code, module
 from tests.logs.conftest import PLAIN, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
 
@@ -90,7 +92,7 @@ def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
 
 
 def test_without_the_row_nobody_knows_the_signal(tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match=r"signal of n, alpha, delta, pitch"):
+    with pytest.raises(DocumentError, match=r"with a signal of n, alpha, delta, (?!.*flap)"):
         flap_log(tmp_path)
     with pytest.raises(DocumentError, match="flap"):
         with_flap()
@@ -152,6 +154,40 @@ def test_a_correction_mirrors_it() -> None:
     reflection = _reflection(table, choose_features(table))
     assert reflection is not None
     np.testing.assert_array_equal(reflection, np.diag([1, -1, -1, 1, -1]))
+
+
+@pytest.fixture
+def jet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The water jet of docs/extending.md: a signal and its term."""
+    row = eval("{" + code("A signal")[0] + "}", {"Signal": Signal})
+    monkeypatch.setitem(signals.SIGNALS, "throttle", row["throttle"])
+    monkeypatch.setitem(TERMS, "thruster.jet", Term(module("A term", "jet_of_the_page", monkeypatch).jet))
+    monkeypatch.setitem(test_laws.RANGES, "throttle", row["throttle"].reach)
+    monkeypatch.setitem(test_laws.MIRROR, "throttle", row["throttle"].mirror)
+    for cached in CACHES:
+        cached.cache_clear()
+    yield
+    for cached in CACHES:
+        cached.cache_clear()
+
+
+@pytest.mark.usefixtures("jet")
+def test_the_jet_of_the_page_obeys_the_laws() -> None:
+    test_laws.test_mirror_port_starboard("thruster.jet", 0)
+    test_laws.test_zero_at_rest("thruster.jet")
+    test_laws.test_finite_at_rest("thruster.jet")
+    test_laws.test_derivative_is_finite_difference("thruster.jet", 0)
+    test_laws.test_froude_scaling("thruster.jet", 0)
+
+
+@pytest.mark.usefixtures("jet")
+def test_a_guess_proposes_the_component_of_the_row_beside_azimuth_units(tmp_path: Path) -> None:
+    log = as_bridge(si_log()).rename(columns={"rudder": "azimuth", "rpm": "shaft rpm"})
+    log.assign(throttle=0.5 + 0.1 * np.sin(log["time"])).to_csv(tmp_path / "log.csv", index=False)
+    names = {column.source: column.name for column in guess(tmp_path / "log.csv").columns}
+    assert names["throttle"] == "jet.throttle"
+    assert names["azimuth"] == "thruster.alpha"
+    assert names["shaft rpm"] == "thruster.n"
 
 
 def read_toy(file: Path, _: readers.Format, __: str) -> pd.DataFrame:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from shipid.errors import ShipidError, choices
+from shipid.errors import ShipidError
 from shipid.export.blocks import Block, Dense, Forest, Formula, Graph, Mirrored, Nearest, Value, formula
 from shipid.export.equations import Equations
 from shipid.export.known import Known, feature_table, past_records
@@ -21,6 +21,7 @@ from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.forest import ForestCorrector
 from shipid.hybrid.hankel_dmd import MISSED, HankelCorrector
 from shipid.hybrid.learned_force import ForceCorrector
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.modules import ModulesCorrector, without
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
@@ -515,37 +516,49 @@ def _missed_before(known: Known, first: int, delays: int) -> Value:
     return graph.map(body, each, [known.of("past", weather, first), known.values["parameters"]], delays)
 
 
-CORRECTORS: dict[type[Any], Callable[[Known, Any], Value]] = {
-    Unchanged: alone,
-    ForceCorrector: alone,
-    Compensator: compensated,
-    Calibrated: compensated,
-    ForestCorrector: forest,
-    RecurrentCorrector: recurrent,
-    OneStepCorrector: one_step,
-    ModulesCorrector: modules,
-    HankelCorrector: hankel,
+def _nothing(_: Any) -> Taken:
+    return Taken((), ())
+
+
+def _recurrent_taken(corrector: RecurrentCorrector) -> Taken:
+    readers = [network.reader for network in corrector.networks]
+    names = [name for reader in readers for name in (*reader.past.names, *reader.now.names)]
+    return Taken(corrector.inputs.commands, tuple(names))
+
+
+def _compensated_taken(corrector: Compensator) -> Taken:
+    return Taken(corrector.inputs.commands, tuple(_names_of(corrector)))
+
+
+def _one_step_taken(corrector: OneStepCorrector) -> Taken:
+    return Taken(corrector.commands, tuple(n for head in corrector.heads for n in head.units.normaliser.names))
+
+
+class Counterpart(NamedTuple):
+    """A corrector as blocks: its path (T, 2), row by row, as a value of the graph, and what it takes."""
+
+    path: Callable[[Known, Any], Value]
+    takes: Callable[[Any], Taken]
+
+
+CORRECTORS: dict[type[Any], Counterpart] = {
+    Unchanged: Counterpart(alone, _nothing),
+    ForceCorrector: Counterpart(alone, _nothing),
+    Compensator: Counterpart(compensated, _compensated_taken),
+    Calibrated: Counterpart(compensated, _compensated_taken),
+    ForestCorrector: Counterpart(forest, lambda one: Taken(one.inputs.commands, one.names)),
+    RecurrentCorrector: Counterpart(recurrent, _recurrent_taken),
+    OneStepCorrector: Counterpart(one_step, _one_step_taken),
+    ModulesCorrector: Counterpart(modules, lambda one: Taken(one.commands, one.units.normaliser.names)),
+    HankelCorrector: Counterpart(hankel, lambda one: Taken(one.law.commands, one.law.normaliser.names)),
 }
-"""Class of a corrector -> path (T, 2), row by row, as a value of the graph."""
+"""Class of a corrector -> its counterpart."""
 
 
 def taken(corrector: Any) -> Taken:
     """What a corrector takes; ShipidError for one that has no counterpart here."""
-    if isinstance(corrector, Unchanged | ForceCorrector):
-        return Taken((), ())
-    if isinstance(corrector, Compensator):
-        return Taken(corrector.inputs.commands, tuple(_names_of(corrector)))
-    if isinstance(corrector, ForestCorrector):
-        return Taken(corrector.inputs.commands, corrector.names)
-    if isinstance(corrector, RecurrentCorrector):
-        readers = [network.reader for network in corrector.networks]
-        names = [name for reader in readers for name in (*reader.past.names, *reader.now.names)]
-        return Taken(corrector.inputs.commands, tuple(names))
-    if isinstance(corrector, OneStepCorrector):
-        return Taken(corrector.commands, tuple(n for head in corrector.heads for n in head.units.normaliser.names))
-    if isinstance(corrector, ModulesCorrector):
-        return Taken(corrector.commands, corrector.units.normaliser.names)
-    if isinstance(corrector, HankelCorrector):
-        return Taken(corrector.law.commands, corrector.law.normaliser.names)
-    kinds = [kind.__name__ for kind in CORRECTORS]
-    raise ShipidError(f"a method of this kind cannot be exported: {choices(type(corrector).__name__, kinds)}")
+    if type(corrector) not in CORRECTORS:
+        kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
+        named = next((kind for kind, method in METHODS.items() if method.corrector is type(corrector)), "of this kind")
+        raise ShipidError(f"a predictor by the method {named} cannot be exported; these can: {', '.join(kinds)}")
+    return CORRECTORS[type(corrector)].takes(corrector)

@@ -72,7 +72,7 @@ class Model:
     def graph(self) -> Graph:
         """(now, reached, past, planned, estimates, parameters) -> path (T, 2), row by row."""
         known = Known(self.physics, self.layout)
-        path = CORRECTORS[type(self.predictor.corrector)](known, self.predictor.corrector)
+        path = CORRECTORS[type(self.predictor.corrector)].path(known, self.predictor.corrector)
         graph = known.graph.finish(path)
         count = num_numbers(graph) + (0 if self.band is None else num_numbers(self.band))
         if count > MOST_NUMBERS:

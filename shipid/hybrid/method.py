@@ -139,7 +139,7 @@ class Fitted:
     seconds : time spent on this foundation, its share of what is done for several at once.
     left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
         window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where
-        the method has them only from further fits: `shipid.hybrid.refits`.
+        the method has them only from further fits: `refits` of `shipid.predictor.fit`.
     """
 
     corrector: Corrector | None

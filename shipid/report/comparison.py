@@ -10,4 +10,4 @@ from shipid.report.page import page, write
 
 def write_comparison(content: MethodsContent, file: Path) -> Path:
     """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(page(content, {"methods": SECTION}, "methods"), file)
+    return write(page(content, {"the-methods": SECTION}, "methods"), file)

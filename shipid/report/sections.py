@@ -9,7 +9,7 @@ SECTIONS: dict[str, Section] = {
     "results": error_map.SECTION,
     "errors": errors_over.SECTION,
     "how-far-off": bands.SECTION,
-    "methods": methods.SECTION,
+    "the-methods": methods.SECTION,
     "the-past": memory.SECTION,
     "predictions": paths.SECTION,
     "the-models": factors.SECTION,

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.hybrid.bands import Region
+from shipid.predictor import NO_BAND
 from shipid.study.prepare import kinds_of_runs
 from shipid.study.results import Results
 from shipid.study.verdict import metres
@@ -136,7 +137,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     mine = frame[frame["level"].eq(level)]
     if mine.empty:
         reasons = refused_frame(results)["reason"].unique()
-        return [(f"No band is promised: {reasons[0]}.", "cells")] if len(reasons) else []
+        return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
     said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -380,7 +380,10 @@ def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array,
 
 def machine() -> dict[str, Any]:
     """What the results were computed with: interpreter, packages, machine."""
-    packages = {name: version(name) for name in PACKAGES}
+    packages = {}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):  # an extra that is not installed
+            packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
     return {**system, "cores": os.cpu_count(), "packages": packages}
 
@@ -442,8 +445,12 @@ def _on_dask(
     plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler: str, device: str, trials: Path
 ) -> Computed:
     """The same on the cluster of an existing scheduler; ShipidError where it, or a worker, dies."""
-    import dask
-    from dask.distributed import CancelledError, Client, KilledWorker, as_completed
+    try:
+        import dask
+        from dask.distributed import CancelledError, Client, KilledWorker, as_completed
+    except ImportError:
+        message = "a Dask scheduler needs the package dask: pip install 'shipid[dask]'"
+        raise ShipidError(message, path=f"--scheduler {scheduler}") from None
 
     with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
         warnings.simplefilter("ignore")

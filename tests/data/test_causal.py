@@ -40,6 +40,21 @@ def test_a_later_fix_changes_no_earlier_row(seed: int) -> None:
     assert not np.array_equal(one, other)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_fixes_between_rows_reach_no_row_before_them(seed: int) -> None:
+    """Fixes on a clock of their own: whatever comes at a fix and later, rows before it hold what they held."""
+    rng = np.random.default_rng(seed)
+    rows = np.arange(80.0)
+    fixes = np.cumsum(rng.uniform(2.0, 6.0, 60)) - 3.0
+    heights = rng.normal(size=len(fixes))
+    one = causal_columns(as_dataset(turning(rows).assign(u=np.interp(rows, fixes, heights))), ["u"]).frame["u"]
+    for first in np.flatnonzero((fixes > 10.0) & (fixes < 70.0)):
+        changed = np.where(np.arange(len(fixes)) < first, heights, heights + rng.normal(size=len(fixes)))
+        data = as_dataset(turning(rows).assign(u=np.interp(rows, fixes, changed)))
+        before = rows < fixes[first]
+        np.testing.assert_array_equal(causal_columns(data, ["u"]).frame["u"][before], one[before])
+
+
 def test_what_holds_still_is_known_and_other_columns_stay() -> None:
     data = as_dataset(turning(np.arange(30.0)).assign(u=4.0))
     held = causal_columns(data, ["u"])

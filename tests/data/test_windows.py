@@ -18,12 +18,12 @@ from shipid.data.windows import (
     from_frame,
     nested_runs,
     part_folds,
+    run_folds,
     split_folds,
     split_runs,
     to_frame,
 )
 from shipid.errors import DataError
-from shipid.hybrid.features import planned_means
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 60.5, 0.5)
@@ -259,6 +259,24 @@ def test_held_out_share(share: float, seed: int) -> None:
     assert held
 
 
+@pytest.mark.parametrize(
+    ("validation", "num_folds", "expected"),
+    [("runs", 1, [1] * 10), ("share", 1, [2]), ("runs", 3, [3, 3, 4]), ("share", 4, [2, 2, 3, 3])],
+)
+def test_few_runs_validate_and_all_others_train(validation: str, num_folds: int, expected: list[int]) -> None:
+    """Every run in turn; a fifth of them; or dealt into folds: the second indices are those that judge."""
+    windows = runs_at(*((100.0 * k, 100.0 * k + 30.0) for k in range(10)), clock="run")
+    judges = []
+    for training, judged in run_folds(windows, validation, 3, num_folds):
+        names = set(windows.run[judged])
+        judges.append(sorted(names))
+        assert names.isdisjoint(windows.run[training])
+        np.testing.assert_array_equal(np.sort(np.concatenate([training, judged])), np.arange(len(windows)))
+    assert sorted(map(len, judges)) == expected
+    if len(judges) > 1:
+        assert sorted(name for names in judges for name in names) == sorted(windows.spans)
+
+
 def test_splits_depend_on_the_seed() -> None:
     assert len({nested_runs(NAMES, [5], seed)[5] for seed in range(20)}) == 20
 
@@ -285,17 +303,6 @@ def test_impossible_splits() -> None:
         nested_runs(NAMES, [3, 18], 0)
     with pytest.raises(DataError, match="two runs"):
         split_runs(["a"], 0.2, 0)
-
-
-def test_planned_means_by_hand() -> None:
-    """Seven steps in three parts of 3, 2 and 2; what is planned to stay adds nothing."""
-    planned = {"port.n": np.array([2.0, 2, 2, 5, 6, 8, 9])[:, None], "port.alpha": np.full((7, 1), 0.3)}
-    means = planned_means({"port.n": np.array([2.0]), "port.alpha": np.array([0.3])}, planned)
-    assert {name: float(value[0]) for name, value in means.items()} == pytest.approx(
-        {"port.planned-1.n": 0.0, "port.planned-2.n": 3.5, "port.planned-3.n": 6.5}
-        | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
-    )
-    assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]
 
 
 @given(st.integers(10, 60), st.integers(1, 12))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
 from shipid.export.write import TARGETS, export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.compensator import Normaliser
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
+from tests.documented import module
 from tests.export.strange import drawn
 
 
@@ -51,3 +55,16 @@ def test_a_forest_beyond_the_size_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr("shipid.export.model.MOST_NUMBERS", 10)
     with pytest.raises(ShipidError, match=r"hold .* numbers, an export at most 10: use fewer trees"):
         export_predictor(drawn("forest", 5, vessel="mariner").predictor, "c", tmp_path / "f")
+
+
+def test_a_method_without_a_counterpart_is_named_with_those_that_have_one(simple, monkeypatch, tmp_path):
+    linear = module("A method", "linear_of_the_page", monkeypatch)
+    monkeypatch.setitem(METHODS, "linear", linear.Linear)
+    normaliser = Normaliser(("u",), np.zeros(1), np.ones(1))
+    corrector = linear.LinearCorrector((), normaliser, np.zeros((3, 2, 2)), {})
+    predictor = Predictor(simple.physics, "linear", corrector, {})
+    with pytest.raises(
+        ShipidError, match=r"the method linear cannot be exported; these can: alone, .*path-drawn"
+    ) as one:
+        predictor.export("c", tmp_path / "out")
+    assert "linear," not in str(one.value)

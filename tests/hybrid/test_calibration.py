@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.hybrid.calibration import calibrated, radii
+from shipid.hybrid.calibration import _fitted, _runs, calibrated, radii
 from tests.hybrid.runs import NAMES, made, runs
 
 AT = [49, 79, 89]  # 50, 80, 90 %
@@ -104,3 +104,16 @@ def test_strange_errors_give_finite_bands(error: float) -> None:
     assert bands is not None
     region = bands.region(np.zeros_like(errors), still, 1.0, 0.7)
     assert np.isfinite(region.radius).all()
+
+
+@pytest.mark.parametrize("circle", [True, False])
+def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> None:
+    """Errors of one run three times as large: its scores are three times as large, those of the others smaller."""
+    rng = np.random.default_rng(4)
+    of = _runs(np.repeat(np.arange(6), 8))
+    apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
+    larger = np.where(mine[:, None], 3.0, 1.0) * apart
+    still = np.zeros((48, 5))  # no traits: no growth
+    one, other = (_fitted(of, errors, still, circle).scores for errors in (apart, larger))
+    np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
+    assert (other[:, ~mine] < one[:, ~mine]).all()

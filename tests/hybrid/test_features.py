@@ -7,7 +7,16 @@ import pytest
 
 from shipid.data.windows import Instants, cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.features import Inputs, Memory, choose_features, estimates, feature_table, group_of, past_error
+from shipid.hybrid.features import (
+    Inputs,
+    Memory,
+    choose_features,
+    estimates,
+    feature_table,
+    group_of,
+    past_error,
+    planned_means,
+)
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import mirror_sign
 from shipid.vessel.load import load_vessel
@@ -157,3 +166,14 @@ def test_groups_follow_from_names():
 def test_inputs_survive_their_header():
     inputs = Inputs(COMMANDS, Memory(history=(2.0, 4.0), error=8.0))
     assert Inputs.from_header(inputs.header()) == inputs
+
+
+def test_planned_means_by_hand() -> None:
+    """Seven steps in three parts of 3, 2 and 2; what is planned to stay adds nothing."""
+    planned = {"port.n": np.array([2.0, 2, 2, 5, 6, 8, 9])[:, None], "port.alpha": np.full((7, 1), 0.3)}
+    means = planned_means({"port.n": np.array([2.0]), "port.alpha": np.array([0.3])}, planned)
+    assert {name: float(value[0]) for name, value in means.items()} == pytest.approx(
+        {"port.planned-1.n": 0.0, "port.planned-2.n": 3.5, "port.planned-3.n": 6.5}
+        | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
+    )
+    assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]

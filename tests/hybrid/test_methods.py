@@ -1,4 +1,4 @@
-"""Laws that every method obeys, on one small world; a method is added to METHODS and is tested here."""
+"""Laws that every method obeys, on one small world; a method is added to METHODS and is tested here unasked."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from shipid.errors import DataError, DocumentError, ResultError
 from shipid.hybrid.method import Case
 from shipid.hybrid.methods import METHODS, kind_of, method_of
 from shipid.hybrid.physics import Physics
+from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, case_of, ship, world
 
-#: settings that make each method quick; the laws hold for any
+#: settings that make slow methods quick; the laws hold for any
 QUICK = {
-    "alone": {},
     "calibrator": {"trials": 3, "units": 24, "averaged": 2},
     "forest": {"trials": 2, "trees": 6},
     "hankel-dmd": {"delays": (2.0, 4.0)},
@@ -27,17 +27,24 @@ QUICK = {
     "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
     "recurrent": {"trials": 2, "epochs": 3, "units": 6, "seconds": 4.0},
 }
-EVERY = pytest.mark.parametrize("kind", METHODS)
-COMPENSATING = pytest.mark.parametrize("kind", [kind for kind, method in METHODS.items() if method.compensates])
+DOCUMENTED = "linear"  # the method of docs/extending.md
+EVERY = pytest.mark.parametrize("kind", [*METHODS, DOCUMENTED])
+LEARNING = [kind for kind, method in METHODS.items() if method.compensates] + [DOCUMENTED]
+COMPENSATING = pytest.mark.parametrize("kind", LEARNING)
 CLOSE = 1e-9  # m
 #: methods that train several foundations as one batch, whose rounding then grows over the epochs
 IN_STACKS = {"path-trained": 0.05}
 
 
+@pytest.fixture(autouse=True)
+def documented(monkeypatch):
+    monkeypatch.setitem(METHODS, DOCUMENTED, module("A method", "linear_of_the_page", monkeypatch).Linear)
+
+
 def quick(kind):
     if kind == "forest":
         pytest.importorskip("sklearn")
-    return method_of(kind, QUICK[kind])
+    return method_of(kind, QUICK.get(kind, {}))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +71,7 @@ def test_a_method_is_named_and_its_settings_are_checked(kind):
     with pytest.raises(DocumentError, match="unknown key"):
         method_of(kind, {"nonsense": 1})
     assert method.past <= 10.0
-    assert set(QUICK) == set(METHODS)
+    assert set(QUICK) <= set(METHODS)
 
 
 @EVERY
@@ -171,7 +178,7 @@ def test_windows_that_are_in_no_fold_are_not_seen(kind, here):
     np.testing.assert_allclose(paths, first, rtol=0, atol=CLOSE)
 
 
-@pytest.mark.parametrize("kind", [kind for kind, method in METHODS.items() if method.meets_none])
+@pytest.mark.parametrize("kind", [kind for kind, method in METHODS.items() if method.meets_none] + [DOCUMENTED])
 def test_without_physics_a_method_learns_the_path(kind, here):
     physics = Physics(None, HORIZON, 1.0)
     longer = {"path-trained": {"epochs": 400, "learning_rate": 0.01}, "recurrent": {"epochs": 60, "batch": 16}}

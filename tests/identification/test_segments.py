@@ -25,6 +25,15 @@ def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one() -> Non
         assert all(np.allclose(np.diff(one.t), 1.0) for one in segments)
 
 
+def test_earlier_orders_are_those_before_the_segment_the_latest_first() -> None:
+    frame = DATA.frame.assign(**{"port.n": 1.0 + 0.01 * DATA.frame["t"]})
+    segments = cut_segments(SHIP, Dataset(frame, DATA.metadata), DATA.runs, 1.0, 20.0, lags=3)
+    for one in segments:
+        steps = np.maximum(one.t[0] - [1.0, 2.0, 3.0], 0.0)  # before the first row its order holds
+        np.testing.assert_allclose(one.earlier["port.n"], 1.0 + 0.01 * steps, atol=1e-12)
+    assert {one.t[0] for one in segments} == {0.0, 20.0, 40.0}
+
+
 def test_a_break_parts_a_run() -> None:
     frame = DATA.frame.copy()
     frame.loc[(frame["run"] == "M01") & (frame["t"] == 20), "flags"] = 1

@@ -251,3 +251,24 @@ def test_mapping_is_frozen_and_digested(plain_mapping: Write) -> None:
     assert first.digest != second.digest
     with pytest.raises(ValueError, match="frozen"):
         first.name = "other"
+
+
+@pytest.mark.parametrize("direction", ["from", "towards"])
+@pytest.mark.parametrize("seed", range(3))
+def test_wind_felt_on_board_becomes_the_wind_over_ground(
+    seed: int, direction: str, plain_mapping: Write, tmp_path: Path
+) -> None:
+    """A ship that turns and drifts in one wind feels the wind less her own velocity, from another side each second."""
+    rng = np.random.default_rng(seed)
+    motion = turning(T, u=rng.uniform(2, 6), v=rng.uniform(-2, 2), psi0=rng.uniform(0, 6))
+    speed, towards = rng.uniform(1, 12), rng.uniform(0, 2 * np.pi)
+    felt = speed * np.exp(1j * (towards - motion["psi"])) - (motion["u"] + 1j * motion["v"])
+    came = -felt if direction == "from" else felt
+    log = as_log(motion, tmp_path / "log.csv")
+    table = pd.read_csv(log).assign(speed=np.abs(felt), angle=np.degrees(np.angle(came)) % 360)
+    table.to_csv(log, index=False)
+    columns = '[columns.V_w]\nfrom = "speed"\nunit = "m/s"\n[columns.beta_w]\nfrom = "angle"\nunit = "deg"\n'
+    columns += f'direction = "{direction}"\nrelative = true\nwrap = true\n'
+    frame = import_log(read_mapping(plain_mapping(columns)), log).frame
+    np.testing.assert_allclose(frame["V_w"], speed, atol=1e-6)
+    np.testing.assert_allclose(np.exp(1j * frame["beta_w"]), np.exp(1j * towards), atol=1e-6)

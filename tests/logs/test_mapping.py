@@ -23,6 +23,22 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
     assert len(mapping.digest) >= 16
 
 
+DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
+    "s": {"s": 1, "ms": 1 / 1000, "min": 60, "h": 60 * 60, "date": 1},
+    "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
+    "m/s": {"m/s": 1, "kn": 1852 / 3600, "km/h": 1000 / 3600},
+    "rad": {"rad": 1, "deg": 2 * math.pi / 360},
+    "rad/s": {"rad/s": 1, "deg/s": 2 * math.pi / 360, "deg/min": 2 * math.pi / 360 / 60},
+    "rev/s": {"rev/s": 1, "rpm": 1 / 60, "rad/s": 1 / (2 * math.pi)},
+    "-": {"-": 1, "%": 1 / 100},
+}
+
+
+@pytest.mark.parametrize("si", UNITS)
+def test_every_unit_is_as_it_is_defined(si: str) -> None:
+    assert UNITS[si] == pytest.approx(DEFINED[si], rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("unit", "name", "factor"),
     [

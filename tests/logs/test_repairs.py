@@ -16,11 +16,13 @@ T = np.arange(0.0, 240.0, 0.5)
 MOTION = turning(T)
 
 
-def lever(frame: pd.DataFrame, x: float) -> pd.DataFrame:
-    """What a sensor at x forward of the origin measures on a rigid body."""
+def lever(frame: pd.DataFrame, x: float, y: float) -> pd.DataFrame:
+    """What a sensor x forward and y to starboard of the origin measures on a rigid body."""
+    c, s = np.cos(frame["psi"]), np.sin(frame["psi"])
     return frame.assign(
-        north=frame["north"] + x * np.cos(frame["psi"]),
-        east=frame["east"] + x * np.sin(frame["psi"]),
+        north=frame["north"] + x * c - y * s,
+        east=frame["east"] + x * s + y * c,
+        u=frame["u"] - y * frame["r"],
         v=frame["v"] + x * frame["r"],
     )
 
@@ -45,7 +47,7 @@ CASES = {
         1e-9,
     ),
     "heading_offset": ('offset = 2.3\nunit = "deg"', lambda f: low_heading(f, np.radians(2.3)), 480, 1e-9),
-    "lever_arm": ("x = 2.1", lambda f: lever(f, 2.1), 480, 1e-9),
+    "lever_arm": ("x = 2.1\ny = -1.4", lambda f: lever(f, 2.1, -1.4), 480, 1e-9),
     "despike": ('columns = ["north"]\nwindow = 6\nthreshold = 10\nunit = "m"', spiked, 3, 0.15),
 }
 

@@ -32,6 +32,14 @@ def test_horizon_draws_the_rows_of_its_size(simulation, statistic, column, index
         assert np.abs(whole - rows[column]).max() <= np.ptp(rows[column]) / 400  # less than a pixel
 
 
+@pytest.mark.parametrize("draw", [horizon, over_time])
+def test_the_page_opens_at_the_largest_amount_of_data(simulation, draw):
+    """As the takeaway beside it speaks of that."""
+    control = draw(simulation).controls[-1]
+    assert control.options[control.start] == str(simulation.cells.N_D.max())
+    assert len(control.options) > 1
+
+
 def test_seeds_become_their_mean(full_scale):
     one = full_scale.horizon
     both = pd.concat([one, one.assign(seed=1, mean=3 * one["mean"])])

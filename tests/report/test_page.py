@@ -145,7 +145,7 @@ def test_sentences_link_to_what_is_there(page):
     answers = [text for _, text in parsed.all("li") if "Figure" in text and "With 30" in text]
     assert len(answers) == 1
     # A map needs several N_D; these sections need frames that neither study has.
-    lacking = {anchor for name in ("the-past", "how-far-off", "methods") for anchor in SECTIONS[name].anchors}
+    lacking = {anchor for name in ("the-past", "how-far-off", "the-methods") for anchor in SECTIONS[name].anchors}
     assert declared(SECTIONS) - set(ids) - lacking == (set() if content.cells.N_D.nunique() > 1 else {"map"})
 
 

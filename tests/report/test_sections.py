@@ -1,11 +1,14 @@
 from dataclasses import fields
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from shipid.report import ReportContent, checks, identification, manoeuvre
-from shipid.report.section import drawn
+from shipid.report.section import OF_EVERY_PAGE, drawn
 from shipid.report.sections import SECTIONS
 from shipid.study.contents import FRAMES
+from tests.documented import module
 from tests.report import test_checks, test_identification, test_manoeuvre
 
 PAGES = {
@@ -27,6 +30,28 @@ def test_every_item_drawn_is_declared_and_no_id_twice(page, simulation_drawn):
         seen += ids
     assert len(seen) == len(set(seen))
     assert not set(seen) & set(sections), "a section and an item need different ids" if page == "study" else ""
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_id_is_declared_twice(page):
+    """Of sections and items together, drawn or not: a link leads to one place."""
+    sections = PAGES[page][0]
+    ids = [*sections, *(anchor for section in sections.values() for anchor in section.anchors), *OF_EVERY_PAGE]
+    assert len(ids) == len(set(ids))
+
+
+def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
+    """The code of docs/extending.md: a section, and a frame of what a study holds."""
+    slow = module("A section of the report", "slow_of_the_page", monkeypatch)
+    (section,) = drawn({"time": slow.SECTION}, simulation)
+    (table,) = section.items
+    longest = sorted(simulation.cells["seconds"], reverse=True)[:5]
+    assert [row[1].text for row in table.rows] == [f"{seconds:.0f} s" for seconds in longest]
+    frame = module("A section of the report", "bias_of_the_page", monkeypatch, number=2).bias_frame
+    future, off = np.zeros((3, 4, 2)), np.array([2.0, -1.0])
+    cells = [{"cell": "a", "model": "one", "N_D": 5}, {"cell": "failed", "model": "two", "N_D": 5}]
+    results = SimpleNamespace(rows=cells, paths={"a": future - off}, test=SimpleNamespace(future=future))
+    assert frame(results).to_dict("records") == [{"model": "one", "N_D": 5, "ahead": 2.0, "starboard": -1.0}]
 
 
 def test_a_full_study_draws_every_declared_item(simulation_drawn):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.errors import DataError
 from shipid.hybrid.bands import LEVELS, Bands
-from shipid.predictor import Predictor
+from shipid.predictor import NO_BAND, NO_REFITS, Predictor
 from shipid.study import bands, store
 from shipid.study.apply import Band, along_run
 from shipid.study.compare import compare_bands
@@ -183,3 +184,11 @@ def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
         np.testing.assert_array_equal(same.whole, kept.whole)
     stored = Predictor.load(store.cell_file(tmp_path / "run", next(iter(lost))))
     assert stored.bands is not None
+
+
+def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:
+    results = read_results(tiny_run)
+    without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
+    ((sentence, _),) = bands.answer(without)
+    assert sentence.startswith("No band is promised: its errors on runs left out need")
+    assert "`bands.refits`" in sentence

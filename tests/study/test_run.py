@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -191,6 +192,12 @@ def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
 
 
+def test_a_scheduler_without_dask_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(ShipidError, match=r"pip install 'shipid\[dask\]'"):
+        list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
+
+
 # Folders that are not what they are taken for.
 
 
@@ -306,3 +313,19 @@ def test_the_plan_of_a_bundled_study_survives_the_folder(tmp_path: Path) -> None
     plan = read_plan("full-scale")
     store.open_folder(tmp_path / "run", plan)
     assert store.stored_plan(tmp_path / "run") == plan
+
+
+def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Weights are drawn anew for each seed of the grid, not the order of the runs alone."""
+    plan, seen = tiny_plan(tmp_path, {"grid.seeds": [3, 8], "grid.N_D": [4]}), []
+
+    def fit(_: PathDrawn, task: Task) -> dict[str, Fitted]:
+        seen.append(task.seed)
+        return {name: Fitted(None, [], 0.0) for name in task.cases}
+
+    monkeypatch.setattr(PathDrawn, "fit", fit)
+    prepared = prepare(plan, obtain(plan))
+    for batch in plan.batches:
+        run_batch(plan, prepared, batch, "cpu")
+    assert seen == [batch.seed for batch in plan.batches]
+    assert sorted(seen) == [3, 8]

@@ -15,6 +15,7 @@ from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, named, steers
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
+SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
@@ -119,7 +120,8 @@ def _held(values: Array) -> float:
 def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
     for signal in (signal for signal in named("command") if not steers(signal)):
         for name, _ in _named(state, [signal]):
-            fallback = AZIMUTH if azimuth else SIGNALS[signal].component
+            usual = SIGNALS[signal].component
+            fallback = AZIMUTH if azimuth and usual == SCREW else usual
             component = side_of(name) or fallback
             if SIGNALS[signal].shaft:
                 unit, confidence, why, extra = _shaft_unit(state, name)
