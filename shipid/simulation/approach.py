@@ -131,7 +131,9 @@ def steady(
     """
     asked = _Approach(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), controls)
     state, memory = _steady(asked, tuple(map(float, n)), step, method, engine)
-    return {name: values.copy() for name, values in state.items()}, {name: values.copy() for name, values in memory.items()}
+    return {name: values.copy() for name, values in state.items()}, {
+        name: values.copy() for name, values in memory.items()
+    }
 
 
 @dataclass(frozen=True)

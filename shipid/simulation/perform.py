@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.engine.casadi import orders_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
@@ -24,8 +23,6 @@ from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-
-BLOCK = 256  # samples of one call that computes orders
 
 
 def perform(
@@ -229,16 +226,7 @@ def _orders(
     memory = [path.names.index(f"actual.{name}") for name in model.memory]
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
     values = np.array(list(vessel.parameters.values()))
-    rows = _mapped(model.orders)
     parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
-    flat = [part.reshape(records * samples, part.shape[-1]) for part in parts]
-    blocks = np.minimum(np.arange(-(-records * samples // BLOCK) * BLOCK), records * samples - 1).reshape(-1, BLOCK)
-    found = [np.array(rows(*(part[block].T for part in flat), values)) for block in blocks]  # the last one is padded
-    ordered = np.concatenate(found, axis=1)[:, : records * samples].reshape(-1, records, samples).swapaxes(0, 1)
+    flat = orders_of(model, *(part.reshape(records * samples, part.shape[-1]).T for part in parts), values)
+    ordered = flat.reshape(-1, records, samples).swapaxes(0, 1)
     return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
-
-
-@lru_cache(maxsize=32)
-def _mapped(orders: ca.Function) -> ca.Function:
-    """The orders of `BLOCK` samples with the same parameters: a map of all records would be slow to build."""
-    return orders.map("rows", "serial", BLOCK, [orders.n_in() - 1], [])

@@ -104,12 +104,14 @@ def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]
     assert len(list(own_cache.iterdir())) == 3
 
 
+@pytest.mark.usefixtures("own_cache")
 def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "compiler", lambda: None)
     with pytest.raises(ShipidError, match="install gcc, or use 'torch'"):
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
 
 
+@pytest.mark.usefixtures("own_cache")
 def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "target", lambda: replace(target(), flags=("-mno-such-processor",)))
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
