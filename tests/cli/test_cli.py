@@ -118,8 +118,8 @@ def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Pat
     import shutil
 
     folder = shutil.copytree(tiny_run, tmp_path / "run")
-    quiet, loud = shell("study", "report", folder), shell("-v", "study", "report", folder)
-    assert (quiet.returncode, quiet.stderr) == (0, "")
+    quiet, loud = CliRunner().invoke(app, ["study", "report", str(folder)]), shell("-v", "study", "report", folder)
+    assert (quiet.exit_code, quiet.stderr) == (0, "")
     assert loud.returncode == 0
     assert f"shipid.study.contents: report written: {folder / 'report.html'}" in loud.stderr
     assert quiet.stdout == loud.stdout
