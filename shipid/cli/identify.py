@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.options import command_line, pairs, parsed, stem
-from shipid.cli.terminal import digits, iterations, show, table
+from shipid.cli.answer import Answer, Json, answering
+from shipid.cli.completion import files
+from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
+from shipid.cli.terminal import digits, iterations, table
 from shipid.errors import ShipidError
 
 if TYPE_CHECKING:
@@ -20,11 +22,11 @@ if TYPE_CHECKING:
 
 
 def identify(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    vessel: VesselName,
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     parameters: Annotated[
         list[str] | None,
-        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...[order >= 3]"'),
+        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...\\[order >= 3]"'),
     ] = None,
     fixed: Annotated[list[str] | None, typer.Option(help="paths to leave out of --parameters")] = None,
     together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
@@ -53,6 +55,7 @@ def identify(
         Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml in this folder")
     ] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
+    as_json: Json = False,
 ) -> None:
     """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
     from shipid.data.dataset import read_dataset
@@ -77,29 +80,30 @@ def identify(
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
     check(ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or ())
-    _look(ship, log, runs or (), test or ())
-    try:
-        with iterations() as progress:
-            outcome = run_identification(
-                ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
-                band=band, progress=progress,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted: nothing was written\n")
-        sys.exit(130)
-    _show_identified(outcome)
-    write_patch(outcome, file)
-    count = len(outcome.solution.values)
-    typer.echo(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}")
-    if html is not None:
-        from shipid.identification.contents import identification_content
-        from shipid.report.identification import write_identification
+    with answering(as_json) as answer:
+        _look(ship, log, runs or (), test or (), answer)
+        try:
+            with iterations() as progress:
+                outcome = run_identification(
+                    ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
+                    band=band, progress=progress,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            sys.stderr.write("interrupted: nothing was written\n")
+            sys.exit(130)
+        _show_identified(outcome, answer)
+        write_patch(outcome, file)
+        count = len(outcome.solution.values)
+        answer.say(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}", file=file)
+        if html is not None:
+            from shipid.identification.contents import identification_content
+            from shipid.report.identification import write_identification
 
-        content = identification_content(outcome, dataset, command_line())
-        typer.echo(f"page -> {write_identification(content, html)}")
+            content = identification_content(outcome, dataset, command_line())
+            answer.say(f"page -> {write_identification(content, html)}", page=html)
 
 
-def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) -> None:
+def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say what is off between vessel and log before anything is fitted, and draft the correction."""
     from shipid.errors import DataError
     from shipid.identification.outcome import pick_runs
@@ -112,10 +116,15 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) 
         found = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
         return  # the fit says what is missing
-    typer.echo(f"warning: {found.sentence}" if found.wrong else found.sentence, err=found.wrong)
+    if found.wrong:
+        typer.echo(f"warning: {found.sentence}", err=True)
+    else:
+        answer.say(found.sentence)
+    answer.say(first_look=found.sentence)
     if found.changes:
-        typer.echo("draft of a correction, to begin with:")
-        typer.echo(found.patch(str(ship.file)))
+        answer.say("draft of a correction, to begin with:")
+        patch = found.patch(str(ship.file))
+        answer.say(patch, correction=patch)
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:
@@ -128,13 +137,14 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
-def _show_identified(outcome: Identified) -> None:
+def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
     solution = outcome.solution
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
     )
-    typer.echo(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
+    status = {"status": solution.status, "runs": outcome.runs, "held_out": outcome.held_out}
+    answer.say(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s", **status)
     rows: list[list[str]] = [
         [
             row["path"] + (f" (with {row['with']})" if row["with"] else ""),
@@ -150,15 +160,15 @@ def _show_identified(outcome: Identified) -> None:
         for row in outcome.estimates.to_dict("records")
     ]
     columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
-    show(table(columns, rows))
+    answer.rows("estimates", outcome.estimates, table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
-    typer.echo(
+    answer.say(
         f"Factors are on the base; standard errors and intervals are theirs, by {words[outcome.statistics.chosen]}."
     )
-    for sentence in outcome.unseen:
-        typer.echo(f"  {sentence}")
-    typer.echo(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
-    show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(outcome)))
+    answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
+    answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
+    heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
+    answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
     banded = "low" in outcome.manoeuvres
     compared = [
         [
@@ -168,17 +178,20 @@ def _show_identified(outcome: Identified) -> None:
         ]
         for row in outcome.manoeuvres.to_dict("records")
     ]
-    show(table(["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"], compared))
-    for curve in outcome.profiles:
-        typer.echo(f"profile: {curve.sentence}")
+    heads = ["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"]
+    answer.rows("manoeuvres", outcome.manoeuvres, table(heads, compared))
+    profiles = [curve.sentence for curve in outcome.profiles]
+    answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:
-        typer.echo("To run next, by information per hour:")
+        answer.say("To run next, by information per hour:")
         ranked = [
             [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
              f"{1 - row['after'] / row['before']:.0%}"]
             for row in outcome.programme.head(10).to_dict("records")
         ]  # fmt: skip
-        show(table(["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"], ranked))
+        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
+        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
+    answer.say(warnings=outcome.warnings)
     for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)
 

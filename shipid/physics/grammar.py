@@ -17,6 +17,7 @@ from casadi import SX
 AXES = "XYZKMN"
 MOTIONS = "uvwpqr"
 DEVIATIONS = ("u", "v", "r", "delta")
+ACCELERATIONS = rf"[{AXES}]_[{MOTIONS}]dot"
 POSITIVE = object()  # marks a parameter that must be greater than zero
 
 
@@ -50,28 +51,40 @@ class Monomial:
         return product
 
 
+def monomial_names(alphabet: str | tuple[str, ...], axes: str = AXES) -> str:
+    """Regular expression of the coefficient names whose factors are words of the alphabet."""
+    return rf"([{axes}])_((?:{_factor(alphabet)})+)" if axes else rf"()((?:{_factor(alphabet)})+)"
+
+
+def _factor(alphabet: str | tuple[str, ...]) -> str:
+    word = f"(?:{'|'.join(alphabet)})"
+    return rf"{word}|\|{word}\|"
+
+
 @cache
 def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
     """Parse a coefficient name whose factors are words of the alphabet; ValueError shows the expected form."""
-    word = f"(?:{'|'.join(alphabet)})"
-    factor, before = rf"{word}|\|{word}\|", rf"([{axes}])_" if axes else "()"
-    parts = re.fullmatch(rf"{before}((?:{factor})+)", name)
+    parts = re.fullmatch(monomial_names(alphabet, axes), name)
     if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
         example = "Y_v|r|" if axes else "J|y|"
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    tokens = re.findall(factor, parts[2])
+    tokens = re.findall(_factor(alphabet), parts[2])
     return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in tokens))
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name."""
+    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name.
+
+    names : regular expression of the valid names, for editors; `check_name` says what is wrong with another.
+    """
 
     check_name: Callable[[str], Monomial]
     unit: Callable[[str], str]
+    names: str
 
     def check(self, names: Iterable[str]) -> None:
         """Raise ValueError for the first invalid name, or for a second name of one monomial."""
@@ -92,7 +105,7 @@ def derivative(name: str) -> Monomial:
 
 def acceleration_derivative(name: str) -> Monomial:
     """Monomial of an added-mass derivative from its name, such as `Y_rdot`."""
-    if not re.fullmatch(rf"[{AXES}]_[{MOTIONS}]dot", name):
+    if not re.fullmatch(ACCELERATIONS, name):
         raise ValueError(f"{name!r} is not an added-mass derivative: write it like 'X_udot' or 'N_vdot'")
     return Monomial(name[0], ((name[2], False),))
 
@@ -153,9 +166,10 @@ def thrust_monomial(name: str) -> Monomial:
     return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
 
 
-DERIVATIVES = Grammar(derivative, derivative_unit)
-PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime")
-HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime")
-RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime")
-ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
-THRUST = Grammar(thrust_monomial, lambda _: "-")
+_MOTIONS, _OF_HULL = monomial_names(MOTIONS), monomial_names(DEVIATIONS[:-1])
+DERIVATIVES = Grammar(derivative, derivative_unit, _MOTIONS)
+PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime", _MOTIONS)
+HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime", _OF_HULL)
+RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime", rf"(?=.*delta){monomial_names(DEVIATIONS)}")
+ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)
+THRUST = Grammar(thrust_monomial, lambda _: "-", rf"1|{monomial_names('Jyt', axes='')}")

@@ -126,7 +126,12 @@ def _checked_table(grammar: Grammar) -> Any:
         grammar.check(table)
         return table
 
-    return Annotated[dict[str, FiniteFloat], AfterValidator(check)]
+    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole(grammar.names)}})
+    return Annotated[dict[str, FiniteFloat], AfterValidator(check), named]
+
+
+def _whole(names: str) -> str:
+    return f"^(?:{names})$"
 
 
 def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[Block]:
@@ -138,7 +143,9 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
-            config = ConfigDict(extra="allow", strict=True)
+            names: dict[str, Any] = {"patternProperties": {_whole(grammar.names): {"type": "number"}}}
+            editors = {**names, "additionalProperties": False}
+            config = ConfigDict(extra="allow", strict=True, json_schema_extra=editors)
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
             continue
