@@ -266,7 +266,7 @@ class _Motion:
     """A run to compare with others: t [s] and a key of the motion, each (N,); whether it moves in most rows."""
 
     t: Array
-    keys: np.ndarray[Any, np.dtype[np.uint64]]
+    keys: np.ndarray[Any, np.dtype[np.integer[Any]]]
     lively: bool
 
 

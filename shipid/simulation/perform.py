@@ -227,6 +227,7 @@ def _orders(
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
     values = np.array(list(vessel.parameters.values()))
     parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
-    flat = orders_of(model, *(part.reshape(records * samples, part.shape[-1]).T for part in parts), values)
-    ordered = flat.reshape(-1, records, samples).swapaxes(0, 1)
+    state, hidden, inputs, environment = (part.reshape(records * samples, part.shape[-1]).T for part in parts)
+    found = orders_of(model, state, hidden, inputs, environment, values)
+    ordered = found.reshape(-1, records, samples).swapaxes(0, 1)
     return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
