@@ -39,7 +39,7 @@ class Reach:
         """
         u, v, r = (np.asarray(columns[name], dtype=float) for name in ("u", "v", "r"))
         speed = np.hypot(u, v)
-        moving = speed > SLOW * np.quantile(speed, share)
+        moving = speed >= SLOW * np.quantile(speed, share)
         length = length_of(vessel) or 1.0
         helms = [np.abs(columns[name]) for name in dynamics(vessel).commands if steers(name)]
         return cls(

@@ -129,14 +129,14 @@ def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
     settings, seen = solution.settings, whiteness(LinearFit.of(solution))
     factors = {
-        name: float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in SIGNALS[name]]))
+        name: max(float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in SIGNALS[name]])), LEAST)
         for name in settings.weights
     }
     widths = settings.widths
     if "initial_state" in widths:  # a start is one row, however long residuals remember
         widths["initial_state"] /= float(np.exp(np.mean(np.log(list(factors.values())))))
     update = {
-        "weights": {name: width * max(factors[name], LEAST) for name, width in settings.weights.items()},
+        "weights": {name: width * factors[name] for name, width in settings.weights.items()},
         "nuisance": widths,
     }
     return settings.model_copy(update=update), {name: one.effective for name, one in seen.items()}

@@ -59,9 +59,11 @@ class Claims:
                 with suppress(OSError):
                     self.give_back(unit)
             with suppress(OSError):
+                files = list(self._folder.iterdir())  # before the look at others: one that joins now keeps its claims
                 if not self._others():  # what killed processes left behind is removed by the last one
-                    for file in self._folder.iterdir():
+                    for file in files:
                         file.unlink(missing_ok=True)
+            with suppress(OSError):
                 self._me.unlink(missing_ok=True)
                 self._folder.rmdir()  # fails while others are at work
 
@@ -147,8 +149,13 @@ class Claims:
             return self._others()
 
     def _others(self) -> bool:
-        signs = [file for file in self._folder.glob(".*") if file != self._me]
-        return any(not self._is_abandoned(file, file.stat()) for file in signs)
+        return any(self._lives(file) for file in self._folder.glob(".*") if file != self._me)
+
+    def _lives(self, sign: Path) -> bool:
+        try:
+            return not self._is_abandoned(sign, sign.stat())
+        except FileNotFoundError:  # its process has ended since the folder was listed
+            return False
 
     def _sign_in(self) -> None:
         """Write the file of this process, to which its claims are links."""
@@ -200,13 +207,18 @@ class Claims:
             away.unlink(missing_ok=True)
 
     def _is_abandoned(self, file: Path, status: os.stat_result) -> bool:
-        """Whether nobody renews a file any more; the clock is that of the file system, as this process renews."""
+        """Whether nobody renews a file any more; the clock is that of the file system, as this process renews.
+
+        FileNotFoundError if the file is removed meanwhile.
+        """
         try:
             who: Any = json.loads(file.read_text(encoding="utf-8"))
             if who["host"] == socket.gethostname() and who["system"] == _system() and not is_alive(int(who["process"])):
                 return True
         except (ValueError, KeyError, TypeError):
             pass
+        except FileNotFoundError:
+            raise
         except OSError:
             return False
         try:

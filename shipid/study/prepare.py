@@ -213,7 +213,7 @@ def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:
 
 
 def runs_by_amount(plan: Plan, pool: Windows) -> dict[int, tuple[str, ...]]:
-    """Return the training and validation runs of each amount of data, most first, for the first seed."""
+    """Return the training and validation runs of each amount of data, fewest first, for the first seed."""
     seed = min(plan.study.grid.seeds)
     return {batch.N_D: nested(plan, pool, batch) for batch in reversed(plan.batches) if batch.seed == seed}
 

@@ -126,7 +126,7 @@ def run_study(
             cells = event.done
             yield event
         if cells == plan.cells:
-            finish = partial(_finish, plan, folder, prepared, device, begun)
+            finish = partial(_finish, plan, folder, claims, prepared, device, begun)
             claims.once(store.RESULTS, partial(seals.is_sealed, folder, store.RESULTS), finish)
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
 
@@ -168,13 +168,14 @@ def _write_data(plan: Plan, folder: Path) -> None:
     seals.write_seal(folder, DATA, [folder / store.DATASET])
 
 
-def _finish(plan: Plan, folder: Path, prepared: Prepared, device: str, begun: float) -> None:
+def _finish(plan: Plan, folder: Path, claims: Claims, prepared: Prepared, device: str, begun: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
-    record = read_json(folder / store.PROVENANCE)
-    record["notes"] = list(prepared.notes)
-    record["machine"] = {**machine(), "device": device}
-    record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
-    write_json(folder / store.PROVENANCE, record)
+    with claims.alone(SESSIONS):  # a process that joins notes its session there
+        record = read_json(folder / store.PROVENANCE)
+        record["notes"] = list(prepared.notes)
+        record["machine"] = {**machine(), "device": device}
+        record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
+        write_json(folder / store.PROVENANCE, record)
     store.write_results(folder, store.read_rows(folder, plan))
 
 

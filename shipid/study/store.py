@@ -54,6 +54,8 @@ def open_folder(folder: Path, plan: Plan) -> None:
         make_folder(folder.parent)
         sweep(folder.parent)
         if not (folder / STUDY).exists():
+            if folder.resolve() == Path.cwd():  # it is made anew, under the feet of this process
+                raise ResultError("is the working folder: name a new one by --out, such as --out run", file=folder)
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
@@ -161,11 +163,6 @@ def rows_file(folder: Path, key: str) -> Path:
     return folder / "batches" / f"{key}.json"
 
 
-def journal_file(folder: Path, key: str) -> Path:
-    """Where the searches of a unit of work are written as they go."""
-    return folder / JOURNALS / f"{key}.log"
-
-
 def cell_file(folder: Path, cell: str) -> Path:
     """Where the predictor of a cell is."""
     return folder / "cells" / f"{cell}.npz"
@@ -222,7 +219,9 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 
 def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     """One row per finished cell, with its trials; ordered by N_D, seed and, with the plan, foundation and method."""
-    rows = [row for file in sorted((folder / "batches").glob("*.json")) for row in read_json(file)]
+    sealed = seals.sealed(folder)  # other files are of units that are computed again, perhaps cut in another way
+    files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in sealed)
+    rows = [row for file in files for row in read_json(file)]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     frame = pd.DataFrame(rows)

@@ -25,7 +25,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, Limits, candidates, performed, steps_between
-from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.outcome import SIGNALS, TRIED, pick_runs, residual_level, residual_spacing
 from shipid.identification.reach import Reach, beyond, of_log, reach_of
 from shipid.identification.settings import Identify
@@ -116,7 +116,7 @@ class Compared:
             said.append("all others are shown to be worse")
         wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
         if wide:
-            worst = max(wide, key=lambda row: float(row["spread"] / abs(row["greatest"])))
+            worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
             said.append(
                 "structures differ by more than the interval within one in "
                 f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
@@ -192,6 +192,7 @@ def compare_structures(
     if len(fitted) < 2:
         raise DataError("only one run: it cannot be held out of its own fit; give two or more", path="runs")
     length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
+    check_length(settings, length)
     tell = say or (lambda _: None)
     parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]
     errors, fits, notes, series = list[pd.DataFrame](), dict[str, Fitted](), dict[str, str](), dict[str, Any]()

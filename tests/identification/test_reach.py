@@ -25,6 +25,11 @@ def test_it_is_the_greatest_of_the_motion() -> None:
     assert found.speed == 1.0
 
 
+def test_a_ship_at_rest_has_no_drift() -> None:
+    still = dict.fromkeys(("u", "v", "r", "rudder.delta", "propeller.n"), np.zeros(3))
+    assert Reach.of(SHIP, still) == Reach(0.0, 0.0, 0.0, 0.0)
+
+
 def test_a_hard_turn_goes_beyond_gentle_trials_and_not_beyond_itself() -> None:
     hard = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=35, duration=60)], step=0.1)
     gentle = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=3, duration=20)], step=0.1)

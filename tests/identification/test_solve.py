@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from shipid.errors import ShipidError
 from shipid.identification.fit import origin, search
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solve import LEAST, Solution, _discounted, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
@@ -429,6 +430,14 @@ def test_discounted_residuals_let_priors_count() -> None:
     assert all(less.settings.weights[name] > plain.settings.weights[name] for name in SHARP)
     again = identify(degraded(SHIP), data, data.runs, less.settings)  # the settings in a patch give the same numbers
     assert again.factors == pytest.approx(less.factors, rel=1e-3)
+
+
+def test_residuals_that_vanish_are_discounted_to_a_limit() -> None:
+    data = trials(SHIP, runs=1, steps=20)
+    found = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
+    again, _ = _discounted(replace(found, residuals=np.zeros_like(found.residuals)))
+    assert all(again.weights[name] == pytest.approx(LEAST * found.settings.weights[name]) for name in again.weights)
+    assert again.widths["initial_state"] == pytest.approx(found.settings.widths["initial_state"] / LEAST)
 
 
 @pytest.mark.slow

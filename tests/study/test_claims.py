@@ -224,6 +224,13 @@ def test_others_are_those_that_live(tmp_path: Path) -> None:
         assert not one.others()
 
 
+def test_a_process_that_ends_meanwhile_is_no_other(tmp_path: Path) -> None:
+    with Claims(tmp_path) as one:
+        (tmp_path / claims.FOLDER / ".ended").symlink_to("nowhere")  # listed, and gone when it is looked at
+        assert not one.others()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_waits_grow() -> None:
     assert claims.pause(0.0) == 0.0
     assert claims.pause(0.001) == pytest.approx(0.0015)

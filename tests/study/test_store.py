@@ -36,6 +36,18 @@ def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
     assert [entry.name for entry in (tmp_path / "full").iterdir()] == ["thesis.tex"]
 
 
+def test_the_working_folder_holds_no_new_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, folder = tiny_plan(tmp_path), tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    with pytest.raises(ResultError, match="is the working folder"):
+        store.open_folder(Path(), plan)
+    monkeypatch.chdir(tmp_path)
+    store.open_folder(folder, plan)
+    monkeypatch.chdir(folder)
+    store.open_folder(Path(), plan)  # a run that is there goes on from anywhere
+
+
 def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     store.open_folder(folder, tiny_plan(tmp_path))
@@ -62,6 +74,8 @@ def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
     rows = store.read_rows(tmp_path)
     assert rows["seed"].tolist() == [0, 1]
     assert rows["H"].isna().all()
+    seals.remove(tmp_path, batches[0].key)  # as after a damaged predictor: the unit is computed again
+    assert store.read_rows(tmp_path)["seed"].tolist() == [0]
     with pytest.raises(ResultError, match="no cell is finished"):
         store.read_rows(tmp_path / "empty")
 
