@@ -208,7 +208,6 @@ class Quiet:
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
-        self.done: set[str] = set()
         self.last = time.monotonic()
 
     def say(self, line: str) -> None:
@@ -218,7 +217,7 @@ class Quiet:
 
     def look(self) -> None:
         """Print the search that moved last, if it is time to."""
-        if time.monotonic() - self.last >= SILENCE and (found := self.watch.look(self.done)):
+        if time.monotonic() - self.last >= SILENCE and (found := self.watch.look()):
             more = f" ({len(found)} searches go on)" if len(found) > 1 else ""
             self.say(f"... {found[0].words}{more}")
 
@@ -237,7 +236,6 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
         quiet = Quiet(watch)
         with looking(quiet.look, min(SILENCE, 5.0)):
             for event in events:
-                quiet.done.update([event.row["cell"]] if event.kind == "cell" else ())
                 line = event_line(event)
                 if line:
                     quiet.say(line)
@@ -261,12 +259,11 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    finished: set[str] = set()
     progress = Progress(*columns, console=console, refresh_per_second=2)  # drawing takes time from workers
     task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
 
     def look() -> None:
-        found = watch.look(finished)
+        found = watch.look()
         progress.update(inner, visible=bool(found))
         if found:
             said = escape(visible(found[0].words))
@@ -282,7 +279,6 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                 progress.update(task, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
-                finished.add(row["cell"])
                 if row["status"] == "ok":
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])

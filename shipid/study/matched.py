@@ -75,6 +75,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
     """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
     names = _names([results.folder for results in runs])
+    _check_pairs(runs, pairs or {})
     notes = []
     for name, results in zip(names, runs, strict=True):
         good = int((results.cells["status"] == "ok").sum())
@@ -95,6 +96,16 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
     return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
 
 
+def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
+    """DocumentError for a name that is no family or method of the first run, or a counterpart that no other run has."""
+    first, *others = ({*results.cells["family"], *results.cells["method"], ALONE} for results in runs)
+    there = set[str]().union(*others)
+    for words, named, known in (("the first run", pairs, first), ("any other run", pairs.values(), there)):
+        wrong = next((name for name in named if name not in known), None)
+        if wrong is not None:
+            raise DocumentError(f"{wrong!r} is no family or method of {words}: {choices(wrong, known)}", path="--pair")
+
+
 def _names(folders: Sequence[Path]) -> tuple[str, ...]:
     """The last parts of folders that tell them apart, as few as do."""
     parts = [folder.resolve().parts for folder in folders]
@@ -108,12 +119,6 @@ def _names(folders: Sequence[Path]) -> tuple[str, ...]:
 def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, dict[str, str], list[str]]:
     """Rows of `Comparison.errors` for one run, without its name; name there -> name in the first; notes."""
     mine, theirs = _cells(first), _cells(other)
-    known = {*mine["family"], *mine["method"]}
-    wrong = next((name for name in pairs if name not in known), None)
-    if wrong is not None:
-        raise DocumentError(
-            f"{wrong!r} is no family or method of the first run: {choices(wrong, known)}", path="--pair"
-        )
     notes: list[str] = []
     called: dict[str, str] = {}
     for key in ("family", "method"):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
 
+from shipid.study import seals
 from shipid.study.plan import WITH, Plan
 from shipid.study.store import JOURNALS, part_folder
 
@@ -50,19 +51,23 @@ class Watch:
         }
         self._ends: dict[Path, int] = {}
         self._cells: dict[Path, list[str]] = {}
-        self._found: dict[str, Searching] = {}
-        self._last: dict[str, int] = {}
+        self._found: dict[Path, dict[str, Searching]] = {}  # parts of a study have cells of the same names
+        self._last: dict[tuple[Path, str], int] = {}
         self._looks = 0
 
-    def look(self, done: Iterable[str] = ()) -> list[Searching]:
-        """Return the searches that go on, those that were written to last first; without cells that are done."""
+    def look(self) -> list[Searching]:
+        """Return the searches that go on, those that were written to last first; none of units that are finished."""
         self._looks += 1
+        left: list[tuple[int, Searching]] = []
         for folder, trials in self._trials.items():
+            finished = seals.sealed(folder)
             for file in (folder / JOURNALS).glob("*.log"):
+                if file.stem in finished:
+                    continue
                 self._read(file, trials)
-        finished = set(done)
-        left = [one for cell, one in self._found.items() if cell not in finished and one.done != one.count]
-        return sorted(left, key=lambda one: -self._last[one.cell])
+                known = self._found.get(file, {})
+                left += [(self._last[file, one.cell], one) for one in known.values() if one.done != one.count]
+        return [one for _, one in sorted(left, key=lambda pair: -pair[0])]
 
     def _read(self, file: Path, trials: Mapping[str, int | None]) -> None:
         """Take over the whole lines that have been added to a journal."""
@@ -83,23 +88,23 @@ class Watch:
                 if code == BEGUN:
                     cells.append(entry["study_name"])
                 elif code == COUNTED and "trials" in entry["user_attr"]:
-                    self._count(cells[entry["study_id"]], entry["user_attr"]["trials"], trials)
+                    self._count(file, cells[entry["study_id"]], entry["user_attr"]["trials"], trials)
                 elif code == TRIED:
-                    self._tried(cells[entry["study_id"]], entry.get("value"), trials)
+                    self._tried(file, cells[entry["study_id"]], entry.get("value"), trials)
             except (ValueError, KeyError, IndexError, TypeError):
                 continue  # half a line, or an entry of someone else
 
-    def _known(self, cell: str, trials: Mapping[str, int | None]) -> Searching:
+    def _known(self, file: Path, cell: str, trials: Mapping[str, int | None]) -> Searching:
         method = next((name for name in trials if f"{WITH}{name}-N" in cell), "")
-        return self._found.get(cell) or Searching(cell, 0, trials.get(method), inf)
+        return self._found.get(file, {}).get(cell) or Searching(cell, 0, trials.get(method), inf)
 
-    def _count(self, cell: str, count: int, trials: Mapping[str, int | None]) -> None:
-        known = self._known(cell, trials)
-        self._found[cell] = Searching(cell, known.done, count, known.best)
-        self._last[cell] = self._looks
+    def _count(self, file: Path, cell: str, count: int, trials: Mapping[str, int | None]) -> None:
+        self._keep(file, replace(self._known(file, cell, trials), count=count))
 
-    def _tried(self, cell: str, value: float | None, trials: Mapping[str, int | None]) -> None:
-        known = self._known(cell, trials)
-        best = min(known.best, inf if value is None else value)
-        self._found[cell] = Searching(cell, known.done + 1, known.count, best)
-        self._last[cell] = self._looks
+    def _tried(self, file: Path, cell: str, value: float | None, trials: Mapping[str, int | None]) -> None:
+        known = self._known(file, cell, trials)
+        self._keep(file, replace(known, done=known.done + 1, best=min(known.best, inf if value is None else value)))
+
+    def _keep(self, file: Path, now: Searching) -> None:
+        self._found.setdefault(file, {})[now.cell] = now
+        self._last[file, now.cell] = self._looks

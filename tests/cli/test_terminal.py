@@ -30,7 +30,7 @@ class Still:
 
     looks = 0
 
-    def look(self, done: object = ()) -> list[Any]:  # noqa: ARG002
+    def look(self) -> list[Any]:
         from shipid.study.progress import Searching
 
         self.looks += 1

@@ -113,6 +113,8 @@ def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
     assert rows.loc[("bad ~ clean", 10), "difference"] == pytest.approx(-1.0)
     with pytest.raises(DocumentError, match="'goood' is no family or method of the first run: did you mean 'good'"):
         compare_results([placed(one, "a"), placed(other, "b")], {"goood": "clean"})
+    with pytest.raises(DocumentError, match="'cleen' is no family or method of any other run: did you mean 'clean'"):
+        compare_results([placed(one, "a"), placed(other, "b")], {"good": "cleen"})
 
 
 def test_cells_without_a_result_do_not_match(made: Made) -> None:

@@ -12,8 +12,9 @@ import pytest
 from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.settings import Span
+from shipid.study import seals
 from shipid.study.progress import Searching, Watch
-from shipid.study.store import JOURNALS, TRIALS
+from shipid.study.store import JOURNALS, TRIALS, part_folder
 from tests.study.tiny import tiny_plan
 
 SPACE = {"units": Span(1, 100)}
@@ -42,7 +43,9 @@ def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
     assert watch.look()[0] == Searching(other, 2, 5, 0.04), "the one that moved last comes first"
     journal.add({other: [row(number, 0.09) for number in (2, 3, 4)]}, SPACE)
     assert [search.cell for search in watch.look()] == [one], "all its trials have ended"
-    assert watch.look([one]) == []
+    file.with_suffix(".json").write_text("[]")
+    seals.write_seal(tmp_path, "unit", [file.with_suffix(".json")])
+    assert watch.look() == [], "the unit is finished"
 
 
 def test_a_budget_says_its_number_when_it_knows_it(tmp_path: Path) -> None:
@@ -77,6 +80,16 @@ def test_journals_of_a_folder_that_has_several(tmp_path: Path) -> None:
         Journal(tmp_path / JOURNALS / f"{name}.log").add({f"{name}+drawn-N0004-s0": [row(0, 1.0)]}, SPACE)
     watch = Watch(plan, tmp_path)
     assert {search.cell for search in watch.look()} == {"one+drawn-N0004-s0", "two+drawn-N0004-s0"}
+
+
+def test_parts_of_a_study_have_cells_of_the_same_names(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"method.0.trials": 5, "repeat": {"split.seed": [0, 1]}})
+    cell, watch = "right+drawn-N0004-s0", Watch(plan, tmp_path)
+    for name, count in zip(plan.parts, (4, 3), strict=True):
+        file = part_folder(tmp_path, name) / JOURNALS / f"{cell}.log"
+        file.parent.mkdir(parents=True)
+        Journal(file).add({cell: [row(number, 1.0) for number in range(count)]}, SPACE)
+    assert sorted(search.done for search in watch.look()) == [3, 4]
 
 
 def test_a_finished_run_searches_no_more(tiny_run: Path, tmp_path: Path) -> None:
