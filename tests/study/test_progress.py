@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
+from shipid.files import write_json
 from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.settings import Span
 from shipid.study import seals
 from shipid.study.progress import Searching, Watch
-from shipid.study.store import JOURNALS, TRIALS, part_folder
+from shipid.study.store import JOURNALS, TRIALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
 SPACE = {"units": Span(1, 100)}
@@ -43,8 +44,8 @@ def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
     assert watch.look()[0] == Searching(other, 2, 5, 0.04), "the one that moved last comes first"
     journal.add({other: [row(number, 0.09) for number in (2, 3, 4)]}, SPACE)
     assert [search.cell for search in watch.look()] == [one], "all its trials have ended"
-    file.with_suffix(".json").write_text("[]")
-    seals.write_seal(tmp_path, "unit", [file.with_suffix(".json")])
+    write_json(rows_file(tmp_path, "unit"), [])
+    seals.write_seal(tmp_path, "unit", [rows_file(tmp_path, "unit")])
     assert watch.look() == [], "the unit is finished"
 
 
