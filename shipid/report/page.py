@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
@@ -91,17 +94,17 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
         sections=parts,
         anchors=anchors,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
-        views={item.id: _embedded(_views(item)) for item in _figures(parts)},
+        views={item.id: packed(_json(_views(item))) for item in _figures(parts)},
         fixed={
-            item.id: _embedded(paths.fixed_data(item.windows, windows))
+            item.id: packed(_json(paths.fixed_data(item.windows, windows)))
             for item in _figures(parts)
             if item.windows and windows
         },
-        windows=_embedded(windows) if windows else "",
+        windows=packed(_json(windows)) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=Markup(_resource("vendor/plotly-cartesian.min.js")),
+        plotly=_plotly(),
     )
 
 
@@ -139,10 +142,21 @@ def _views(figure: Figure) -> dict[str, Any]:
     }
 
 
-def _embedded(data: Any) -> Markup:
-    """JSON inside a script element: no character in it can end the element or start a tag."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+def packed(text: str) -> Markup:
+    """Compress a text (zlib, base64) for a script element: no character in it can end the element or start a tag."""
+    return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
+
+
+def _json(data: Any) -> str:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+@cache
+def _plotly() -> dict[str, Markup]:
+    """Plotly, packed, and the notice of its authors and licence, which a reader of the file is to see."""
+    script = _resource("vendor/plotly-cartesian.min.js")
+    notice = script[script.index("/**") + 3 : script.index("*/")]
+    return {"script": packed(script), "notice": Markup(notice.replace("--", "-").strip())}
 
 
 def _resource(name: str) -> str:
