@@ -8,10 +8,14 @@
   }
 
   // Plotly and the data of figures lie in the page compressed.
-  async function unpacked(element) {
-    const text = atob(element.textContent), bytes = new Uint8Array(text.length);
+  function bytesOf(base64) {
+    const text = atob(base64), bytes = new Uint8Array(text.length);
     for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-    return new Response(new Response(bytes).body.pipeThrough(new DecompressionStream("deflate"))).text();
+    return bytes;
+  }
+
+  async function unpacked(element) {
+    return new Response(new Response(bytesOf(element.textContent)).body.pipeThrough(new DecompressionStream("deflate"))).text();
   }
 
   function once(make) {
@@ -50,10 +54,20 @@
   }
 
   // Every figure can be taken away: as an image, or as the numbers of its lines.
+  const TYPES = { f4: Float32Array, f8: Float64Array, i1: Int8Array, i2: Int16Array, i4: Int32Array,
+                  u1: Uint8Array, u2: Uint16Array, u4: Uint32Array };
+
+  // What a trace holds: a list, or numbers written as bytes (single precision has seven digits).
+  function values(given) {
+    if (!given?.bdata) return [...(given || [])];
+    const list = [...new TYPES[given.dtype](bytesOf(given.bdata).buffer)];
+    return given.dtype === "f4" ? list.map((value) => (Number.isFinite(value) ? Number(value.toPrecision(7)) : "")) : list;
+  }
+
   function csv(plot) {
     const rows = [["line", "x", "y", "shown"]];
     for (const trace of plot.data) {
-      const x = [...(trace.x || [])], y = [...(trace.y || [])];
+      const x = values(trace.x), y = values(trace.y);
       x.forEach((value, i) => rows.push([trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1]));
     }
     const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replace(/"/g, '""')}"` : value);
