@@ -19,7 +19,7 @@ from shipid.report.page import page, write
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted, listed, number
+from shipid.report.wording import counted, listed, number, scientific
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -214,7 +214,7 @@ def unseen(content: IdentificationContent) -> Table | None:
 def _short(value: float) -> Cell:
     if not np.isfinite(value):
         return Cell("–", tables.MISSING)
-    return Cell(f"{value:.4g}".replace("-", "−"), float(value))
+    return Cell(scientific(value), float(value))
 
 
 def correlations(content: IdentificationContent) -> Figure | None:

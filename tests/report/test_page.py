@@ -195,6 +195,21 @@ def test_every_figure_speaks(sections):
                 assert re.fullmatch(r"(\S+ )+\S+\.", item.how), item.id
 
 
+@pytest.mark.slow
+def test_numbers_are_written_for_people(page):
+    """No exponent, no not-a-number, no more digits than mean something, no name of a column, no mark of markdown."""
+    content, _, parsed = page
+    prose = [text for _, text in parsed.all("p", "figcaption", "th", "button", "h3", "option", "legend")]
+    prose += [text for a, text in parsed.all("td") if a.get("class") == "numeric"]
+    prose += [str(a[key]) for _, a, _ in parsed.elements for key in ("aria-label", "title") if a.get(key)]
+    assert len(prose) > 100
+    strange = re.compile(
+        r"\d[eE][+-]?\d|\b(nan|inf|None)\b|\+-|\d\.\d{6,}|`|\b\d+\.\d+ \d+(\.\d+)?\b|\b[a-z]{2,}_[a-z]{2,}"
+    )
+    given = {content.command, *content.cells.hyperparameters, *content.cells.sentence}
+    assert [text for text in prose if strange.search(text) and not any(one and one in text for one in given)] == []
+
+
 def test_axes_have_units(sections):
     seen = 0
     for section in sections:
