@@ -50,6 +50,7 @@
     const coarse = matchMedia("(pointer: coarse)").matches;
     layout.dragmode = coarse ? false : "zoom";
     layout.uirevision = view;
+    if (!plot.data) plot.replaceChildren(); // the sketch
     Plotly.react(plot, data, layout, CONFIG);
   }
 

@@ -22,6 +22,7 @@ from shipid.report.figure import Figure
 from shipid.report.glossary import glossed
 from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
 from shipid.report.sections import SECTIONS
+from shipid.report.sketch import sketch
 from shipid.report.wording import bound, number
 
 
@@ -100,6 +101,7 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
             for item in _figures(parts)
             if item.windows and windows
         },
+        sketches=_first_sketch(_figures(parts)),
         windows=packed(_json(windows)) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
@@ -140,6 +142,15 @@ def _views(figure: Figure) -> dict[str, Any]:
         ]
         for key, panels in figure.views.items()
     }
+
+
+def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:
+    """Sketch of the first figure, by its id; nothing where it has several panels or cannot be sketched."""
+    for figure in figures[:1]:
+        panels = figure.views.get("-".join(str(control.start) for control in figure.controls), ())
+        if len(panels) == 1:
+            return {figure.id: sketch(panels[0].figure, figure.height)}
+    return {}
 
 
 def packed(text: str) -> Markup:
