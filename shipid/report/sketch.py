@@ -31,14 +31,14 @@ def sketch(figure: go.Figure, height: int) -> Markup:
     margin = figure.layout.margin
     names = up.ticktext or up.tickvals
     left = max(margin.l, TITLE + CHARACTER * max((len(_plain(name)) for name in names), default=0))
-    place = f'x="{left:g}" y="{margin.t}" height="{height - margin.t - margin.b}" overflow="visible"'
-    width = f'style="width: calc(100% - {left + margin.r:g}px)"'
+    size = f"width: calc(100% - {left + margin.r:g}px); height: {height - margin.t - margin.b:g}px"
+    place = f"position: relative; left: {left:g}px; top: {margin.t:g}px; {size}; overflow: visible"
     inside = [*_grid(up), *_rules(figure), *(mark for trace in figure.data for mark in _marks(trace, across, up))]
     texts = [*_texts(figure), *_tick_names(across, up), *_titles(across, up, height - margin.t - margin.b, left)]
     stretched = f'viewBox="0 0 {UNITS} {UNITS}" width="100%" height="100%" preserveAspectRatio="none"'
     return Markup(
-        f'<svg class="sketch" width="100%" height="{height}" aria-hidden="true"><svg {place} {width}>'
-        f"<svg {stretched}>{''.join(inside)}</svg>{''.join(texts)}</svg></svg>"
+        f'<svg class="sketch" aria-hidden="true" style="{place}">'
+        f"<svg {stretched}>{''.join(inside)}</svg>{''.join(texts)}</svg>"
     )
 
 
@@ -104,7 +104,8 @@ def _joined(x: Sequence[float], y: Sequence[float]) -> str:
 
 
 def _text(text: object, x: str, y: str, anchor: str, size: float = 12, more: str = "") -> str:
-    ink = _style(fill=INK, **{"font-size": f"{size:g}px", "text-anchor": anchor})
+    rim = {"stroke": "var(--page)", "stroke-width": "4px", "paint-order": "stroke"}
+    ink = _style(fill=INK, **rim, **{"font-size": f"{size:g}px", "text-anchor": anchor})
     return f'<text x="{x}" y="{y}" {more} {ink}>{escape(_plain(text))}</text>'
 
 
