@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 
 export OMP_NUM_THREADS ?= 2
 
-.PHONY: study test slow check format faults bench clean
+.PHONY: study test slow check docs format faults bench clean
 
 study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
 	$(BIN)/shipid study run quick
@@ -27,6 +27,13 @@ check: $(STAMP)          ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The site: warnings are errors, links are checked, nothing is fetched. What builds it is a stamp beside that of the rest.
+DOCS := $(VENV)/.installed-docs
+
+docs: $(DOCS)            ## the documentation as a site, in docs/_build/html
+	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "site: docs/_build/html/index.html"
+
 format: $(STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -41,10 +48,14 @@ bench: $(STAMP)          ## timings: never in tests
 	$(BIN)/python -m tests.benchmarks
 
 clean:
-	rm -rf $(VENV) results .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) results docs/_build docs/generated .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(STAMP): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+$(DOCS): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	touch $@

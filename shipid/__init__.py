@@ -47,9 +47,12 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.simulation.truth import Truth as Truth
     from shipid.simulation.truth import simulate as simulate
     from shipid.study.contents import write_pages as write_pages
+    from shipid.study.matched import Comparison as Comparison
+    from shipid.study.matched import compare as compare
     from shipid.study.plan import Plan as Plan
     from shipid.study.plan import read_plan as read_plan
     from shipid.study.results import Results as Results
+    from shipid.study.results import read_cells as read_cells
     from shipid.study.results import read_results as read_results
     from shipid.study.run import run_study as run_study
     from shipid.study.screen import screen as screen
@@ -67,6 +70,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
 _PUBLIC = {
     "Alone": "shipid.hybrid.alone",
     "Case": "shipid.hybrid.method",
+    "Comparison": "shipid.study.matched",
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
     "Fitted": "shipid.hybrid.method",
@@ -88,6 +92,7 @@ _PUBLIC = {
     "Vessel": "shipid.vessel.load",
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
+    "compare": "shipid.study.matched",
     "cut_windows": "shipid.data.windows",
     "draw": "shipid.vessel.perturb",
     "events": "shipid.study.start",
@@ -101,6 +106,7 @@ _PUBLIC = {
     "members": "shipid.vessel.perturb",
     "perform": "shipid.simulation.perform",
     "position_error": "shipid.metrics",
+    "read_cells": "shipid.study.results",
     "read_dataset": "shipid.data.dataset",
     "read_mapping": "shipid.logs.mapping",
     "read_plan": "shipid.study.plan",

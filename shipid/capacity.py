@@ -1,12 +1,23 @@
-"""Memory that this machine can give: what cannot be had is refused before it is asked for."""
+"""What this machine is and has: its processor, and memory; what cannot be had is refused before it is asked for."""
 
 from __future__ import annotations
 
 import os
+import platform
 from pathlib import Path
 
 GIB = 2**30
 _GROUP = Path("/sys/fs/cgroup")  # limits of a container
+
+
+def processor() -> str:
+    """Name of the processor; its family where the system tells no more."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
 
 
 def memory() -> int:

@@ -227,10 +227,22 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
             message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
             message = "missing"
+        elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            path, message = _of_no_kind(path, first)
         else:
             shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
             message = shown + first["msg"].removeprefix("Value error, ")
         raise DocumentError(message, file=file, path=path) from None
+
+
+def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
+    """Path of the key that chooses between kinds of a block, and what is wrong with it."""
+    key = problem["ctx"]["discriminator"].strip("'")
+    if problem["type"] == "union_tag_not_found":
+        return f"{path}.{key}", "missing"
+    tag = problem["ctx"]["tag"]
+    valid = [name.strip("' ") for name in problem["ctx"]["expected_tags"].split(",")]
+    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(str(tag), valid)}"
 
 
 def _place(data: Any, location: tuple[int | str, ...]) -> Iterator[str]:
@@ -258,9 +270,15 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
                 inner += _alternatives(field.annotation) if field else []
             elif get_args(kind):
                 inner += _alternatives(get_args(kind)[-1])
-        kinds = inner or kinds  # the name of a union member is no key
+        kinds = inner or _of_kind(kinds, part) or kinds  # the name of a union member is no key
     models = [kind for kind in kinds if hasattr(kind, "model_fields")]
     return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
+
+
+def _of_kind(models: list[Any], tag: int | str) -> list[Any]:
+    """The models whose key `kind` is the tag."""
+    fields = [(model, getattr(model, "model_fields", {}).get("kind")) for model in models]
+    return [model for model, field in fields if field is not None and get_args(field.annotation) == (tag,)]
 
 
 def _alternatives(annotation: Any) -> list[Any]:

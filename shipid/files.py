@@ -129,7 +129,12 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
 
 def write_json(file: Path, content: Any) -> None:
     """Write plain data as JSON; a number that is not finite becomes null."""
-    write_text(file, json.dumps(_plain(content), indent=1))
+    write_text(file, json_text(content))
+
+
+def json_text(content: Any) -> str:
+    """Write plain data, NumPy's numbers and paths among them, as the text of JSON; what is not finite is null."""
+    return json.dumps(_plain(content), indent=1)
 
 
 def read_json(file: Path) -> Any:
@@ -179,8 +184,10 @@ def _plain(value: Any) -> Any:
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
-    if isinstance(value, np.generic):
-        value = value.item()
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

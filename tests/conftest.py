@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,10 @@ torch.set_num_threads(1)  # the machine is shared
 
 LAG = {
     "n": {"kind": "first_order", "T": 1.0, "rate": 0.17},
-    "alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21},
+    "alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21, "low": -2.0, "high": 2.0},
 }
 ROLL = {"inertia.I_x": 4.8e6, "inertia.z_G": -0.9, "added_mass.K_pdot": -2.3e6, "hull.derivatives.K_p": -4e5}
+ROLL |= {"hull.derivatives.Y_phiuu": 400.0, "hull.derivatives.N_vvphi": -9e3}
 PITCH = {"inertia.I_y": 3.8e7, "added_mass.Z_wdot": -1.2e6, "added_mass.M_qdot": -8e7, "added_mass.K_vdot": -1e5}
 PRIME = {"L_pp": 28.9, "Y_v": -0.03, "Y_r": 0.008, "N_v": -0.01, "N_r": -0.006, "X_vv": -0.004, "Y_v|r|": -0.03}
 
@@ -45,10 +47,23 @@ PATCHED: dict[str, tuple[str, Mapping[str, Any]]] = {
 }
 
 
+#: ships of public simulators, each for a range of speeds of its own: tests/vessel/test_published.py has their laws
+SIMULATED = ("container-175", "cybership2", "esso-190k", "naval-51", "otter", "supply-vessel")
+OF_LAWS = [name for name in bundled("models") if name not in SIMULATED]
+
+
+@cache
+def structure(name: str) -> Vessel:
+    """A bundled vessel, or a patched one."""
+    if name not in PATCHED:
+        return load_vessel(name)
+    base, values = PATCHED[name]
+    return load_vessel(base).with_values(values)
+
+
 def variety() -> dict[str, Vessel]:
-    """Bundled vessels and patched ones, by name."""
-    found = {name: load_vessel(name) for name in bundled("models")}
-    return found | {name: load_vessel(base).with_values(values) for name, (base, values) in PATCHED.items()}
+    """Every structure by name: bundled vessels, without the simulators' ships, and patched ones."""
+    return {name: structure(name) for name in (*OF_LAWS, *PATCHED)}
 
 
 @pytest.fixture(scope="session")
@@ -63,7 +78,7 @@ def shared_data() -> Path:
 @pytest.fixture(scope="session", params=list(variety()))
 def vessel(request: pytest.FixtureRequest) -> Vessel:
     """Every structure in turn."""
-    return variety()[request.param]
+    return structure(request.param)
 
 
 @pytest.fixture(scope="session", params=list(bundled("models")))

@@ -1,4 +1,4 @@
-"""Memory: what cannot be had is said in GiB."""
+"""The machine: its processor has a name, and memory that cannot be had is said in GiB."""
 
 from __future__ import annotations
 
@@ -27,3 +27,8 @@ def test_the_limit_of_a_container_counts(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert capacity.memory() == whole
     (tmp_path / "memory.max").write_text("1048576\n")
     assert capacity.memory() == 1048576
+
+
+def test_the_processor_has_a_name() -> None:
+    assert capacity.processor().strip()
+    assert "\n" not in capacity.processor()

@@ -44,6 +44,8 @@ MIRROR_OF_A_TERM = {  # a tunnel's shaft drives sideways, so the mirrored unit t
     "thruster.tunnel": {"n": -1},
     "radiation.roll": {"state": -1},
 }
+WHOLE_CIRCLE = {"beta_deg": [-180.0, -65.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
+EXAMPLES = {"thruster.quadratic": "naval-51"}  # a vessel other than the first that has the term
 SCALE_OF_STATES = {"radiation.heave_pitch": [1.0] * 6 + [0.0] * 6}  # metres, then radians
 DRAWN_COMPONENTS = ("waves.first_order", "waves.drift")  # forces of the sea: not zero at rest, no numbers of their own
 DISSIPATIVE = ("hull.crossflow", "hull.resistance")
@@ -110,12 +112,18 @@ def _columns(key: str, block: Mapping[str, Any]) -> dict[str, Any]:
     return dict(zip(widths, [[ca.DM(row) for row in part] for part in parts], strict=True))
 
 
+@cache
+def _all_on(name: str) -> Vessel:
+    """A bundled vessel with every term switched on."""
+    document = load_vessel(name).document
+    off = [path for path, value in documents.leaves(document) if path.endswith(".off") and value]
+    return check_vessel(documents.replace(document, dict.fromkeys(off, False)), name)
+
+
 def _with_term(key: str) -> tuple[Vessel, str]:
     """A vessel that has this term, switched on, and where; made up if no bundled vessel has one."""
-    for name in documents.bundled("models"):
-        document = load_vessel(name).document
-        off = [path for path, value in documents.leaves(document) if path.endswith(".off") and value]
-        vessel = check_vessel(documents.replace(document, dict.fromkeys(off, False)), name)
+    for name in sorted(documents.bundled("models"), key=lambda name: name != EXAMPLES.get(key)):
+        vessel = _all_on(name)
         for path, found, _ in term_blocks(vessel.document):
             if found == key:
                 return vessel, path
@@ -137,6 +145,7 @@ def _made_up(key: str) -> dict[str, Any]:
             block |= accepted if parameter.kind == "open" else {name: accepted}
         elif parameter.kind == "list":
             block[name] = [0.0, 45.0, 90.0, 135.0, 180.0] if name.endswith("_deg") else [0.0, 0.7, 0.9, 0.4, 0.0]
+            block[name] = WHOLE_CIRCLE.get(name, block[name])
         elif name not in SHARED:
             block[name] = 0.5 + uniform(key, name)
     return block

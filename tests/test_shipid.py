@@ -111,9 +111,17 @@ def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest
     assert Path("gain.html").is_file()
 
 
+def test_cells_of_the_documentation_are_read(tiny_run: Path) -> None:
+    space: dict[str, Any] = {}
+    text = blocks("python.md")[2]
+    assert '"results/quick-69699190"' in text
+    exec(text.replace('"results/quick-69699190"', repr(str(tiny_run))), space)
+    assert len(space["cells"]) == 8
+
+
 def test_frames_of_the_documentation_are_drawn() -> None:
     space: dict[str, Any] = {}
-    exec(blocks("python.md")[2], space)
+    exec(blocks("python.md")[3], space)
     assert space["figure"].layout.yaxis.type == "log"
 
 

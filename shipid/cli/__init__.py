@@ -7,13 +7,12 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
+from shipid.cli import data, export, identify, predict, replay, schema, simulation, study, vessel
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     help="How good must the physics be, and how much data is needed, to predict a ship's trajectory?",
 )
@@ -22,6 +21,7 @@ app.command("manoeuvre")(simulation.manoeuvre)
 app.command("replay")(replay.replay)
 app.command("identify")(identify.identify)
 app.command("predict")(predict.predict)
+app.command("schema")(schema.schema)
 app.command("export")(export.export)
 app.command("aboard")(export.aboard)
 app.add_typer(vessel.app, name="vessel")

@@ -7,14 +7,25 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.terminal import criterion_table, measure_table, reading, show, table, write_measures
+from shipid.cli.answer import Answer, Json, answering
+from shipid.cli.completion import beginning, files
+from shipid.cli.options import MappingName
+from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 
 
+def _public(incomplete: str) -> list[str]:
+    from shipid.document import bundled
+
+    return beginning(incomplete, bundled("studies/mappings"))
+
+
 @app.command("fetch")
-def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")]) -> None:
+def data_fetch(
+    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_public)],
+) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
     from shipid.logs.catalogue import fetch
 
@@ -23,7 +34,7 @@ def data_fetch(name: Annotated[str, typer.Argument(help="a public log, such as g
 
 @app.command("import")
 def data_import(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")] = "",
+    mapping: MappingName = "",
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[
         Path | None, typer.Option(help="file to write, .parquet (with --guess .toml); default: in this folder")
@@ -34,12 +45,14 @@ def data_import(
         typer.Option(help="draft a mapping of this log, folder of logs or glob in quotes, instead of importing it"),
     ] = None,
     names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
+    as_json: Json = False,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
-        _draft(guess, tuple(filter(None, names.split(","))), out)
+        with answering(as_json) as answer:
+            _draft(guess, tuple(filter(None, names.split(","))), out, answer)
         return
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
@@ -56,44 +69,53 @@ def data_import(
         dataset = import_log(declared, source, without=without or (), progress=progress)
     file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
     repairs = dataset.metadata.get("repairs", [])
-    if repairs:
+    with answering(as_json) as answer:
         rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
-        show(table(["repair", "column", "count", "what was done"], rows))
-    typer.echo(f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> {file}")
+        shown = table(["repair", "column", "count", "what was done"], rows)
+        answer.rows("repairs", repairs, shown if repairs else None)
+        counts = {"rows": len(dataset.frame), "runs": len(dataset.runs)}
+        answer.say(f"{counts['rows']} rows in {counts['runs']} runs -> {file}", file=file, **counts)
 
 
-def _draft(log: Path, names: tuple[str, ...], out: Path | None) -> None:
-    from shipid.files import write_new
+def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) -> None:
+    from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import draft_mapping
+    from shipid.schemas import with_schema
 
     guessed = guess(log, names)
-    file = write_new(draft_mapping(guessed), out or Path(f"{guessed.file.resolve().stem}.toml"))
-    rows = ((c.name, c.source, c.unit, f"{c.confidence:.0%}", c.evidence) for c in guessed.columns)
-    show(table(["column", "from", "unit", "sure", "why"], rows))
-    if guessed.findings:
-        show(
-            table(["finding", "sure", "what"], ((f.kind, f"{f.confidence:.0%}", f.sentence) for f in guessed.findings))
-        )
+    file = out or Path(f"{guessed.file.resolve().stem}.toml")
+    check_new(file, "mapping")
+    write_new(with_schema(draft_mapping(guessed), file, "mapping"), file)
+    columns = [
+        {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
+        for c in guessed.columns
+    ]
+    shown = ((*list(c.values())[:3], f"{c['sure']:.0%}", c["why"]) for c in columns)
+    answer.rows("columns", columns, table(["column", "from", "unit", "sure", "why"], shown))
+    found = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
+    shown = ((f["finding"], f"{f['sure']:.0%}", f["what"]) for f in found)
+    answer.rows("findings", found, table(["finding", "sure", "what"], shown) if found else None)
     source = guessed.source
     if source.pattern is not None:
-        typer.echo(f"{len(source.files)} files {source.pattern!r} are one source of as many runs")
-    if source.skipped:
-        show(table(["left out", "because"], source.skipped.items()))
-    for note in guessed.sniffed.notes:
-        typer.echo(f"note: {note}")
-    if guessed.unused:
-        typer.echo(f"not used: {', '.join(map(repr, guessed.unused))}")
-    for question in guessed.questions:
-        typer.echo(f"? {question.sentence}")
-    typer.echo(f"draft -> {file}: read it before you import with it")
+        said = f"{len(source.files)} files {source.pattern!r} are one source of as many runs"
+        answer.say(said, files=len(source.files), pattern=source.pattern)
+    left = [{"left out": name, "because": why} for name, why in source.skipped.items()]
+    answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)
+    notes = [f"note: {note}" for note in guessed.sniffed.notes]
+    answer.say("\n".join(notes), notes=guessed.sniffed.notes)
+    answer.say(f"not used: {', '.join(map(repr, guessed.unused))}" if guessed.unused else "", unused=guessed.unused)
+    questions = [question.sentence for question in guessed.questions]
+    answer.say("\n".join(f"? {question}" for question in questions), questions=questions)
+    answer.say(f"draft -> {file}: read it before you import with it", file=file)
 
 
 @app.command("segment")
 def data_segment(
-    mapping: Annotated[str, typer.Argument(help="bundled mapping or path of one")],
+    mapping: MappingName,
     log: Annotated[Path | None, typer.Argument(help="raw log; default: the public original of the mapping")] = None,
     out: Annotated[Path | None, typer.Option(help="TOML file to write; default: in this folder")] = None,
+    as_json: Json = False,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
     from shipid.files import write_new
@@ -105,14 +127,22 @@ def data_segment(
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch(mapping))
     file = write_new(segments_text(segments, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
-    show(table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in segments)))
-    typer.echo(f"{len(segments)} segments -> {file}")
+    with answering(as_json) as answer:
+        answer.rows(
+            "segments",
+            [{"run": s.run, "start": s.start, "end": s.end} for s in segments],
+            table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in segments)),
+        )
+        answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 
 @app.command("check")
 def data_check(
-    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    dataset: Annotated[
+        Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=files(".parquet"))
+    ],
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
+    as_json: Json = False,
 ) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
     from shipid.data.checks import check_dataset
@@ -122,47 +152,53 @@ def data_check(
         raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
     log = read_dataset(dataset)
     checks = check_dataset(log)
-    if html is not None:
-        from shipid.data.contents import check_content
-        from shipid.report.checks import write_checks
-
-        typer.echo(f"plots: {write_checks(check_content(dataset.stem, log, checks), html)}")
     ok = checks["ok"].astype(bool)
-    counts = (
-        (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
-        for name, group in checks.groupby("check", sort=False)
-    )
-    show(table(["check", "runs", "failed"], counts))
-    failed = int((~ok).sum())
-    if failed:
-        rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
-        show(table(["run", "failed", "what to look at"], rows))
-    typer.echo(f"{len(checks) - failed} of {len(checks)} checks passed")
-    if failed:
-        raise typer.Exit(1)
+    with answering(as_json) as answer:
+        if html is not None:
+            from shipid.data.contents import check_content
+            from shipid.report.checks import write_checks
+
+            page = write_checks(check_content(dataset.stem, log, checks), html)
+            answer.say(f"plots: {page}", page=page)
+        counts = (
+            (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
+            for name, group in checks.groupby("check", sort=False)
+        )
+        answer.rows("checks", checks, table(["check", "runs", "failed"], counts))
+        failed = int((~ok).sum())
+        if failed:
+            rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
+            answer.rows("failed", checks[~ok], table(["run", "failed", "what to look at"], rows))
+        answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
+        if failed:
+            raise typer.Exit(1)
 
 
 @app.command("measures")
 def data_measures(
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)", autocompletion=files(".parquet"))],
     manoeuvre: Annotated[
         str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
     ] = None,
     length: Annotated[float | None, typer.Option(help="of the ship between perpendiculars in m, for criteria")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
+    as_json: Json = False,
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
     from shipid.data.dataset import read_dataset
+    from shipid.files import write_table
     from shipid.logs.measuring import measure_dataset
 
     result = measure_dataset(read_dataset(dataset), manoeuvre, length)
-    if len(result.measures):
-        show(measure_table(result.measures.to_dict("records"), ["run", "kind"]))
-    if len(result.criteria):
-        show(criterion_table(result.criteria.to_dict("records"), ["run"]))
-    if result.left:
-        show(table(["run", "not measured, because"], result.left.items()))
-    measured = result.measures["run"].nunique() if len(result.measures) else 0
-    typer.echo(f"{measured} runs measured, {len(result.left)} not")
-    if csv is not None:
-        write_measures(result.measures, csv)
+    measures, criteria = (frame.to_dict("records") for frame in (result.measures, result.criteria))
+    left = [{"run": run, "because": why} for run, why in result.left.items()]
+    with answering(as_json) as answer:
+        answer.rows("measures", measures, measure_table(measures, ["run", "kind"]) if measures else None)
+        answer.rows("criteria", criteria, criterion_table(criteria, ["run"]) if criteria else None)
+        shown = table(["run", "not measured, because"], result.left.items())
+        answer.rows("left", left, shown if left else None)
+        measured = result.measures["run"].nunique() if measures else 0
+        answer.say(f"{measured} runs measured, {len(left)} not")
+        if csv is not None:
+            write_table(csv, result.measures)
+            answer.say(f"measures -> {csv}", csv=csv)

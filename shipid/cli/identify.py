@@ -9,22 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.options import command_line, pairs, parsed, stem
-from shipid.cli.terminal import digits, iterations, show, table
+from shipid.cli.answer import Answer, Json, answering
+from shipid.cli.completion import files
+from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
+from shipid.cli.terminal import digits, iterations, steps, table
 from shipid.errors import ShipidError
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identified
+    from shipid.identification.settings import Identify
+    from shipid.study.structures import Compared
     from shipid.vessel.load import Vessel
 
 
 def identify(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    vessel: VesselName,
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     parameters: Annotated[
         list[str] | None,
-        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...[order >= 3]"'),
+        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...\\[order >= 3]"'),
     ] = None,
     fixed: Annotated[list[str] | None, typer.Option(help="paths to leave out of --parameters")] = None,
     together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
@@ -43,25 +47,46 @@ def identify(
     settings: Annotated[Path | None, typer.Option(help="TOML file with an \\[identify] table to begin with")] = None,
     runs: Annotated[list[str] | None, typer.Option(help="runs to fit, * for any part of a name; default: all")] = None,
     test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
-    ahead: Annotated[float, typer.Option(help="s of each free run that tests the result; 0: whole runs")] = 0.0,
+    ahead: Annotated[
+        float | None,
+        typer.Option(
+            help="s of each free run that tests the result; 0: whole runs (default); with --structures that of a study"
+        ),
+    ] = None,
     profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
     band: Annotated[
         float | None, typer.Option(help="level of bands on the measures of standard manoeuvres, such as 0.9")
     ] = None,
     design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
+    structures: Annotated[
+        str | None,
+        typer.Option(
+            help="compare structures of the hull by runs held out: present, mmg, modulus, cubic, abkowitz with commas "
+            "between, or all"
+        ),
+    ] = None,
+    folds: Annotated[int, typer.Option(help="of --structures: parts of the runs, each held out in turn")] = 3,
     out: Annotated[
-        Path | None, typer.Option(help="patch to write, .toml; default: <vessel>-identified.toml in this folder")
+        Path | None,
+        typer.Option(
+            help="patch to write, .toml; default: <vessel>-identified.toml in this folder; with --structures the "
+            "vessel with the structure chosen, <vessel>-structure.toml"
+        ),
     ] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
+    as_json: Json = False,
 ) -> None:
-    """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch."""
+    """Identify numbers of a vessel from runs: estimates with intervals, tests on runs held out, a patch.
+
+    With --structures, hulls of several structures are fitted to the same runs and compared on runs held out.
+    """
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
     from shipid.identification.outcome import read_settings, run_identification, write_patch
     from shipid.vessel.load import load_vessel
 
-    file = out or Path(f"{stem(vessel)}-identified.toml")
-    check_new(file, "patch")
+    file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
+    check_new(file, "vessel" if structures else "patch")
     if html is not None and html.suffix != ".html":
         raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
     given: dict[str, Any] = {
@@ -74,31 +99,127 @@ def identify(
         "horizon": horizon,
     }
     options = {key: value for key, value in given.items() if value is not None}
+    if structures is not None and settings is None and parameters is None:
+        options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
-    _look(ship, log, runs or (), test or ())
+    with answering(as_json) as answer:
+        _look(ship, log, runs or (), test or (), answer)
+        if structures is not None:
+            given_up = {"--profile": profile, "--design": design}
+            needless = next((name for name, value in given_up.items() if value), None)
+            if needless is not None:
+                raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
+            how = {"runs": runs or (), "held_out": test or (), "ahead": ahead, "folds": folds}
+            _compare(ship, log, declared, structures, how, band, file, html, dataset, answer)
+            return
+        try:
+            with iterations() as progress:
+                outcome = run_identification(
+                    ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
+                    programme=design, band=band, progress=progress,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            sys.stderr.write("interrupted: nothing was written\n")
+            sys.exit(130)
+        _show_identified(outcome, answer)
+        write_patch(outcome, file)
+        count = len(outcome.solution.values)
+        answer.say(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}", file=file)
+        if html is not None:
+            from shipid.identification.contents import identification_content
+            from shipid.report.identification import write_identification
+
+            content = identification_content(outcome, dataset, command_line())
+            answer.say(f"page -> {write_identification(content, html)}", page=html)
+
+
+def _compare(
+    ship: Vessel,
+    log: Dataset,
+    declared: Identify,
+    structures: str,
+    how: dict[str, Any],
+    band: float | None,
+    file: Path,
+    html: Path | None,
+    dataset: Path,
+    answer: Answer,
+) -> None:
+    """Compare structures of the hull, print what was found, and write the vessel with the structure chosen."""
+    from shipid.identification.structures import PRESENT, STRUCTURES
+    from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
+
+    names = [PRESENT, *STRUCTURES] if structures == "all" else [name.strip() for name in structures.split(",")]
     try:
-        with iterations() as progress:
-            outcome = run_identification(
-                ship, log, declared, runs or (), test or (), ahead=ahead, profiles=profile or (), programme=design,
-                band=band, progress=progress,
-            )  # fmt: skip
+        with steps() as say:
+            found = compare_structures(ship, log, declared, names, level=band or LEVEL, say=say, **how)
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
         sys.exit(130)
-    _show_identified(outcome)
-    write_patch(outcome, file)
-    count = len(outcome.solution.values)
-    typer.echo(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}")
+    _show_structures(found, answer)
+    written = write_chosen(found, file)
+    answer.say(f"vessel with the structure {found.chosen} -> {written}", chosen=found.chosen, file=written)
     if html is not None:
-        from shipid.identification.contents import identification_content
-        from shipid.report.identification import write_identification
+        from shipid.report.structures import write_structures
 
-        content = identification_content(outcome, dataset, command_line())
-        typer.echo(f"page -> {write_identification(content, html)}")
+        page = structures_content(found, dataset, command_line())
+        answer.say(f"page -> {write_structures(page, html)}", page=html)
 
 
-def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) -> None:
+def _show_structures(found: Compared, answer: Answer) -> None:
+    """Print errors on runs held out, standard manoeuvres, errors by side, and what to run next."""
+    from math import degrees
+
+    from shipid.identification.sides import HEADS, shown
+
+    length = f"of {found.ahead:g} s" if found.ahead else "as long as the runs"
+    answer.say(
+        f"{found.vessel.name}: {len(found.runs)} runs; free runs {length} that the fit has not seen, mean of RMS:"
+    )
+    rows = [
+        [
+            row["structure"],
+            str(row["numbers"]),
+            *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"], row["more"])),
+            f"{row['low']:.3g} ... {row['high']:.3g}" if row["low"] == row["low"] else "-",
+            digits(row["test"]),
+            row["note"],
+        ]
+        for row in found.table.to_dict("records")
+    ]
+    heads = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "more [m]", "95 % interval"]
+    answer.rows("structures", found.table, table([*heads, "test runs [m]", ""], rows))
+    known = [row for row in found.manoeuvres.to_dict("records") if row["measure"]]
+    names = [name for name in found.table["structure"] if name in {row["structure"] for row in known}]
+    wide = {(row["manoeuvre"], row["measure"]): row for row in found.spread.to_dict("records")}
+    rows = []
+    for place in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in known):
+        by = {row["structure"]: row for row in known if (row["manoeuvre"], row["measure"]) == place}
+        cells = [_with_interval(by[name]) if name in by else "-" for name in names]
+        two = [digits(wide[place][name]) if place in wide else "-" for name in ("spread", "width")]
+        rows.append([*place, *cells, *two, next(iter(by.values()))["unit"]])
+    heads = ["calm water", "measure", *names, "between", "within", "unit"]
+    answer.rows("manoeuvres", found.manoeuvres, table(heads, rows))
+    answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
+    if len(found.groups):
+        answer.say(f"Errors of {found.chosen} by side, helm and speed, on runs that the fit has not seen:")
+        answer.rows("groups", found.groups, table(list(HEADS), shown(found.groups)))
+    answer.say("\n".join(found.sentences), sentences=list(found.sentences))
+    for name, fit in found.fits.items():
+        if fit.caution:
+            typer.echo(f"warning: intervals of {name}: {fit.caution}", err=True)
+    notes = found.manoeuvres[(found.manoeuvres["note"].fillna("") != "") & (found.manoeuvres["measure"] == "")]
+    for row in notes.to_dict("records"):
+        typer.echo(f"warning: {row['structure']}, {row['manoeuvre']}: {row['note']}", err=True)
+
+
+def _with_interval(row: Any) -> str:
+    within = f" ({row['low']:.3g} ... {row['high']:.3g})" if row["low"] == row["low"] else ""
+    return f"{digits(row['value'])}{within}"
+
+
+def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say what is off between vessel and log before anything is fitted, and draft the correction."""
     from shipid.errors import DataError
     from shipid.identification.outcome import pick_runs
@@ -111,10 +232,15 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str]) 
         found = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
         return  # the fit says what is missing
-    typer.echo(f"warning: {found.sentence}" if found.wrong else found.sentence, err=found.wrong)
+    if found.wrong:
+        typer.echo(f"warning: {found.sentence}", err=True)
+    else:
+        answer.say(found.sentence)
+    answer.say(first_look=found.sentence)
     if found.changes:
-        typer.echo("draft of a correction, to begin with:")
-        typer.echo(found.patch(str(ship.file)))
+        answer.say("draft of a correction, to begin with:")
+        patch = found.patch(str(ship.file))
+        answer.say(patch, correction=patch)
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:
@@ -127,13 +253,16 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
-def _show_identified(outcome: Identified) -> None:
+def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
+    from shipid.identification.sides import HEADS, shown
+
     solution = outcome.solution
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
     )
-    typer.echo(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s")
+    status = {"status": solution.status, "runs": outcome.runs, "held_out": outcome.held_out}
+    answer.say(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s", **status)
     rows: list[list[str]] = [
         [
             row["path"] + (f" (with {row['with']})" if row["with"] else ""),
@@ -149,15 +278,15 @@ def _show_identified(outcome: Identified) -> None:
         for row in outcome.estimates.to_dict("records")
     ]
     columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
-    show(table(columns, rows))
+    answer.rows("estimates", outcome.estimates, table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
-    typer.echo(
+    answer.say(
         f"Factors are on the base; standard errors and intervals are theirs, by {words[outcome.statistics.chosen]}."
     )
-    for sentence in outcome.unseen:
-        typer.echo(f"  {sentence}")
-    typer.echo(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
-    show(table(["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], _free_rows(outcome)))
+    answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
+    answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
+    heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
+    answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
     banded = "low" in outcome.manoeuvres
     compared = [
         [
@@ -167,17 +296,29 @@ def _show_identified(outcome: Identified) -> None:
         ]
         for row in outcome.manoeuvres.to_dict("records")
     ]
-    show(table(["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"], compared))
-    for curve in outcome.profiles:
-        typer.echo(f"profile: {curve.sentence}")
+    heads = ["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"]
+    answer.rows("manoeuvres", outcome.manoeuvres, table(heads, compared))
+    beyond = list(outcome.beyond)
+    answer.say("\n".join(f"extrapolated: {sentence}" for sentence in beyond), extrapolated=beyond)
+    if len(outcome.groups):
+        answer.say(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
+        answer.rows("groups", outcome.groups, table(list(HEADS), shown(outcome.groups)))
+    if outcome.solution.effective:
+        worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
+        counts = dict(outcome.solution.effective)
+        answer.say(f"residuals count as so many independent ones: {worth}", independent_residuals=counts)
+    profiles = [curve.sentence for curve in outcome.profiles]
+    answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:
-        typer.echo("To run next, by information per hour:")
+        answer.say("To run next, by information per hour:")
         ranked = [
             [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
              f"{1 - row['after'] / row['before']:.0%}"]
             for row in outcome.programme.head(10).to_dict("records")
         ]  # fmt: skip
-        show(table(["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"], ranked))
+        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
+        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
+    answer.say(warnings=outcome.warnings)
     for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)
 

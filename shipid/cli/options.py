@@ -9,12 +9,26 @@ from typing import Annotated, Any
 
 import typer
 
+from shipid.cli.completion import bundled_or_file, files
 from shipid.errors import DocumentError, ShipidError
 
-Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
+VesselName = Annotated[
+    str,
+    typer.Argument(
+        help="bundled name, or path of a vessel or patch document", autocompletion=bundled_or_file("models")
+    ),
+]
+StudyName = Annotated[
+    str, typer.Argument(help="bundled study or path of one", autocompletion=bundled_or_file("studies"))
+]
+MappingName = Annotated[
+    str, typer.Argument(help="bundled mapping or path of one", autocompletion=bundled_or_file("studies/mappings"))
+]
+Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d", autocompletion=files())]
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
 Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
 Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
+Leave = Annotated[bool, typer.Option("--leave", help="end when other processes in the folder work on all that is left")]
 Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
+from shipid.cli.completion import cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
 
 
 def predict(
     folder: Folder,
     log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
-    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
+    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet", autocompletion=cells)],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv")] = None,
     level: Annotated[

@@ -7,14 +7,16 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.options import command_line, stem
-from shipid.cli.terminal import digits, show, table
+from shipid.cli.answer import Json, answering
+from shipid.cli.completion import files
+from shipid.cli.options import VesselName, command_line, stem
+from shipid.cli.terminal import digits, table
 from shipid.errors import ShipidError
 
 
 def replay(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
+    vessel: VesselName,
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     runs: Annotated[
         list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
     ] = None,
@@ -22,6 +24,7 @@ def replay(
     step: Annotated[float, typer.Option(help="s, of the integration")] = 0.1,
     out: Annotated[Path | None, typer.Option(help="page to write; default: <vessel>-replay.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV or Parquet file of both motions to write")] = None,
+    as_json: Json = False,
 ) -> None:
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
     from math import degrees
@@ -52,11 +55,6 @@ def replay(
         else [row["run"], "diverges", "", "", ""]
         for row in found.errors.to_dict("records")
     ]
-    typer.echo(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
-    show(table(["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"], rows))
-    if csv is not None:
-        write_table(csv, found.series)
-        typer.echo(f"motions -> {csv}")
     content = ReplayContent(
         title=f"{ship.name}: recorded runs, replayed",
         name=ship.key,
@@ -71,4 +69,12 @@ def replay(
         },
         command=command_line(),
     )
-    typer.echo(f"page -> {write_replay(content, file)}")
+    with answering(as_json) as answer:
+        answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
+        heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
+        answer.rows("errors", found.errors.drop(columns="model"), table(heads, rows))
+        if csv is not None:
+            write_table(csv, found.series)
+            answer.say(f"motions -> {csv}", csv=csv)
+        page = write_replay(content, file)
+        answer.say(f"page -> {page}", page=page)

@@ -7,17 +7,25 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.options import Changes, command_line, parsed, stem
-from shipid.cli.terminal import criterion_table, measure_table, show, table, write_measures
+from shipid.cli.answer import Json, answering
+from shipid.cli.completion import bundled_or_file
+from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
+from shipid.cli.terminal import criterion_table, measure_table, table
 from shipid.errors import DocumentError, ShipidError
 
 
 def simulate(
-    study: Annotated[str, typer.Argument(help="bundled name or path of a study with a [truth]")],
+    study: Annotated[
+        str,
+        typer.Argument(
+            help="bundled name or path of a study with a \\[truth]", autocompletion=bundled_or_file("studies")
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet in this folder")
     ] = None,
     changes: Changes = None,
+    as_json: Json = False,
 ) -> None:
     """Simulate the truth of a study into a dataset, and show its envelope beside the published one."""
     from shipid.data.dataset import write_dataset
@@ -40,9 +48,12 @@ def simulate(
         for name, part in ranges.groupby("set", sort=False)
     ]
     file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
-    typer.echo(f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> {file}")
-    typer.echo("least / mean / greatest at the instants of prediction:")
-    show(table(["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())], rows))
+    with answering(as_json) as answer:
+        counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
+        answer.say(f"{counts['runs']} runs, {counts['rows']} rows -> {file}", file=file, **counts)
+        answer.say("least / mean / greatest at the instants of prediction:")
+        heads = ["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())]
+        answer.rows("envelope", ranges, table(heads, rows))
 
 
 def _limits(row: Any) -> str:
@@ -50,7 +61,7 @@ def _limits(row: Any) -> str:
 
 
 def manoeuvre(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")],
+    vessel: VesselName,
     name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
     angles: Annotated[
         list[float] | None,
@@ -65,32 +76,44 @@ def manoeuvre(
     side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
     step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
+    approach: Annotated[
+        str | None,
+        typer.Option(
+            help="steady (helm amidships), helmsman (holds the course) or rest; default: steady, and the helmsman for "
+            "a ship that does not go straight"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="HTML page to write; default: <vessel>-<name>.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file of the measures to write")] = None,
     log: Annotated[Path | None, typer.Option(help="dataset of the run to write, .parquet")] = None,
+    as_json: Json = False,
 ) -> None:
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from shipid.data.dataset import Dataset, write_dataset
+    from shipid.files import write_table
     from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import manoeuvre_content, measure_standard
+    from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
     if log is not None and log.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
     ship = load_vessel(vessel)
-    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, step=step)
-    title, rpm = done.standard.title, done.standard.manoeuvre.n_rpm
-    typer.echo(f"{ship.name}: {title}, approach at {done.standard.speed:.3g} m/s ({rpm:.4g} rpm)")
-    show(measure_table(done.measures, []))
-    if done.criteria:
-        show(criterion_table(done.criteria, []))
-    if csv is not None:
-        import pandas as pd
+    done = measure_standard(
+        ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
+    )
+    title = done.standard.title
+    with answering(as_json) as answer:
+        answer.say(f"{ship.name}: {title}, {approached(done.standard)}", title=title, speed=done.standard.speed)
+        answer.rows("measures", done.measures, measure_table(done.measures, []))
+        answer.rows("criteria", done.criteria, criterion_table(done.criteria, []) if done.criteria else None)
+        if csv is not None:
+            import pandas as pd
 
-        write_measures(pd.DataFrame(done.measures), csv)
-    if log is not None:
-        source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
-        typer.echo(f"log -> {write_dataset(Dataset(done.frame, source), log)}")
-    content = manoeuvre_content(done, command_line())
-    page = out or Path(f"{stem(vessel)}-{name}.html")
-    typer.echo(f"page -> {write_manoeuvre(content, page)}")
+            write_table(csv, pd.DataFrame(done.measures))
+            answer.say(f"measures -> {csv}", csv=csv)
+        if log is not None:
+            source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
+            answer.say(f"log -> {write_dataset(Dataset(done.frame, source), log)}", log=log)
+        content = manoeuvre_content(done, command_line())
+        page = write_manoeuvre(content, out or Path(f"{stem(vessel)}-{name}.html"))
+        answer.say(f"page -> {page}", page=page)

@@ -3,69 +3,95 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from shipid.cli.options import Changes, Device, Folder, Scheduler, Workers, parsed, stem
-from shipid.cli.terminal import counted, digits, draw, show, show_reasons, table
+from shipid.cli.answer import Answer, Json, answering
+from shipid.cli.completion import bundled_or_file, files
+from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.terminal import counted, digits, draw, short, show_reasons, table
+from shipid.errors import DocumentError
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from shipid.study.matched import Comparison
     from shipid.study.plan import Plan
+    from shipid.study.results import Results
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
+MOST_DIFFERENCES = 20  # of documents, on a terminal
 FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
 
 
 @app.command("list")
-def study_list() -> None:
+def study_list(as_json: Json = False) -> None:
     """List the bundled studies."""
     from shipid.document import bundled, read
 
-    show(table(["name", "question"], ((name, read(file)["question"]) for name, file in bundled("studies").items())))
+    rows = [{"name": name, "question": read(file)["question"]} for name, file in bundled("studies").items()]
+    with answering(as_json) as answer:
+        answer.rows("studies", rows, table(["name", "question"], (row.values() for row in rows)))
 
 
 @app.command("new")
 def study_new(
-    vessel: Annotated[list[str], typer.Option(help="bundled name, or path of a vessel or patch; may be repeated")],
+    vessel: Annotated[
+        list[str],
+        typer.Option(
+            help="bundled name, or path of a vessel or patch; may be repeated", autocompletion=bundled_or_file("models")
+        ),
+    ],
     data: Annotated[
         Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="TOML file to write; default: <data or vessel>-study.toml in this folder")
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
     import shlex
 
     from shipid.files import check_new, write_new
+    from shipid.schemas import with_schema
     from shipid.study.new import draft_study
 
     file = out or Path(f"{stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
     draft = draft_study(vessel, data, file)
-    write_new(draft.text, file, "study")
-    show_reasons([(choice.path, str(choice.value), choice.why) for choice in draft.choices])
-    for warning in draft.warnings:
-        typer.echo(f"warning: {warning}", err=True)
-    for named, look in draft.looks.items():
-        if not look.wrong:
-            typer.echo(look.sentence)
-        elif look.changes:
-            typer.echo(f"draft of a correction, in the study as {look.vessel.key}-corrected; as a patch of its own:")
-            typer.echo(look.patch(named))
-    names = ", ".join(model.name for model in draft.plan.foundations)
-    typer.echo(f"{draft.plan.cells} cells of {len(draft.plan.foundations)} foundations ({names}) -> {file}")
-    typer.echo(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
+    write_new(with_schema(draft.text, file, "study"), file, "study")
+    with answering(as_json) as answer:
+        choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
+        answer.say(choices=choices)
+        if not as_json:
+            show_reasons(choices)
+        for warning in draft.warnings:
+            typer.echo(f"warning: {warning}", err=True)
+        for named, look in draft.looks.items():
+            if not look.wrong:
+                answer.say(look.sentence)
+            elif look.changes:
+                corrected = f"{look.vessel.key}-corrected"
+                answer.say(f"draft of a correction, in the study as {corrected}; as a patch of its own:")
+                patch = look.patch(named)
+                answer.say(patch, correction=patch)
+        names = [model.name for model in draft.plan.foundations]
+        said = f"{draft.plan.cells} cells of {len(names)} foundations ({', '.join(names)}) -> {file}"
+        answer.say(said, file=file, cells=draft.plan.cells, foundations=names, warnings=draft.warnings)
+        answer.say(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
 
 
 @app.command("variants")
 def study_variants(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     save: Annotated[Path | None, typer.Option(help="folder for one patch document per variant")] = None,
     accuracy: Annotated[bool, typer.Option(help="also simulate or import the data, and show A")] = True,
     changes: Changes = None,
+    as_json: Json = False,
 ) -> None:
     """Show the foundations of a study with their factors and accuracy A; save patches that rebuild them exactly."""
     from shipid.study.plan import read_plan
@@ -78,26 +104,36 @@ def study_variants(
         models = prepared.foundations
         known = [model.name for model in models if model.vessel and model.identify is None]
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
-    rows = []
-    for model in models:
-        if model.identify is not None:
-            rows.append((model.name, "-", "-", "identified from the runs of each cell, so A differs by cell"))
-            continue
-        factors = model.variant.factors if model.variant else {}
-        changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in factors.items())
-        shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)
-        score = scores.get(model.name)
-        rows.append((model.name, "-" if score is None else f"{score:.2f}", str(len(factors)), shown))
-    show(table(["foundation", "A [m]", "changed", "factors"], rows))
-    if save is not None:
-        from shipid.study.store import write_patches
+    found = [
+        {
+            "foundation": model.name,
+            "A": scores.get(model.name),
+            "identified": model.identify is not None,
+            "factors": model.variant.factors if model.variant and model.identify is None else {},
+        }
+        for model in models
+    ]
+    with answering(as_json) as answer:
+        heads = ["foundation", "A [m]", "changed", "factors"]
+        answer.rows("foundations", found, table(heads, map(_factors, found)))
+        if save is not None:
+            from shipid.study.store import write_patches
 
-        typer.echo(f"{write_patches(save, models)} patches -> {save}")
+            answer.say(f"{write_patches(save, models)} patches -> {save}", patches=save)
+
+
+def _factors(row: dict[str, Any]) -> list[str]:
+    """A foundation as words: its accuracy, how many numbers are changed, and by which factors."""
+    if row["identified"]:
+        return [row["foundation"], "-", "-", "identified from the runs of each cell, so A differs by cell"]
+    changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in row["factors"].items())
+    shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)
+    return [row["foundation"], "-" if row["A"] is None else f"{row['A']:.2f}", str(len(row["factors"])), shown]
 
 
 @app.command("screen")
 def study_screen(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     family: Annotated[str | None, typer.Argument(help="family; default: all that draw factors from a range")] = None,
     members: Annotated[int, typer.Option(min=2, max=100000, help="members of each family")] = 1000,
     out: Annotated[
@@ -105,6 +141,7 @@ def study_screen(
     ] = None,
     changes: Changes = None,
     device: Device = "cpu",
+    as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
     from shipid.files import write_table
@@ -121,20 +158,21 @@ def study_screen(
     spread = screen.spread(frame)
     shares = [f"{share:.0%}" for share in screen.SHARES]
     rows = [[*map(str, row[:3]), *(f"{value:.2f}" for value in row[3:])] for row in spread.itertuples(index=False)]
-    typer.echo("accuracy A [m] that so many of the members reach:")
-    show(table(["family", "members", "diverged", *shares], rows))
     correlations = screen.drivers(frame)
-    typer.echo("what drives A: rank correlation with a factor, and with its distance from 1:")
     pairs = [
         (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
     ]
-    show(table(["family", "parameter", "factor", "distance"], pairs))
-    typer.echo(f"{len(frame)} members -> {file}")
+    with answering(as_json) as answer:
+        answer.say("accuracy A [m] that so many of the members reach:")
+        answer.rows("accuracy", spread, table(["family", "members", "diverged", *shares], rows))
+        answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
+        answer.rows("drivers", correlations, table(["family", "parameter", "factor", "distance"], pairs))
+        answer.say(f"{len(frame)} members -> {file}", file=file)
 
 
 @app.command("rotate")
 def study_rotate(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     tests: Annotated[list[str], typer.Option(help="runs that test in turn, * for any part of a name; may be repeated")],
     out: Annotated[
         Path | None,
@@ -142,8 +180,9 @@ def study_rotate(
     ] = None,
     changes: Changes = None,
     device: Device = "cpu",
+    as_json: Json = False,
 ) -> None:
-    """Test on every run in turn and train on all others: how much the answer depends on the choice of the test run."""
+    """Test on every run in turn and train on all others; the same command goes on after an interruption."""
     from shipid.files import write_table
     from shipid.study import rotate
     from shipid.study.prepare import obtain
@@ -154,33 +193,45 @@ def study_rotate(
     cells = len(wanted) * len(plan.pairs) * len(set(plan.study.grid.seeds))
     import pandas as pd
 
-    frame = pd.concat(list(counted(rotate.rotate(plan, dataset, wanted, device), cells, "cells")), ignore_index=True)
+    kept = rotate.kept_folder(file, plan, dataset, device)
+    blocks = rotate.rotate(plan, dataset, wanted, device, kept)
+    said = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
+    frame = pd.concat(list(counted(blocks, cells, "cells", said)), ignore_index=True)
     write_table(file, frame)
-    typer.echo(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:")
+    rotate.forget(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
-    for row in rotate.spread(frame).to_dict("records"):
+    over = rotate.spread(frame)
+    for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
         inside = "-" if row["coverage"] != row["coverage"] else f"{row['coverage']:.0%}"
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
     band = f"in band of {plan.study.bands.level:.0%}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
-    show(table(heads, rows))
-    typer.echo(f"naive floor {digits(frame.groupby('test')['naive'].first().mean())} m")
-    if found := rotate.turn_findings(frame, plan):
-        typer.echo("findings over the turns, in brackets 95 % intervals:")
-        show(table(["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)))
-    typer.echo(f"{len(frame)} cells -> {file}")
+    found = rotate.turn_findings(frame, plan)
+    naive = frame.groupby("test")["naive"].first().mean()
+    with answering(as_json) as answer:
+        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
+        answer.rows("turns", over, table(heads, rows))
+        answer.say(f"naive floor {digits(naive)} m", naive=naive)
+        if found:
+            answer.say("findings over the turns, in brackets 95 % intervals:")
+        shown = table(
+            ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)
+        )
+        answer.rows("findings", found, shown if found else None)
+        answer.say(f"{len(frame)} cells -> {file}", file=file)
 
 
 @app.command("run")
 def study_run(
-    study: Annotated[str, typer.Argument(help="bundled study or path of one")],
+    study: StudyName,
     workers: Workers = None,
     scheduler: Scheduler = None,
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
     changes: Changes = None,
     device: Device = "cpu",
+    leave: Leave = False,
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
@@ -190,15 +241,21 @@ def study_run(
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or plan.folder, workers, scheduler, device)
+    _run(plan, out or plan.folder, workers, scheduler, device, leave)
 
 
 @app.command("resume")
-def study_resume(folder: Folder, workers: Workers = None, scheduler: Scheduler = None, device: Device = "cpu") -> None:
+def study_resume(
+    folder: Folder,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    device: Device = "cpu",
+    leave: Leave = False,
+) -> None:
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run(stored_plan(folder), folder, workers, scheduler, device)
+    _run(stored_plan(folder), folder, workers, scheduler, device, leave)
 
 
 @app.command("report")
@@ -210,51 +267,127 @@ def study_report(folder: Folder) -> None:
 
 
 @app.command("check")
-def study_check(folder: Folder) -> None:
+def study_check(folder: Folder, as_json: Json = False) -> None:
     """Check that the files of a run's folder are whole and as they were written; ends with 1 if one is not."""
     from shipid.study.check import check_folder
 
     found = check_folder(folder)
-    for line in found.lines:
-        typer.echo(line)
-    if found.faults:
-        raise typer.Exit(1)
+    with answering(as_json) as answer:
+        answer.say("\n".join(found.lines), lines=found.lines, faults=found.faults)
+        if found.faults:
+            raise typer.Exit(1)
 
 
 @app.command("compare")
 def study_compare(
-    folders: Annotated[list[Path], typer.Argument(help="finished runs of one study, each with another --set seed=")],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="two or more folders of runs; the first is what others meet", autocompletion=files()),
+    ],
+    pair: Annotated[
+        list[str] | None,
+        typer.Option(help="FIRST=OTHER: a family or method of the first run and its counterpart; may be repeated"),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
+    as_json: Json = False,
 ) -> None:
-    """Show findings and errors of one study in several worlds: other manoeuvres, families and training."""
-    from shipid.study.compare import compare_bands, compare_errors, compare_findings, read_worlds
+    """Set runs beside the first one: what their documents differ in, and H of equal cells with paired intervals.
 
-    worlds = read_worlds(folders)
-    findings = compare_findings(worlds)
-    if len(findings):
-        words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
-        values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
-        show(table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True)))
-    errors = compare_errors(worlds)
-    errors["text"] = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
-    wide = errors.pivot(index="family", columns="N_D", values="text").reindex(errors["family"].unique()).fillna("-")
+    Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
+    errors over the worlds.
+    """
+    from shipid.files import check_table, write_table
+    from shipid.study import compare, matched
+
+    if out is not None:
+        check_table(out)
+    with answering(as_json) as answer:
+        if pair is None and compare.are_worlds(folders):
+            errors = _show_worlds(compare.read_worlds(folders), answer)
+        else:
+            pairs = dict(_counterpart(one) for one in pair or ())
+            errors = _show_matched(matched.compare(folders, pairs), answer)
+        if out is not None:
+            write_table(out, errors)
+            answer.say(f"{len(errors)} rows -> {out}", file=out)
+
+
+def _counterpart(pair: str) -> tuple[str, str]:
+    first, equals, other = pair.partition("=")
+    if not (first and equals and other):
+        raise DocumentError(f"{pair!r}: write --pair FIRST=OTHER, such as --pair drawn=trained", path="--pair")
+    return first, other
+
+
+def _show_matched(found: Comparison, answer: Answer) -> DataFrame:
+    """Show what differs between runs, and the errors of cells that match; returns these."""
+    documents, errors = found.documents, found.errors
+    answer.say("", folders=found.names)
+    rows = [[short(str(text), 60) for text in row] for row in documents.itertuples(index=False)]
+    shown = table(["what differs", *found.names], rows[:MOST_DIFFERENCES])
+    answer.rows("documents", documents, shown if rows else None)
+    if not rows:
+        answer.say("the documents say the same")
+    elif len(rows) > MOST_DIFFERENCES:
+        answer.say(f"and {len(rows) - MOST_DIFFERENCES} more: --json shows all")
+    banded = bool(errors[["coverage_first", "coverage_other"]].notna().any(axis=None))
+    for name, part in errors.groupby("folder", sort=False):
+        answer.say(f"H [m] of {found.names[0]}, of {name}, and the difference with its 95 % interval:")
+        heads = ["family", "method", "N_D", "cells", found.names[0], str(name), "difference", *["in band"] * banded, ""]
+        lines = [_difference(row, banded) for row in part.to_dict("records")]
+        answer.rows("errors", errors, table(heads, lines))
+    answer.say("\n".join(found.notes), notes=found.notes)
+    return errors
+
+
+def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
+    """One row of a comparison as words."""
+    interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if row["low"] == row["low"] else ""
+    amount = "A" if row["N_D"] == 0 else str(row["N_D"])
+    inside = " ".join(
+        "-" if share != share else f"{share:.0%}" for share in (row["coverage_first"], row["coverage_other"])
+    )
+    return [
+        *(row["family"], row["method"], amount, str(row["cells"])),
+        *(f"{row[side]:.3f}" for side in ("first", "other")),
+        f"{row['difference']:+.3f}{interval}",
+        *[inside] * banded,
+        row["verdict"],
+    ]
+
+
+def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
+    """Show findings, errors and bands of one study over several worlds; returns the errors."""
+    from shipid.study.compare import compare_bands, compare_errors, compare_findings
+
+    findings, errors, bands = compare_findings(worlds), compare_errors(worlds), compare_bands(worlds)
+    words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
+    values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
+    shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
+    answer.rows("findings", findings, shown if len(findings) else None)
+    texts = [f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in errors.itertuples()]
+    several = bool(errors.duplicated(["family", "N_D"]).any())
+    names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
+    wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
+    wide = wide.reindex(names.unique()).fillna("-")
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
-    show(table(columns, wide.reset_index().to_numpy().tolist()))
-    bands = compare_bands(worlds)
+    answer.rows("errors", errors, table(columns, wide.reset_index().to_numpy().tolist()))
     if len(bands):
         level = worlds[0].plan.study.bands.level
-        typer.echo(
+        answer.say(
             f"bands of {level:.0%}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
         )
-        columns = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
-        rows = [
-            [
-                *(str(row[name]) for name in ("family", "method", "N_D")),
-                *(f"{row[n]:.2f} [{row[f'{n}_low']:.2f}, {row[f'{n}_high']:.2f}]" for n in ("coverage", "width")),
-                str(row["worlds"]),
-            ]
-            for row in bands.to_dict("records")
+    rows = [
+        [
+            *(str(row[name]) for name in ("family", "method", "N_D")),
+            *(f"{row[n]:.2f} [{row[f'{n}_low']:.2f}, {row[f'{n}_high']:.2f}]" for n in ("coverage", "width")),
+            str(row["worlds"]),
         ]
-        show(table(columns, rows))
+        for row in bands.to_dict("records")
+    ]
+    heads = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
+    answer.rows("bands", bands, table(heads, rows) if rows else None)
+    return errors
 
 
 def _before_work(
@@ -272,16 +405,23 @@ def _before_work(
     return plan, file
 
 
-def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> None:
+def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
     from shipid.study import run
-    from shipid.study.contents import ANSWER, write_pages
+    from shipid.study.contents import ANSWER, share_pages
+    from shipid.study.progress import Watch
 
+    resume = f"shipid study resume {folder}"
     try:
-        draw(run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device))
+        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
+        end = draw(events, Watch(plan, folder))
     except KeyboardInterrupt:
-        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: shipid study resume {folder}\n")
+        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: {resume}\n")
         sys.exit(130)
-    report = write_pages(folder)
+    if end is not None and end.done < end.total:
+        left = f"{end.total - end.done} of {end.total} cells"
+        typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
+        return
+    report = share_pages(folder)
     for line in (folder / ANSWER).read_text(encoding="utf-8").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +14,13 @@ import typer
 from shipid.errors import visible
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
     from rich.table import Table
 
+    from shipid.study.progress import Watch
     from shipid.study.run import Event
 
 
+SILENCE, LOOK = 30.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
 HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
 
@@ -75,15 +77,20 @@ def reading(log: Path) -> Iterator[Callable[[float], None]]:
             print(file=sys.stderr)
 
 
-def show_reasons(choices: list[tuple[str, str, str]]) -> None:
-    """Print choices, each with its value and the reason: a table on a terminal, else a line each."""
+def show_reasons(choices: Iterable[Mapping[str, str]]) -> None:
+    """Print choices, each with its path, value and reason why: a table on a terminal, else a line each."""
     from rich.console import Console
 
     if Console().is_terminal:
-        show(table(["choice", "value", "because"], choices))
+        show(table(["choice", "value", "because"], (choice.values() for choice in choices)))
         return
-    for path, value, why in choices:
-        typer.echo(f"{path} = {value}" + (f"  # {why}" if why else ""))
+    for choice in choices:
+        typer.echo(f"{choice['path']} = {choice['value']}" + (f"  # {choice['why']}" if choice["why"] else ""))
+
+
+def short(text: str, most: int) -> str:
+    """Shorten a text to so many characters, with dots in its middle."""
+    return text if len(text) <= most else f"{text[: most // 2 - 1]}...{text[-(most - most // 2 - 2) :]}"
 
 
 def digits(value: float) -> str:
@@ -127,16 +134,13 @@ def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
     return table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
 
 
-def write_measures(frame: DataFrame, file: Path) -> None:
-    """Write a table of measures as CSV or Parquet and say where."""
-    from shipid.files import write_table
+def counted(
+    blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = "interrupted: nothing was written"
+) -> Iterator[Any]:
+    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`.
 
-    write_table(file, frame)
-    typer.echo(f"measures -> {file}")
-
-
-def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`."""
+    interrupted : what Ctrl-C is answered with.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -149,8 +153,8 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members") -> Iterato
                 progress.advance(task, len(block))
                 yield block
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted: nothing was written\n")
-        raise
+        sys.stderr.write(f"{interrupted}\n")
+        sys.exit(130)
 
 
 @contextmanager
@@ -166,19 +170,79 @@ def iterations() -> Iterator[Any]:
         yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
 
 
-def draw(events: Iterable[Event]) -> None:
-    """Show the events of a run: live progress on a terminal, else one plain line per finished cell."""
+@contextmanager
+def steps() -> Iterator[Callable[[str], object] | None]:
+    """Give a function that shows the step of a long calculation, in one line; None if not on a terminal."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status("") as status:
+        yield lambda step: status.update(visible(step))
+
+
+@contextmanager
+def looking(look: Callable[[], None], every: float) -> Iterator[None]:
+    """Call a function every so many seconds, in a thread beside the block."""
+    from threading import Event, Thread
+
+    ended = Event()
+
+    def go() -> None:
+        while not ended.wait(every):
+            look()
+
+    thread = Thread(target=go, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+class Quiet:
+    """Plain lines of a run: when nothing has been said for a while, how far the searches are."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch = watch
+        self.done: set[str] = set()
+        self.last = time.monotonic()
+
+    def say(self, line: str) -> None:
+        """Print a line."""
+        typer.echo(visible(line))
+        self.last = time.monotonic()
+
+    def look(self) -> None:
+        """Print the search that moved last, if it is time to."""
+        if time.monotonic() - self.last >= SILENCE and (found := self.watch.look(self.done)):
+            more = f" ({len(found)} searches go on)" if len(found) > 1 else ""
+            self.say(f"... {found[0].words}{more}")
+
+
+def draw(events: Iterable[Event], watch: Watch) -> Event | None:
+    """Show the events of a run: live progress on a terminal, else one plain line per finished cell. Return the last.
+
+    watch : what says how far searches are, so that there is news within long cells, too.
+    """
     from rich.console import Console
 
     from shipid.study.start import event_line
 
-    console = Console()
+    console, event = Console(), None
     if not console.is_terminal:
-        for event in events:
-            line = event_line(event)
-            if line:
-                typer.echo(visible(line))
-        return
+        quiet = Quiet(watch)
+        with looking(quiet.look, min(SILENCE, 5.0)):
+            for event in events:
+                quiet.done.update([event.row["cell"]] if event.kind == "cell" else ())
+                line = event_line(event)
+                if line:
+                    quiet.say(line)
+        return event
+    from rich.markup import escape
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -197,15 +261,28 @@ def draw(events: Iterable[Event]) -> None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    with Progress(*columns, console=console, refresh_per_second=2) as progress:  # drawing takes time from workers
-        task = progress.add_task("cells", total=None)
+    finished: set[str] = set()
+    progress = Progress(*columns, console=console, refresh_per_second=2)  # drawing takes time from workers
+    task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
+
+    def look() -> None:
+        found = watch.look(finished)
+        progress.update(inner, visible=bool(found))
+        if found:
+            said = escape(visible(found[0].words))
+            progress.update(inner, description=said, completed=found[0].done, total=found[0].count)
+
+    with progress, looking(look, LOOK):
         for event in events:
             if event.kind == "note":
                 progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
+            elif event.kind == "others":
+                progress.update(task, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
+                finished.add(row["cell"])
                 if row["status"] == "ok":
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])
@@ -215,6 +292,7 @@ def draw(events: Iterable[Event]) -> None:
                     else "cells"
                 )
                 progress.update(task, completed=event.done, description=label)
+    return event
 
 
 def log_to_stderr(verbose: bool) -> None:

@@ -4,65 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import criterion_table, show, table
+from shipid.cli.answer import Json, answering
+from shipid.cli.options import VesselName
+from shipid.cli.terminal import criterion_table, table
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
 
 
 @app.command("list")
-def vessel_list() -> None:
+def vessel_list(as_json: Json = False) -> None:
     """List the bundled vessels."""
     from shipid.document import bundled, read
 
-    show(table(["name", "vessel"], ((name, read(file)["name"]) for name, file in bundled("models").items())))
+    rows = [{"name": name, "vessel": read(file)["name"]} for name, file in bundled("models").items()]
+    with answering(as_json) as answer:
+        answer.rows("vessels", rows, table(["name", "vessel"], (row.values() for row in rows)))
 
 
 @app.command("show")
 def vessel_show(
-    vessel: Annotated[str, typer.Argument(help="bundled name, or path of a vessel or patch document")] = "",
-    schema: Annotated[
-        bool, typer.Option("--schema", help="print the JSON schema of vessel documents for editors")
-    ] = False,
+    vessel: VesselName,
+    as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    if schema:
-        import json
-
-        from shipid.vessel.schema import vessel_model
-
-        typer.echo(json.dumps(vessel_model().model_json_schema(), indent=1))
-        return
-    if not vessel:
-        raise ShipidError("name a vessel (see `shipid vessel list`), or ask for --schema")
     from shipid.vessel.load import load_vessel, sources
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
     ship = load_vessel(vessel)
     document = ship.document
-    typer.echo(
-        "\n".join(filter(None, [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]))
-    )
-    particulars = document.get("particulars", {})
-    typer.echo(
-        "particulars: " + ", ".join(f"{k} {particulars[k]:g} {u}" for k, u in PARTICULARS.items() if k in particulars)
-    )
     origin = sources(ship)
-    rows = [
-        (path, key.split(".")[1] + (", off" if off else ""), origin[path])
+    terms: list[dict[str, Any]] = [
+        {"term": path, "kind": key.split(".")[1], "off": off, "source": origin[path]}
         for off in (False, True)
         for path, key, _ in term_blocks(document, off)
     ]
-    show(table(["term", "kind", "source"], rows))
-    for path, _, block in term_blocks(document):
-        if "table" in block:
-            omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
-            typer.echo(f"{path}: {min(omega):g} to {max(omega):g} rad/s, {len(set(beta))} headings from 0 to 180 deg")
-    show(table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)))
+    known = {key: document["particulars"][key] for key in PARTICULARS if key in document.get("particulars", {})}
+    with answering(as_json) as answer:
+        words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
+        answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
+        said = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
+        answer.say(f"particulars: {said}", particulars=known)
+        rows = ((t["term"], t["kind"] + ", off" * t["off"], t["source"]) for t in terms)
+        answer.rows("terms", terms, table(["term", "kind", "source"], rows))
+        for path, _, block in term_blocks(document):
+            if "table" in block:
+                omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
+                ends = f"{min(omega):g} to {max(omega):g} rad/s"
+                answer.say(f"{path}: {ends}, {len(set(beta))} headings from 0 to 180 deg")
+        answer.rows(
+            "parameters",
+            [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()],
+            table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)),
+        )
 
 
 @app.command("new")
@@ -91,12 +89,15 @@ def vessel_new(
     frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
     lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
     name: Annotated[str | None, typer.Option(help="for people; default: first guess and length")] = None,
+    as_json: Json = False,
 ) -> None:
     """Write a first guess of a vessel from its main particulars: runnable, each number with its formula."""
     if out.suffix != ".toml":
         raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
     if out.exists():
         raise ShipidError("exists already: choose another name", file=out)
+    from shipid.files import write_text
+    from shipid.schemas import with_schema
     from shipid.simulation.measured import trials
     from shipid.vessel.template import Particulars, first_guess
 
@@ -105,19 +106,20 @@ def vessel_new(
         propeller_diameter, rudder_area, rudder_span, rudder_rate, tunnel_thruster, scale, density,
     )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
-    out.write_text(guessed.text, encoding="utf-8")
-    typer.echo(f"{len(guessed.vessel.parameters)} parameters by formula, none of them measured -> {out}")
-    typer.echo(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s")
-    if guessed.growth < 0:
-        typer.echo("course-stable by these formulae")
-    else:
-        typer.echo(f"course-UNSTABLE by these formulae: a small yaw grows e-fold in {1 / guessed.growth:.3g} s")
-    for remark in guessed.remarks:
-        typer.echo(remark)
-    judged, notes = trials(guessed.vessel, given.service)
-    show(criterion_table(judged, []))
-    for note in notes:
-        typer.echo(note)
+    write_text(out, with_schema(guessed.text, out, "vessel"))
+    with answering(as_json) as answer:
+        count = len(guessed.vessel.parameters)
+        answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
+        answer.say(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s", n=guessed.n, speed=given.service)
+        if guessed.growth < 0:
+            answer.say("course-stable by these formulae", growth=guessed.growth)
+        else:
+            grows = f"a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
+            answer.say(f"course-UNSTABLE by these formulae: {grows}", growth=guessed.growth)
+        judged, notes = trials(guessed.vessel, given.service)
+        answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
+        answer.rows("criteria", judged, criterion_table(judged, []))
+        answer.say("\n".join(notes), notes=notes)
 
 
 def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, PositiveFloat, field_validator
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, field_validator
 
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
@@ -60,6 +60,9 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
     return table
 
 
+OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
+
+
 class Memory(BaseModel):
     """What a method takes from the past: all in seconds before the instant; nothing by default.
 
@@ -79,7 +82,7 @@ class Memory(BaseModel):
     error: tuple[PositiveFloat, ...] = ()
     observer: bool = False
 
-    @field_validator("history", "turned", "error", mode="before")
+    @field_validator("history", "turned", "error", mode="before", json_schema_input_type=OneOrMore)
     @classmethod
     def _several(cls, value: Any) -> Any:
         """Take one number as a list of one; 0 as none."""

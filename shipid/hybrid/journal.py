@@ -1,6 +1,7 @@
-"""The journal of a run: the trials of all its cells in one file, which Optuna and its dashboard open.
+"""Journals of searches: the trials of a unit of work in a file, which Optuna and its dashboard open.
 
-There is one Optuna study for each cell. A trial is written when it has ended, in one line: a search has no trial that
+There is one Optuna study for each cell. A process that works on a unit is alone in its journal; `merge` makes one file
+of those of a run. A trial is written when it has ended, in one line: a search has no trial that
 is half done, and the order of the lines is the order of the trials. A line that a killed process left behind half
 written is cut off by the next one that writes.
 """
@@ -9,8 +10,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from math import nan
 from pathlib import Path
 from typing import IO, Any
@@ -19,9 +20,11 @@ import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+from optuna.storages.journal._storage import JournalOperation
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from shipid.errors import ResultError
+from shipid.files import whole
 from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
@@ -122,6 +125,35 @@ def _row(number: int, trial: FrozenTrial) -> Row:
     }
 
 
+def merge(files: Iterable[Path], target: Path) -> None:
+    """Write one journal that holds the studies of all; it appears whole."""
+    with whole(target) as temporary, temporary.open("w", encoding="utf-8") as out:
+        studies = trials = 0
+        for file in files:
+            names: set[str] = set()
+            created = 0
+            for log in _entries(file):
+                out.write(json.dumps(_moved(log, studies, trials), separators=(",", ":")) + "\n")
+                names |= {log["study_name"]} if log["op_code"] == JournalOperation.CREATE_STUDY else set()
+                created += log["op_code"] == JournalOperation.CREATE_TRIAL
+            studies, trials = studies + len(names), trials + created
+
+
+def _entries(file: Path) -> Iterator[dict[str, Any]]:
+    """The whole lines of a journal; what is none is left out."""
+    with file.open("rb") as stream:
+        for line in stream:
+            with suppress(ValueError):
+                log = json.loads(line)
+                if isinstance(log, dict) and "op_code" in log and line.endswith(b"\n"):
+                    yield log
+
+
+def _moved(log: dict[str, Any], studies: int, trials: int) -> dict[str, Any]:
+    """An entry as it is after so many studies and trials of other journals: Optuna numbers them in order."""
+    return log | {name: log[name] + by for name, by in (("study_id", studies), ("trial_id", trials)) if name in log}
+
+
 class _Lines(JournalFileBackend):
     """The file of a journal: what a killed process left half written is cut off by the next one that writes."""
 
@@ -182,7 +214,11 @@ def _alone(stream: IO[bytes], path: str) -> Iterator[None]:
         finally:
             lock.release()
         return
-    fcntl.flock(stream, fcntl.LOCK_EX)
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+    except OSError:  # a file system of a cluster that locks no files: only one process works on a unit
+        yield
+        return
     try:
         yield
     finally:

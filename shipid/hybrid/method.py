@@ -170,6 +170,11 @@ class Method(BaseModel, ABC):
         """Length of the past that windows must hold for this method [s]."""
         return 0.0
 
+    @property
+    def together(self) -> bool:
+        """Whether several foundations cost much less in one fit than in a fit each: then they are one unit of work."""
+        return False
+
     def varied(self) -> tuple[str, ...]:
         """Names of the hyperparameters that differ between trials."""
         return ()

@@ -81,6 +81,11 @@ class PathDrawn(Searched):
         """Length of the past that windows must hold [s]."""
         return self.memory.past
 
+    @property
+    def together(self) -> bool:
+        """One decomposition a trial serves all foundations."""
+        return True
+
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
         """Return which quantities the networks may take, given the names of the command columns."""
         return Inputs(commands, self.memory)

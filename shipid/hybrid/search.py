@@ -17,6 +17,7 @@ from shipid.hybrid.settings import Searched
 
 Point = TypeVar("Point")
 TIMED = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
+TOGETHER = 5.0  # s for which quick trials are kept, to be written together
 CLOSING = 1  # trials that the last fit costs, about
 
 
@@ -59,6 +60,7 @@ class Search:
         self.count = None if method.budget else method.trials
         self.before: float | None = None
         self._earlier = 0.0
+        self._wrote = time.monotonic()
         if self.journal is None:
             return
         known = {name: self.journal.rows(cell) for name, cell in self.cells.items()}
@@ -98,12 +100,15 @@ class Search:
         self.write()
 
     def keep(self, rows: Mapping[str, Row]) -> None:
-        """Keep a trial of every foundation, to be written later."""
+        """Keep a trial of every foundation; written with others, at most so often that a search can be followed."""
         for name, row in rows.items():
             self.rows[name].append(row)
+        if time.monotonic() - self._wrote > TOGETHER:
+            self.write()
 
     def write(self) -> None:
         """Write what is kept and not in the journal yet, all at once."""
+        self._wrote = time.monotonic()
         if self.journal is None:
             return
         new = {name: rows[self.written[name] :] for name, rows in self.rows.items()}

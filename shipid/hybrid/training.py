@@ -263,6 +263,11 @@ def check_device(device: str) -> None:
         raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}") from None
 
 
+def vectors() -> str:
+    """Name of the vector instructions that PyTorch uses on this processor, such as AVX512."""
+    return str(torch.backends.cpu.get_cpu_capability())
+
+
 def use_threads(count: int) -> None:
     """Set the threads of PyTorch in this process: networks this small lose time on more than one."""
     torch.set_num_threads(count)

@@ -37,6 +37,8 @@ def identification_content(outcome: Identified, dataset: str | Path, command: st
         colours=outcome.colours,
         profiles=pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(),
         programme=pd.DataFrame() if outcome.programme is None else outcome.programme,
+        groups=outcome.groups,
+        beyond=outcome.beyond,
         provenance={
             "Vessel": f"{outcome.vessel.name}, digest {outcome.vessel.digest}",
             "Dataset": f"{dataset}, digest {outcome.digest}",

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.settings import SIGNALS
-from shipid.simulation.approach import Controls
+from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
@@ -160,10 +160,9 @@ def informed(
         raise ShipidError(f"no signal {unknown!r}: {choices(unknown, SIGNALS)}", path="weights")
     if not choice:
         raise ShipidError("no manoeuvre is within the limits of the actuators")
-    every = _every(vessel, interval) if step is None else max(round(interval / step), 1)
+    every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
     fine = interval / every
-    named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
-    log = perform(vessel, named, step=fine, environment=environment or {})
+    log = performed(vessel, choice, step=fine, environment=environment or {})
     cut = _cut(vessel, log, environment or {}, round(horizon / interval) * every, every)
     signals = {name: width for signal, width in weights.items() for name in SIGNALS[signal]}
     by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
@@ -171,7 +170,24 @@ def informed(
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
 
 
-def _every(vessel: Vessel, interval: float) -> int:
+def performed(
+    vessel: Vessel,
+    choice: Sequence[Candidate],
+    *,
+    step: float,
+    interval: float | None = None,
+    environment: Mapping[str, float] | None = None,
+) -> pd.DataFrame:
+    """Log of all candidates, `run` 0000, 0001, ...; by a helmsman's approach where the ship does not go straight."""
+    named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
+    try:
+        return perform(vessel, named, step=step, interval=interval, environment=environment or {})
+    except NotStraight:
+        held = [one.model_copy(update={"approach": "helmsman"}) for one in named]
+        return perform(vessel, held, step=step, interval=interval, environment=environment or {})
+
+
+def steps_between(vessel: Vessel, interval: float) -> int:
     """Integrator steps in one interval [s] between rows: 40 or more per ship length at Froude number 0.2."""
     length = length_of(vessel) or 30.0
     passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))

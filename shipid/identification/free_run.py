@@ -52,9 +52,8 @@ def free_runs(
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
     overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
-    problem = build(
-        first, dataset, runs, settings.model_copy(update={"horizon": length, "nuisance": [], "runs": overrides})
-    )
+    asked = {"horizon": length, "nuisance": [], "runs": overrides}
+    problem = build(first, dataset, runs, settings.model_copy(update=_nothing_free(first, overrides) | asked))
     given = np.array(list(first.parameters.values()))
     predicted: dict[tuple[int, int], Array] = {}
     for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
@@ -72,6 +71,13 @@ def free_runs(
         ]
     series = pd.concat(frames, ignore_index=True)
     return FreeRuns(series.drop(columns="measured"), _errors(series))
+
+
+def _nothing_free(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
+    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides."""
+    path = next(path for path in vessel.parameters if not any(key.endswith(f".{path}") for key in overrides))
+    none: dict[str, object] = {"prior": {}, "bounds": {}, "scale": {}}
+    return none | {"parameters": [path], "fixed": [], "together": [], "ranges": False}
 
 
 def _belongs(key: str, runs: Sequence[str]) -> bool:

@@ -198,12 +198,12 @@ class _Problem:
                 row += 1
         velocities = model.state[model.num_dof :]
         self.rows = [velocities.index(name) for name in MEASURED]
-        equations = _equations(model, tuple(self.free))
-        shared = [equations.n_in() - 1]  # the parameters
+        motion = equations(model, tuple(self.free))
+        shared = [motion.n_in() - 1]  # the parameters
         sizes = {stretch.inputs[0].shape[1] for stretch in stretches}
-        by_size = {size: equations.map("equations", "serial", size, shared, []) for size in sizes}
+        by_size = {size: motion.map("equations", "serial", size, shared, []) for size in sizes}
         self.mapped = [by_size[stretch.inputs[0].shape[1]] for stretch in stretches]
-        still = equations(*(np.zeros(equations.size1_in(i)) for i in range(shared[0])), self.base)
+        still = motion(*(np.zeros(motion.size1_in(i)) for i in range(shared[0])), self.base)
         self.inertia = np.diag(np.array(still[2]))[self.rows]
         counts = [len(stretch.weigh) for stretch in stretches]
         self.signals = tuple(name for count in counts for name in MEASURED for _ in range(count))
@@ -246,7 +246,7 @@ class _Problem:
 
 
 @lru_cache(maxsize=16)
-def _equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
+def equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
     """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free.
 
     The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.

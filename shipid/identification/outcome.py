@@ -24,16 +24,14 @@ from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, free_runs
 from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
+from shipid.identification.reach import beyond, of_log, reach_of
 from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
+from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
 from shipid.interrupts import uninterrupted
-from shipid.measures import MEASURES
-from shipid.measures.recognise import record_of
-from shipid.measures.rows import measure_rows
 from shipid.physics.signals import is_shaft
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import length_of, standard
+from shipid.simulation.measured import measure_standard
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -68,6 +66,8 @@ class Identified:
     ahead : length of a free run [s], 0 for whole runs. free : set (`fit`, `test`) -> free runs `before` and `after`.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`; with a band also `low` and `high`.
     colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
+    groups : errors by side, helm and speed over one horizon, by `shipid.identification.sides.by_group`, on runs held
+        out, else on fitted ones. beyond : sentences on standard manoeuvres that go farther than the fitted runs.
     programme : manoeuvres to run next, ranked by `shipid.identification.design.rank`; None: not requested.
     """
 
@@ -85,6 +85,8 @@ class Identified:
     programme: pd.DataFrame | None
     profiles: tuple[Profile, ...]
     warnings: tuple[str, ...]
+    groups: pd.DataFrame
+    beyond: tuple[str, ...]
 
     @property
     def errors(self) -> pd.DataFrame:
@@ -233,12 +235,15 @@ def run_identification(
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
         _go_on(held)
-        manoeuvres, refused = _manoeuvres(pair), ""
+        logs: dict[str, pd.DataFrame] = {}
+        manoeuvres, refused = _manoeuvres(pair, logs), ""
         if band is not None:
             manoeuvres, refused = _banded(manoeuvres, vessel, solution, judged, band)
         _go_on(held)
         warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
         warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
+        groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
+        warnings += uneven(groups)
         if refused:
             warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
         return Identified(
@@ -256,7 +261,25 @@ def run_identification(
             programme=_programme(pair[AFTER], dataset, fitted, solution, judged) if programme else None,
             profiles=curves,
             warnings=warnings,
+            groups=groups,
+            beyond=_beyond(pair[AFTER], dataset, fitted, logs),
         )
+
+
+def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
+    """Errors by side, helm and speed of free runs as long as the predictions that were fitted."""
+    series = free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
+    return by_group(series, AFTER, vessel, dataset)
+
+
+def _beyond(vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+    """Sentences on standard manoeuvres in which the identified vessel goes beyond the data."""
+    data = reach_of(vessel, dataset, runs)
+    return tuple(filter(None, (beyond(title, of_log(vessel, log), data) for title, log in logs.items())))
+
+
+def _title(kind: str, angles: Sequence[float]) -> str:
+    return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
 
 
 def _go_on(held: Sequence[int]) -> None:
@@ -315,16 +338,19 @@ def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.Dat
     return pd.DataFrame(rows)
 
 
-def _manoeuvres(pair: Mapping[str, Vessel]) -> pd.DataFrame:
-    """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`."""
+def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
+    """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`.
+
+    logs : takes the log of the last vessel in each manoeuvre, by title.
+    """
     rows = []
     for kind, angles in TRIED:
-        title = f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
+        title = _title(kind, angles)
         values: dict[str, dict[str, dict[str, Any]]] = {}
         notes = []
         for name, vessel in pair.items():
             try:
-                values[name] = _measured(vessel, kind, angles)
+                values[name] = _measured(vessel, kind, angles, logs if name == AFTER else None)
             except ShipidError as error:
                 values[name] = {}
                 notes.append(f"{name}: {error.message}")
@@ -343,7 +369,7 @@ def _banded(
     manoeuvres: pd.DataFrame, vessel: Vessel, solution: Solution, judged: Statistics, level: float
 ) -> tuple[pd.DataFrame, str]:
     """The measures with the band of each, `low` and `high`; or as they are, and why there is no band."""
-    why = refusal(solution, judged, _spacing(solution))
+    why = refusal(solution, judged, residual_spacing(solution))
     if why:
         return manoeuvres, why
 
@@ -355,24 +381,23 @@ def _banded(
 
         return measure
 
-    titled = [
-        (f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}", performed(kind, angles)) for kind, angles in TRIED
-    ]
+    titled = [(_title(kind, angles), performed(kind, angles)) for kind, angles in TRIED]
     found = bands(vessel, solution, judged, titled, level)
     ends = found[["manoeuvre", "measure", "low", "high"]]
     return manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"]), ""
 
 
-def _measured(vessel: Vessel, kind: str, angles: Sequence[float]) -> dict[str, dict[str, Any]]:
+def _measured(
+    vessel: Vessel, kind: str, angles: Sequence[float], logs: dict[str, pd.DataFrame] | None = None
+) -> dict[str, dict[str, Any]]:
     """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
-    chosen = standard(vessel, kind, angles)
-    log = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    columns = {str(name): log[name].to_numpy() for name in log if name != "run" and not str(name).startswith("actual.")}
-    rows = measure_rows(MEASURES[kind](record_of(columns)), length_of(vessel))
-    return {row["measure"]: row for row in rows}
+    done = measure_standard(vessel, kind, angles)
+    if logs is not None:
+        logs[_title(kind, angles)] = done.frame
+    return {row["measure"]: row for row in done.measures}
 
 
-def _spacing(solution: Solution) -> float:
+def residual_spacing(solution: Solution) -> float:
     """Time between residuals of one signal [s]."""
     selected = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
     steps = np.diff(solution.times[selected])
@@ -386,7 +411,7 @@ def _longest(solution: Solution) -> float:
 
 
 def _colours(solution: Solution) -> pd.DataFrame:
-    labels, between, frames = np.array(solution.signals), _spacing(solution), []
+    labels, between, frames = np.array(solution.signals), residual_spacing(solution), []
     for name in dict.fromkeys(solution.signals):
         selected = labels == name
         rho = autocorrelation(
@@ -407,7 +432,7 @@ def _programme(
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
-    spread = {name: width * _level(judged, name) for name, width in settings.weights.items()}
+    spread = {name: width * residual_level(judged, name) for name, width in settings.weights.items()}
     contributions = design.informed(
         vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
         interval=settings.step,
@@ -416,7 +441,7 @@ def _programme(
     return design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
 
 
-def _level(judged: Statistics, signal: str) -> float:
+def residual_level(judged: Statistics, signal: str) -> float:
     """Standard deviation of the residuals of a signal, over the declared one."""
     columns = {"position": "north"}
     return judged.whiteness[columns.get(signal, signal)].level
@@ -433,7 +458,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
         limits = {**solution.settings.bounds, **held, name: (factor, factor)}
-        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None})
+        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None, "ranges": False})
         begin = dict(zip(solution.paths, start.tolist(), strict=True))
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors
@@ -482,7 +507,7 @@ def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
 
 def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
     """Warnings about the fit: coloured residuals, short horizon, untrusted errors, bounds, no test, worse free runs."""
-    warnings, between = [], _spacing(solution)
+    warnings, between = [], residual_spacing(solution)
     coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
     horizon = solution.settings.horizon
     if coloured:

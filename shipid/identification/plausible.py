@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from shipid.vessel.load import Vessel
 
+FARTHEST = 1e4  # factor
 NEAR = 0.02  # of the range: nearer to an end is at it
 
 
@@ -77,6 +78,39 @@ KINDS = (
     Kind(r"thruster\..*\.k_T", "thrust over that of the open-water curve", 0.3, 2.0, _itself),
 )
 """Kinds of numbers with the ranges that ships have."""
+
+
+def within(vessel: Vessel, path: str) -> tuple[float, float]:
+    """Least and greatest factor on a number with which it stays in the range that ships have, the base included.
+
+    The other numbers are those of the vessel. Infinite where no range is known.
+    """
+    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+    base, numbers = vessel.parameters[path], vessel.parameters
+    length = vessel.document.get("particulars", {}).get("L_pp")
+    if kind is None or base == 0:
+        return -math.inf, math.inf
+
+    def ratio(factor: float) -> float | None:
+        return kind.ratio(factor * base, {**numbers, path: factor * base}, length)
+
+    one, far = ratio(1.0), ratio(FARTHEST)
+    if one is None or far is None or one == far:
+        return -math.inf, math.inf
+    ends = [_reached(ratio, end, far > one) for end in (kind.low, kind.high)]
+    return min(1.0, *ends), max(1.0, *ends)
+
+
+def _reached(ratio: Callable[[float], float | None], end: float, rising: bool) -> float:
+    """Factor at which a ratio that rises (or falls) with it reaches an end of the range; infinite where it does not."""
+    if not math.isfinite(end):
+        return math.inf if (end > 0) == rising else -math.inf
+    low, high = -FARTHEST, FARTHEST
+    for _ in range(80):
+        middle = (low + high) / 2
+        value = ratio(middle)
+        low, high = (middle, high) if value is not None and (value < end) == rising else (low, middle)
+    return high if abs(high) < FARTHEST / 2 else math.copysign(math.inf, high)
 
 
 def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
+from shipid.identification.plausible import within
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select
 
@@ -75,6 +76,10 @@ class Identify(documents.Checked, BaseModel):
         default="growing",
         description="where to begin: growing horizons, inverse dynamics, or the base",
     )
+    discount: bool = Field(
+        default=False, description="correlated residuals count as so many independent ones, so that priors count"
+    )
+    ranges: bool = Field(default=False, description="numbers stay within the ranges that ships have")
     drop: Positive | None = Field(
         default=None, description="standard errors under which a factor's distance from `drop_to` is dropped"
     )
@@ -177,6 +182,11 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     key = _Digested(vessel.digest, vessel)
     low = np.array([max(_least(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
+    if settings.ranges:
+        for i, group in enumerate(groups):
+            for path in group:
+                least, most = within(vessel, path)
+                low[i], high[i] = max(low[i], least), min(high[i], most)
     for pattern, limits in settings.bounds.items():
         for path in reached(pattern, "bounds", place):
             low[place[path]], high[place[path]] = limits  # as the user says, also below 0

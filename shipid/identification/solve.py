@@ -14,11 +14,13 @@ from shipid.errors import DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.residuals import Problem, build
-from shipid.identification.settings import BLOCK, Identify
+from shipid.identification.settings import BLOCK, SIGNALS, Identify
 from shipid.identification.start import by_inverse_dynamics, grown
+from shipid.identification.statistics import LinearFit, whiteness
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
+DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
@@ -45,6 +47,7 @@ class Solution:
         `stopped`. sentence : the status with its reason and a remedy.
     at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
+    effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
     """
 
     vessel: Vessel
@@ -72,6 +75,7 @@ class Solution:
     held: NDArray[np.bool_]
     point: Point = field(repr=False)
     dropped: tuple[str, ...] = ()
+    effective: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def identified(self) -> Vessel:
@@ -89,6 +93,10 @@ def identify(
 ) -> Solution:
     """Estimate the factors that minimise the weighted prediction errors of the runs.
 
+    With `discount`, the fit is repeated with the deviations of the signals times their level and the square root of the
+    correlation time of their residuals, in samples: so many correlated residuals then weigh, against priors and one
+    another, as the independent ones that they are worth. The settings of the solution have these deviations.
+
     Parameters
     ----------
     runs : names of the runs to fit. settings : unknowns, weights, horizon and solver.
@@ -99,6 +107,50 @@ def identify(
     ------
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
+    plain = settings.model_copy(update={"discount": False})
+    solution = _identified(vessel, dataset, runs, plain, start, progress)
+    if not settings.discount:
+        return solution
+    for _ in range(DISCOUNTS):
+        if solution.status != "ok":
+            break
+        discounted, effective = _discounted(solution)
+        before = solution
+        solution = replace(
+            _identified(vessel, dataset, runs, discounted, solution, progress),
+            effective=effective,
+            objective_start=before.objective_start,
+        )
+        solution = replace(solution, seconds=solution.seconds + before.seconds)
+    return solution
+
+
+def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
+    """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
+    settings, seen = solution.settings, whiteness(LinearFit.of(solution))
+    factors = {
+        name: float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in SIGNALS[name]]))
+        for name in settings.weights
+    }
+    widths = settings.widths
+    if "initial_state" in widths:  # a start is one row, however long residuals remember
+        widths["initial_state"] /= float(np.exp(np.mean(np.log(list(factors.values())))))
+    update = {
+        "weights": {name: width * max(factors[name], LEAST) for name, width in settings.weights.items()},
+        "nuisance": widths,
+    }
+    return settings.model_copy(update=update), {name: one.effective for name, one in seen.items()}
+
+
+def _identified(
+    vessel: Vessel,
+    dataset: Dataset,
+    runs: Sequence[str],
+    settings: Identify,
+    start: Mapping[str, float] | Solution | None,
+    progress: Progress | None,
+) -> Solution:
+    """One fit, and those after each dropped factor."""
     begun = time.perf_counter()
     problem = build(vessel, dataset, runs, settings)
     result, objective_start = _searched(problem, dataset, start, progress)

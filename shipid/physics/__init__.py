@@ -40,7 +40,10 @@ class Term:
 
 @dataclass(frozen=True)
 class Memory:
-    """An actuator model: `output(state)` replaces the command, `advance(command, state, dt)` gives the next state."""
+    """An actuator model: `output(state)` replaces the command, `advance(command, state, dt)` gives the next state.
+
+    Its parameters are those of `advance`; `output` may take some of them.
+    """
 
     output: Callable[..., Any]
     advance: Callable[..., Any]
@@ -66,6 +69,7 @@ SIGNALS = _Commands()
 TERMS: dict[str, Term] = {
     "hull.derivatives": Term(hull.derivatives),
     "hull.prime_derivatives": Term(hull.prime_derivatives),
+    "hull.bis_derivatives": Term(hull.bis_derivatives),
     "hull.mmg": Term(hull.mmg),
     "hull.abkowitz": Term(hull.abkowitz),
     "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
@@ -86,11 +90,16 @@ TERMS: dict[str, Term] = {
     "thruster.tunnel": Term(thruster.tunnel),
     "thruster.propeller": Term(propeller.propeller, gives={"wash": propeller.wash}),
     "thruster.controllable_pitch": Term(propeller.controllable_pitch, gives={"wash": propeller.controllable_wash}),
+    "thruster.four_quadrant": Term(propeller.four_quadrant, gives={"wash": propeller.four_quadrant_wash}),
+    "thruster.quadratic": Term(propeller.quadratic, gives={"wash": propeller.quadratic_wash}),
     "thruster.service_speed": Term(propeller.service_speed),
     "thruster.rudder": Term(rudder.rudder),
+    "thruster.rudder_polynomial": Term(rudder.rudder_polynomial),
+    "thruster.rudder_coefficients": Term(rudder.rudder_coefficients),
     "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),
 }
 
 ACTUATORS: dict[str, Memory] = {
-    "first_order": Memory(thruster.first_order_output, thruster.first_order_advance),
+    "first_order": Memory(thruster.bounded_output, thruster.first_order_advance),
+    "rate_limit": Memory(thruster.bounded_output, thruster.rate_limit_advance),
 }

@@ -11,6 +11,11 @@ def vector(*entries: float | SX) -> SX:
     return ca.vertcat(*(SX(1, 1) if isinstance(entry, int | float) and entry == 0 else entry for entry in entries))
 
 
+def given(value: SX | float, neutral: float) -> bool:
+    """Whether a parameter has another value than its neutral default: what has not stays out of the equations."""
+    return isinstance(value, SX) or value != neutral
+
+
 def skew(a: SX) -> SX:
     """S(a), with S(a) b = a x b, for a (3)."""
     return ca.vertcat(

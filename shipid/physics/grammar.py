@@ -16,7 +16,9 @@ from casadi import SX
 
 AXES = "XYZKMN"
 MOTIONS = "uvwpqr"
+HEEL = "phi"
 DEVIATIONS = ("u", "v", "r", "delta")
+ACCELERATIONS = rf"[{AXES}]_[{MOTIONS}]dot"
 POSITIVE = object()  # marks a parameter that must be greater than zero
 
 
@@ -50,28 +52,40 @@ class Monomial:
         return product
 
 
+def monomial_names(alphabet: str | tuple[str, ...], axes: str = AXES) -> str:
+    """Regular expression of the coefficient names whose factors are words of the alphabet."""
+    return rf"([{axes}])_((?:{_factor(alphabet)})+)" if axes else rf"()((?:{_factor(alphabet)})+)"
+
+
+def _factor(alphabet: str | tuple[str, ...]) -> str:
+    word = f"(?:{'|'.join(alphabet)})"
+    return rf"{word}|\|{word}\|"
+
+
 @cache
 def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
     """Parse a coefficient name whose factors are words of the alphabet; ValueError shows the expected form."""
-    word = f"(?:{'|'.join(alphabet)})"
-    factor, before = rf"{word}|\|{word}\|", rf"([{axes}])_" if axes else "()"
-    parts = re.fullmatch(rf"{before}((?:{factor})+)", name)
+    parts = re.fullmatch(monomial_names(alphabet, axes), name)
     if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
         example = "Y_v|r|" if axes else "J|y|"
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    tokens = re.findall(factor, parts[2])
+    tokens = re.findall(_factor(alphabet), parts[2])
     return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in tokens))
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name."""
+    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name.
+
+    names : regular expression of the valid names, for editors; `check_name` says what is wrong with another.
+    """
 
     check_name: Callable[[str], Monomial]
     unit: Callable[[str], str]
+    names: str
 
     def check(self, names: Iterable[str]) -> None:
         """Raise ValueError for the first invalid name, or for a second name of one monomial."""
@@ -84,15 +98,23 @@ class Grammar:
 
 
 def derivative(name: str) -> Monomial:
-    """Monomial of a hull derivative from its name (SNAME 1950); ValueError for acceleration derivatives."""
+    """Monomial of a hull derivative from its name (SNAME 1950); ValueError for acceleration derivatives.
+
+    Factors are the motions and the angle of heel, phi.
+    """
     if name.endswith("dot"):
         raise ValueError(f"{name!r} is an acceleration derivative: it belongs in [added_mass]")
-    return monomial(name, MOTIONS)
+    return monomial(name, (HEEL, *MOTIONS))
+
+
+def rates(formula: Monomial) -> int:
+    """Number of factors that are velocities or angular velocities."""
+    return sum(symbol != HEEL for symbol, _ in formula.factors)
 
 
 def acceleration_derivative(name: str) -> Monomial:
     """Monomial of an added-mass derivative from its name, such as `Y_rdot`."""
-    if not re.fullmatch(rf"[{AXES}]_[{MOTIONS}]dot", name):
+    if not re.fullmatch(ACCELERATIONS, name):
         raise ValueError(f"{name!r} is not an added-mass derivative: write it like 'X_udot' or 'N_vdot'")
     return Monomial(name[0], ((name[2], False),))
 
@@ -107,7 +129,7 @@ def derivative_unit(name: str) -> str:
     """SI unit of a hull derivative; radians count as 1."""
     formula = derivative(name)
     linear = sum(symbol in "uvw" for symbol, _ in formula.factors)
-    return kg_unit((1 if formula.axis in "XYZ" else 2) - linear, formula.order - 2)
+    return kg_unit((1 if formula.axis in "XYZ" else 2) - linear, rates(formula) - 2)
 
 
 def acceleration_unit(name: str) -> str:
@@ -116,7 +138,7 @@ def acceleration_unit(name: str) -> str:
 
 
 def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
-    """Factor from a derivative in the prime system to SI: 1/2 rho L^a U^(2 - order) (SNAME 1950).
+    """Factor from a derivative in the prime system to SI: 1/2 rho L^a U^(2 - order) (SNAME 1950); heel has no order.
 
     Force = 1/2 rho L^2 U^2, moment = 1/2 rho L^3 U^2, motions u/U, v/U, r L/U; so a = 2 or 3 plus the number of
     angular factors. U [m/s] is the instantaneous speed and cancels for second-order derivatives.
@@ -124,7 +146,19 @@ def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
     formula = derivative(name)
     angular = sum(symbol in "pqr" for symbol, _ in formula.factors)
     length = (2 if formula.axis in "XYZ" else 3) + angular
-    return rho / 2 * L**length * U ** (2 - formula.order)
+    return rho / 2 * L**length * U ** (2 - rates(formula))
+
+
+def bis_scale(name: str, rho: SX, g: SX, nabla: SX, L: SX) -> SX:
+    """Factor from a derivative in the bis system to SI (Norrbin 1970): force rho g nabla, length L, time sqrt(L / g).
+
+    Moment rho g nabla L; motions u / sqrt(g L), v / sqrt(g L), r sqrt(L / g). g cancels for second-order derivatives.
+    """
+    formula = derivative(name)
+    linear = sum(symbol in "uvw" for symbol, _ in formula.factors)
+    length = (0 if formula.axis in "XYZ" else 1) + rates(formula) - linear
+    order = rates(formula)
+    return rho * nabla * g * L**length * (1 / (g * L) if order == 2 else (g * L) ** (-order / 2))
 
 
 def deviation(name: str) -> Monomial:
@@ -148,14 +182,31 @@ def rudder_deviation(name: str) -> Monomial:
     return formula
 
 
+def rudder_flow(name: str) -> Monomial:
+    """Monomial of a rudder coefficient: two factors c, the flow at the rudder, then delta and the drift angle beta."""
+    formula = monomial(name, ("beta", "delta", "c"))
+    if sum(symbol == "c" for symbol, _ in formula.factors) != 2:
+        raise ValueError(f"{name!r} must have two factors c, the flow at the rudder, like 'Y_|c|cdelta'")
+    return formula
+
+
+def cross_flow_monomial(name: str) -> Monomial:
+    """Monomial of the flow across a rudder: factors v and r, in primes."""
+    return monomial(name, "vr", axes="")
+
+
 def thrust_monomial(name: str) -> Monomial:
     """Monomial of a thruster coefficient: factors J, y (J_y) and t (tanh(|J_y| / width)); `1` is the constant term."""
     return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
 
 
-DERIVATIVES = Grammar(derivative, derivative_unit)
-PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime")
-HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime")
-RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime")
-ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
-THRUST = Grammar(thrust_monomial, lambda _: "-")
+_MOTIONS, _OF_HULL = monomial_names((HEEL, *MOTIONS)), monomial_names(DEVIATIONS[:-1])
+_RUDDER_FLOW = rf"(?=(?:[^c]*c){{2}}[^c]*$){monomial_names(('beta', 'delta', 'c'))}"
+DERIVATIVES = Grammar(derivative, derivative_unit, _MOTIONS)
+PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime", _MOTIONS)
+HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime", _OF_HULL)
+RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime", rf"(?=.*delta){monomial_names(DEVIATIONS)}")
+ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)
+RUDDER_FLOWS = Grammar(rudder_flow, lambda _: "prime", _RUDDER_FLOW)
+CROSS_FLOWS = Grammar(cross_flow_monomial, lambda _: "prime", monomial_names("vr", axes=""))
+THRUST = Grammar(thrust_monomial, lambda _: "-", rf"1|{monomial_names('Jyt', axes='')}")

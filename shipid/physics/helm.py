@@ -86,6 +86,32 @@ def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
     return Helmsman("yaw rate", inputs, {"integral": 0.0}, orders=orders, advance=advance)
 
 
+@lru_cache
+def course_keeping(commands: tuple[str, ...]) -> Helmsman:
+    """PID control of the heading: share of the largest helm s = I + (omega^2 e - 2 omega r) / effect, e the error.
+
+    dI/dt = omega^3 / 10 e / effect; s and I limited to -1..1. Inputs: each command with the largest helm to starboard;
+    `course` [rad]; `omega` [rad/s], the natural frequency; `effect` [rad/s^2], yaw acceleration by the largest helm.
+    """
+
+    def error(signals: Named, inputs: Named) -> SX:
+        turn = inputs["course"] - signals["psi"]
+        return SX(ca.atan2(ca.sin(turn), ca.cos(turn)))
+
+    def orders(signals: Named, inputs: Named, memory: Named) -> Named:
+        omega = inputs["omega"]
+        asked = omega**2 * error(signals, inputs) - 2 * DAMPING * omega * signals["r"]
+        now = _limit(memory["integral"] + asked / inputs["effect"])
+        return {name: inputs[name] * now if steers(name) else inputs[name] for name in commands}
+
+    def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
+        gained = INTEGRAL * inputs["omega"] ** 3 * error(signals, inputs) / inputs["effect"] * dt
+        return {"integral": _limit(memory["integral"] + gained)}
+
+    inputs = {**units(commands), "course": "rad", "omega": "rad/s", "effect": "rad/s^2"}
+    return Helmsman("course keeping", inputs, {"integral": 0.0}, orders=orders, advance=advance)
+
+
 def _limit(share: SX) -> SX:
     return ca.fmin(ca.fmax(share, -1), 1)
 

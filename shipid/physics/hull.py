@@ -1,4 +1,4 @@
-"""Hull forces in calm water: named derivatives in four scalings, strip cross-flow drag, straight-ahead resistance."""
+"""Hull forces in calm water: named derivatives in five scalings, strip cross-flow drag, straight-ahead resistance."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from shipid.physics.frames import vector
+from shipid.physics.frames import given, vector
 from shipid.physics.grammar import (
     AXES,
     DERIVATIVES,
+    HEEL,
     HULL_DEVIATIONS,
     MOTIONS,
     POSITIVE,
     PRIME_DERIVATIVES,
+    bis_scale,
     derivative,
     deviation,
     prime_scale,
@@ -25,12 +27,13 @@ from shipid.physics.grammar import (
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
 
 
-def derivatives(nu_r: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
-    """Wrench (6) = sum over names of value x monomial(nu_r), on the force side (SNAME 1950).
+def derivatives(nu_r: SX, eta: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
+    """Wrench (6) = sum over names of value x monomial(nu_r, phi), on the force side (SNAME 1950).
 
-    nu_r (6) [m/s, rad/s] is the velocity through the water; each value has the SI unit that its name implies.
+    nu_r (6) [m/s, rad/s] is the velocity through the water, phi = eta[3] [rad] the angle of heel; each value has the SI
+    unit that its name implies.
     """
-    motions = dict(zip(MOTIONS, ca.vertsplit(nu_r), strict=True))
+    motions = {**dict(zip(MOTIONS, ca.vertsplit(nu_r), strict=True)), HEEL: eta[3]}
     wrench = [SX(1, 1)] * 6
     for name, value in values.items():
         formula = derivative(name)
@@ -41,6 +44,7 @@ def derivatives(nu_r: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
 
 def prime_derivatives(
     nu_r: SX,
+    eta: SX,
     *,
     L_pp: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
@@ -50,14 +54,35 @@ def prime_derivatives(
 
     L_pp [m] is the reference length, U the instantaneous speed through the water with a floor of 0.01 m/s.
     """
-    U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
-    return derivatives(nu_r, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()})
+    U = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
+    return derivatives(nu_r, eta, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()})
+
+
+def bis_derivatives(
+    nu_r: SX,
+    eta: SX,
+    *,
+    nabla: Annotated[SX, "m^3", POSITIVE],
+    L_pp: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+    g: Annotated[SX, "m s^-2", POSITIVE],
+    **values: Annotated[SX, PRIME_DERIVATIVES],
+) -> SX:
+    """Wrench (6) of derivatives in the bis system: value x rho g nabla x monomial (Norrbin 1970; Fossen 2021, app. D).
+
+    Moments with L_pp; motions are divided by sqrt(g L_pp), turning rates by sqrt(g / L_pp). nabla [m^3]: displaced
+    volume. Unlike the prime system it holds at rest: linear damping stays linear.
+    """
+    scaled = {name: value * bis_scale(name, rho, g, nabla, L_pp) for name, value in values.items()}
+    return derivatives(nu_r, eta, **scaled)
 
 
 def mmg(
     nu_r: SX,
+    eta: SX,
     *,
     R_0: Annotated[SX, "-", POSITIVE],
+    k_astern: Annotated[SX | float, "-"] = 1.0,
     L_pp: Annotated[SX, "m", POSITIVE],
     T: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
@@ -66,13 +91,19 @@ def mmg(
     """Wrench (6) of the MMG hull polynomial (Yasukawa and Yoshimura 2015, eqs. 9-11).
 
     X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
-    resistance opposes the motion along the ship: with its full value for drift angles below 45 deg. U [m/s] is the
-    instantaneous speed through the water with a floor of 0.01 m/s.
+    resistance opposes the motion along the ship: with its full value for drift angles below 45 deg, and k_astern times
+    that when she goes astern. U [m/s] is the instantaneous speed through the water with a floor of 0.01 m/s.
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)
+    ahead = _more_astern(ahead, nu_r[0], k_astern)
     scaled = {name: value * T / L_pp * prime_scale(name, rho, L_pp, U) for name, value in values.items()}
-    return derivatives(nu_r, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
+    return derivatives(nu_r, eta, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
+
+
+def _more_astern(value: SX, u: SX, k_astern: SX | float) -> SX:
+    """The value, and k_astern times it where the ship goes astern."""
+    return value * ca.if_else(u >= 0, 1, k_astern) if given(k_astern, 1.0) else value
 
 
 def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L_pp: SX, U_0: SX, rho: SX) -> SX:
@@ -117,17 +148,28 @@ def cross_flow(
     share: SX,
     *,
     C_d: Annotated[SX, "-"],
+    k_fwd: Annotated[SX | float, "-"] = 0.0,
+    k_ends: Annotated[SX | float, "-"] = 0.0,
     x_aft: Annotated[SX, "m"],
     x_fwd: Annotated[SX, "m"],
     T: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
-    """Wrench (6) of cross-flow drag on one strip of the hull: dY = -1/2 rho T C_d (v + x r)|v + x r| dx, dN = x dY.
+    """Wrench (6) of cross-flow drag on one strip of the hull: dY = -1/2 rho T C(x) (v + x r)|v + x r| dx, dN = x dY.
 
-    Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7). x_aft, x_fwd, T [m]; never adds energy for C_d > 0.
+    C(x) = C_d (1 + k_fwd s + k_ends (3 s^2 - 1) / 2), at least 0, with s = -1 aft and 1 forward. Its mean is C_d for
+    any k: C_d is the coefficient of the force in pure sway; k_fwd moves its centre forward by k_fwd / 6 of the length;
+    the moment of pure yaw goes as 1 + k_ends / 2. So force and moment differ in their coefficients, and the drag still
+    never adds energy. x_aft, x_fwd, T [m].
+
+    Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7); coefficients that vary along the hull: Hooft (1994),
+    The cross-flow drag on a manoeuvring ship, Ocean Eng. 21, 329-342. Written as Legendre polynomials here.
     """
     x = x_aft + (x_fwd - x_aft) * fraction
     across = nu_r[1] + x * nu_r[5]
+    if given(k_fwd, 0.0) or given(k_ends, 0.0):
+        s = 2 * fraction - 1
+        C_d = C_d * ca.fmax(1 + k_fwd * s + k_ends * (3 * s**2 - 1) / 2, 0)
     dY = -rho / 2 * T * C_d * (x_fwd - x_aft) * share * across * ca.fabs(across)
     return vector(0, dY, 0, 0, 0, x * dY)
 
@@ -140,9 +182,13 @@ def resistance(
     R_2: Annotated[SX | float, "kg m^-3 s^2"] = 0.0,
     R_3: Annotated[SX | float, "kg m^-4 s^3"] = 0.0,
     R_4: Annotated[SX | float, "kg m^-5 s^4"] = 0.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
 ) -> SX:
-    """Wrench (6) of straight-ahead resistance: X = -(R_0 + R_1|u| + R_2 u^2 + R_3|u|^3 + R_4 u^4) u|u| [N]."""
+    """Wrench (6) of straight-ahead resistance: X = -(R_0 + R_1|u| + R_2 u^2 + R_3|u|^3 + R_4 u^4) u|u| [N].
+
+    Going astern k_astern times that: the hull, the stern foremost, has more resistance than ahead.
+    """
     u = nu_r[0]
     a = ca.fabs(u)
     polynomial = R_0 + a * (R_1 + a * (R_2 + a * (R_3 + a * R_4)))
-    return vector(-polynomial * u * a, 0, 0, 0, 0, 0)
+    return vector(_more_astern(-polynomial * u * a, u, k_astern), 0, 0, 0, 0, 0)

@@ -8,10 +8,13 @@ from typing import Annotated
 import casadi as ca
 from casadi import SX
 
-from shipid.physics.frames import force_at, vector
+from shipid.physics.frames import force_at, given, vector
 from shipid.physics.grammar import POSITIVE, THRUST
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, polynomial
+from shipid.physics.wind import interpolate
+
+ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 
 
 def drift(nu_r: SX) -> tuple[SX, SX]:
@@ -24,16 +27,37 @@ def drift(nu_r: SX) -> tuple[SX, SX]:
     return ca.sqrt(square + SPEED_FLOOR**2), ca.atan2(-nu_r[1], along)
 
 
-def inflow(nu_r: SX, x: SX, y: SX, w_P0: SX, C_1: SX, C_2_plus: SX, C_2_minus: SX) -> SX:
+def signed_root(square: SX) -> SX:
+    """sign(q) sqrt(|q|) [m/s] of a signed square q [m^2/s^2]; linear, with finite slope, below ROOT_FLOOR."""
+    return square / ca.sqrt(ca.fmax(ca.fabs(square), ROOT_FLOOR**2))
+
+
+def inflow(
+    nu_r: SX,
+    x: SX,
+    y: SX,
+    w_P0: SX,
+    C_1: SX,
+    C_2_plus: SX,
+    C_2_minus: SX,
+    tau: SX | float = 0.0,
+    C_P: SX | float = 0.0,
+) -> SX:
     """u_P = (1 - w_P) u [m/s], the wake w_P changing with the drift beta_P at the propeller (MMG eqs. 16, 17).
 
-    (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1), beta_P = beta - x r / U.
+    1 - w_P = (1 - w_P0) (1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1)) + tau |v_P| + C_P v_P^2, beta_P = beta - x r / U and
+    v_P = (v + x r) / U. The part with tau and C_P is that of MMG models before C_1, C_2; Son and Nomoto (1982) have
+    C_P alone.
     """
     U, beta = drift(nu_r)
     beta_P = beta - x * nu_r[5] / U
     C_2 = ca.if_else(beta_P >= 0, C_2_plus, C_2_minus)
     change = 1 + (1 - ca.exp(-C_1 * ca.fabs(beta_P))) * (C_2 - 1)
-    return (1 - w_P0) * change * (nu_r[0] - nu_r[5] * y)
+    share = (1 - w_P0) * change
+    if given(tau, 0.0) or given(C_P, 0.0):
+        v_P = (nu_r[1] + x * nu_r[5]) / ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
+        share += tau * ca.fabs(v_P) + C_P * v_P**2
+    return share * (nu_r[0] - nu_r[5] * y)
 
 
 def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX, J_max: SX) -> SX:
@@ -41,6 +65,15 @@ def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX
     sense = ca.if_else(n >= 0, 1, -1)
     J = sense * u_P / (ca.fmax(ca.fabs(n), SHAFT_FLOOR) * D_p)
     return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), SX(1, 1), SX(1))
+
+
+def beyond(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
+    """Signed square [m^2/s^2] by which the inflow is beyond that of J_min..J_max: u_P|u_P| for a stopped screw.
+
+    sign(u_P) max(u_P^2 - (J n D_p)^2, 0), J = J_max where the water drives the screw in its sense, J_min against it.
+    """
+    limit = ca.if_else(n * u_P >= 0, J_max, J_min)
+    return ca.sign(u_P) * ca.fmax(u_P**2 - (limit * n * D_p) ** 2, 0)
 
 
 def propeller(
@@ -52,25 +85,48 @@ def propeller(
     z: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
     K_T: Annotated[Mapping[str, SX], THRUST],
+    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    Y_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    N_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
     k_astern: Annotated[SX | float, "-"] = 1.0,
+    k_drag: Annotated[SX | float, "-"] = 0.0,
+    k_suction: Annotated[SX | float, "-"] = 0.0,  # noqa: ARG001 - of the wash
     t_P: Annotated[SX, "-"],
     w_P0: Annotated[SX, "-"],
     C_1: Annotated[SX, "-"],
     C_2_plus: Annotated[SX, "-"],
     C_2_minus: Annotated[SX, "-"],
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
     """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
 
-    n [rev/s]; wake w_P0 on a straight course, C_1, C_2 its change with drift (C_2_plus where beta_P > 0). Astern the
-    polynomial is used with the sign of J reversed, times k_astern. Yasukawa and Yoshimura (2015).
+    n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift (see `inflow`). For n < 0
+    X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the polynomial of
+    ahead. Yasukawa and Yoshimura (2015).
+
+    Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `beyond`: a stopped screw by
+    k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment about
+    the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port,
+    Y_astern < 0 < N_astern.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus)
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     sense = ca.if_else(n >= 0, 1, -k_astern)
-    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
-    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+    K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
+    if K_T_astern:
+        K = ca.if_else(n >= 0, K, thrust_coefficient(u_P, n, D_p, K_T_astern, SX(J_min), SX(J_max)))
+    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * K
+    if given(k_drag, 0.0):
+        thrust -= k_drag * rho * D_p**2 * beyond(u_P, n, D_p, SX(J_min), SX(J_max))
+    wrench = force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+    if Y_astern or N_astern:
+        unit = ca.if_else(n >= 0, 0, rho * n**2 * D_p**2 * D_p**2)
+        Y, N = (thrust_coefficient(u_P, n, D_p, K or {}, SX(J_min), SX(J_max)) for K in (Y_astern, N_astern))
+        wrench += unit * vector(0, Y, 0, -z * Y, 0, D_p * N)
+    return wrench
 
 
 def wash(
@@ -81,20 +137,33 @@ def wash(
     y: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
     K_T: Annotated[Mapping[str, SX], THRUST],
+    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    k_suction: Annotated[SX | float, "-"] = 0.0,
     w_P0: Annotated[SX, "-"],
     C_1: Annotated[SX, "-"],
     C_2_plus: Annotated[SX, "-"],
     C_2_minus: Annotated[SX, "-"],
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
 ) -> SX:
     """Propeller slipstream at a rudder behind it, (3): inflow u_P [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)); no race astern.
+    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)). Astern the race
+    goes forward, and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less
+    k_suction times the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory
+    that share is 1/2 at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus)
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
     race = ca.sqrt(ca.fmax(u_P**2 + 8 / ca.pi * K * (n * D_p) ** 2, 0) + SPEED_FLOOR**2)
+    if given(k_suction, 0.0):
+        K_a = thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, SX(J_min), SX(J_max))
+        added = 8 / ca.pi * k_astern * ca.fmax(K_a, 0) * (n * D_p) ** 2
+        astern = u_P - k_suction * (ca.sqrt(u_P**2 + added + SPEED_FLOOR**2) - ca.sqrt(u_P**2 + SPEED_FLOOR**2))
+        return ca.vertcat(ca.if_else(n >= 0, u_P, astern), ca.if_else(n >= 0, race, astern), D_p)
     return ca.vertcat(u_P, ca.if_else(n >= 0, race, u_P), D_p)
 
 
@@ -124,6 +193,8 @@ def controllable_pitch(
     C_1: Annotated[SX | float, "-"] = 0.0,
     C_2_plus: Annotated[SX | float, "-"] = 1.0,
     C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
     """Wrench (6) of a controllable-pitch propeller: X = (1 - t_P) rho D_p^4 (k_P p n|n| - k_J |n| u_P / D_p).
@@ -134,7 +205,7 @@ def controllable_pitch(
     Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T curves of
     the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus))
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
     thrust = rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
 
@@ -154,15 +225,176 @@ def controllable_wash(
     C_1: Annotated[SX | float, "-"] = 0.0,
     C_2_plus: Annotated[SX | float, "-"] = 1.0,
     C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
 ) -> SX:
     """Slipstream of a controllable-pitch propeller, (3): inflow [m/s], slipstream speed far behind [m/s], D_p [m].
 
     u_race^2 = u_P^2 + 8 T / (pi rho D_p^2) by momentum theory; no race where the propeller drives astern.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus))
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
     lift = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
     race = ca.sqrt(ca.fmax(u_P**2 + lift, 0) + SPEED_FLOOR**2)
     return ca.vertcat(u_P, ca.if_else(pitch * n >= 0, race, u_P), D_p)
+
+
+def quadratic_thrust(
+    u_P: SX,
+    n: SX,
+    T_nn: SX,
+    T_nu: SX | float,
+    T_uu: SX | float,
+    k_astern: SX | float,
+    dT_nu: SX | float,
+    k_driven: SX | float,
+) -> SX:
+    """Thrust [N] of a screw: T_nn n|n| - T_nu |n| u_P - T_uu u_P|u_P|; for n < 0 with k_astern T_nn and T_nu + dT_nu.
+
+    The part against the sense of the shaft, of a screw that the water drives, is multiplied by k_driven.
+    """
+    ahead = n >= 0
+    thrust = T_nn * ca.if_else(ahead, 1, k_astern) * n * ca.fabs(n)
+    thrust -= (T_nu + ca.if_else(ahead, 0, dT_nu)) * ca.fabs(n) * u_P + T_uu * u_P * ca.fabs(u_P)
+    if not given(k_driven, 1.0):
+        return thrust
+    sense = ca.if_else(ahead, 1, -1)
+    return sense * (ca.fmax(sense * thrust, 0) + k_driven * ca.fmin(sense * thrust, 0))
+
+
+def quadratic(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    T_nn: Annotated[SX, "kg m", POSITIVE],
+    T_nu: Annotated[SX | float, "kg"] = 0.0,
+    T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    dT_nu: Annotated[SX | float, "kg"] = 0.0,
+    k_driven: Annotated[SX | float, "-"] = 1.0,
+    t_P: Annotated[SX | float, "-"] = 0.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    Y_T: Annotated[SX | float, "-"] = 0.0,
+    N_T: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX | float, "m"] = 0.0,  # noqa: ARG001 - this and the next are of the wash
+    c_uu: Annotated[SX | float, "-"] = 0.0,  # noqa: ARG001
+    c_un: Annotated[SX | float, "m"] = 0.0,  # noqa: ARG001
+    c_nn: Annotated[SX | float, "m^2"] = 0.0,  # noqa: ARG001
+    rho: Annotated[SX, "kg m^-3", POSITIVE],  # noqa: ARG001
+) -> SX:
+    """Wrench (6) of a screw with a quadratic law of thrust T: X = (1 - t_P) T, Y = Y_T T, N = N_T T - y X.
+
+    See `quadratic_thrust`; n [rev/s], u_P = (1 - w_P0) u. Y_T and N_T are the side force and the moment of one turning
+    screw. Norrbin (1970), van Berlekom and Goddard (1972); with T_uu = 0 the bilinear thrust of Blanke (1981).
+    """
+    u_P = (1 - w_P0) * nu_r[0]
+    thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
+    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
+
+
+def quadratic_wash(
+    nu_r: SX,
+    n: SX,
+    *,
+    T_nn: Annotated[SX, "kg m", POSITIVE],
+    T_nu: Annotated[SX | float, "kg"] = 0.0,
+    T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    dT_nu: Annotated[SX | float, "kg"] = 0.0,
+    k_driven: Annotated[SX | float, "-"] = 1.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    D_p: Annotated[SX | float, "m"] = 0.0,
+    c_uu: Annotated[SX | float, "-"] = 0.0,
+    c_un: Annotated[SX | float, "m"] = 0.0,
+    c_nn: Annotated[SX | float, "m^2"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Slipstream of a screw with a quadratic law of thrust, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
+
+    Its signed square is c_uu u_P|u_P| + c_un n u_P + c_nn n|n| (van Berlekom and Goddard 1972), and with a diameter
+    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream`.
+    """
+    u_P = (1 - w_P0) * nu_r[0]
+    still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
+    if given(D_p, 0.0):
+        thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
+        still, driven = u_P * ca.fabs(u_P), driven + 8 * thrust / (ca.pi * rho * D_p**2)
+    return vector(u_P, slipstream(u_P, still, driven), D_p)
+
+
+def slipstream(u_P: SX, still: SX, driven: SX) -> SX:
+    """Speed [m/s] of a slipstream of signed square `still` and what the screw adds to it, `driven` [m^2/s^2].
+
+    A screw astern takes at most all flow of a ship that goes ahead; on a ship that goes astern it adds none.
+    """
+    return signed_root(ca.if_else(u_P >= 0, ca.fmax(still + driven, 0), still + ca.fmax(driven, 0)))
+
+
+def four_quadrant_thrust(u_P: SX, n: SX, D_p: SX, beta_deg: list[SX], C_T: list[SX]) -> SX:
+    """Thrust over rho [m^4/s^2]: 1/2 C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2, linear between the entries."""
+    tip = 0.7 * ca.pi * n * D_p
+    square = u_P**2 + tip**2
+    beta = ca.atan2(u_P, ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, tip))
+    coefficient = interpolate(beta * (180 / ca.pi), ca.vertcat(*beta_deg), ca.vertcat(*C_T))
+    return ca.pi / 8 * D_p**2 * square * coefficient
+
+
+def four_quadrant(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    beta_deg: Annotated[list[SX], "deg"],
+    C_T: Annotated[list[SX], "-"],
+    t_P: Annotated[SX | float, "-"] = 0.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of a propeller from its open-water test in four quadrants: X = (1 - t_P) T (Oltmann and Sharma 1984).
+
+    T = 1/2 rho C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2 with the advance angle at 0.7 of the radius, beta =
+    atan2(u_P, 0.7 pi n D_p): 0 to 90 deg ahead, 90 to 180 the screw astern while the ship goes ahead (crash stop), -90
+    to 0 the screw ahead while she goes astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
+    in `inflow`.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
+    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+
+
+def four_quadrant_wash(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    beta_deg: Annotated[list[SX], "deg"],
+    C_T: Annotated[list[SX], "-"],
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+) -> SX:
+    """Slipstream of a propeller in four quadrants, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
+
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`.
+    """
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    driven = 8 / ca.pi * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T) / D_p**2
+    return vector(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
 
 def service_speed(

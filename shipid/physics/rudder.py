@@ -1,16 +1,25 @@
-"""Rudders: behind a propeller (MMG), or as derivatives about a service speed. delta > 0 turns the ship to starboard."""
+"""Rudders: behind a propeller (MMG and others), or as derivatives. delta > 0 turns the ship to starboard."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import casadi as ca
 from casadi import SX
 
-from shipid.physics.frames import vector
-from shipid.physics.grammar import POSITIVE, RUDDER_DEVIATIONS
+from shipid.physics.frames import given, vector
+from shipid.physics.grammar import (
+    AXES,
+    CROSS_FLOWS,
+    POSITIVE,
+    RUDDER_DEVIATIONS,
+    RUDDER_FLOWS,
+    cross_flow_monomial,
+    rudder_flow,
+)
 from shipid.physics.hull import SPEED_FLOOR, about_service_speed
-from shipid.physics.propeller import drift
+from shipid.physics.propeller import drift, signed_root
 
 
 def rudder(
@@ -32,6 +41,9 @@ def rudder(
     t_R: Annotated[SX, "-"],
     a_H: Annotated[SX, "-"],
     x_H: Annotated[SX, "m"],
+    f_angle: Annotated[SX | float, "-"] = 0.0,
+    f_side: Annotated[SX | float, "-"] = 0.0,
+    f_angle_side: Annotated[SX | float, "-"] = 0.0,
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
     """Wrench (6) of a rudder in the slipstream `wash` of a propeller (Yasukawa and Yoshimura 2015, eqs. 18-27).
@@ -41,6 +53,11 @@ def rudder(
     F_N = 1/2 rho A_R f_alpha U_R^2 sin(alpha_R); X = -(1 - t_R) F_N sin(delta), Y = -(1 + a_H) F_N cos(delta),
     N = -(x + a_H x_H) F_N cos(delta). Along: u_R = epsilon sqrt(eta (u_P + kappa (u_race - u_P))^2 + (1 - eta) u_P^2),
     eta = D_p / H_R at most 1. Across: v_R = gamma_R (U beta - ell_R r), gamma_R_plus if U beta - ell_R r > 0.
+
+    With s = sin(alpha_R), F_N is multiplied by 1 + f_angle |s| + f_side sign(s) + f_angle_side s: f_angle is the loss
+    (or gain) that grows with the angle on both sides, f_side makes starboard helm stronger than port helm at all
+    angles, f_angle_side does so in proportion to the angle. So F_N has odd and even parts, as the force behind one
+    turning screw has; gamma_R_plus and gamma_R_minus of the MMG method are such a difference in the flow across alone.
     """
     u_P, u_race, D_p = wash[0], wash[1], wash[2]
     U, beta = drift(nu_r)
@@ -52,8 +69,80 @@ def rudder(
     u_R = epsilon * ca.if_else(within >= 0, size, -size)
     U_R = ca.sqrt(u_R**2 + v_R**2)
     F_N = rho / 2 * A_R * f_alpha * U_R * (u_R * ca.sin(delta) - v_R * ca.cos(delta))
+    if given(f_angle, 0.0) or given(f_side, 0.0) or given(f_angle_side, 0.0):
+        s = (u_R * ca.sin(delta) - v_R * ca.cos(delta)) / U_R
+        F_N *= 1 + f_angle * ca.fabs(s) + f_side * ca.sign(s) + f_angle_side * s
+    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+
+
+def _forces(F_N: SX, delta: SX, x: SX, y: SX | float, z: SX | float, t_R: SX, a_H: SX, x_H: SX) -> SX:
+    """Wrench (6) of a normal force F_N on rudder and hull (Yasukawa and Yoshimura 2015, eq. 18)."""
     X, Y = -(1 - t_R) * F_N * ca.sin(delta), -(1 + a_H) * F_N * ca.cos(delta)
     return vector(X, Y, 0, -z * Y, z * X, -(x + a_H * x_H) * F_N * ca.cos(delta) - y * X)
+
+
+def rudder_polynomial(
+    nu_r: SX,
+    delta: SX,
+    wash: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    A_R: Annotated[SX, "m^2", POSITIVE],
+    f_alpha: Annotated[SX, "-", POSITIVE],
+    epsilon: Annotated[SX, "-", POSITIVE],
+    k_x: Annotated[SX, "-"],
+    v_R: Annotated[Mapping[str, SX], CROSS_FLOWS],
+    t_R: Annotated[SX, "-"],
+    a_H: Annotated[SX, "-"],
+    x_H: Annotated[SX, "m"],
+    L_pp: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Wrench (6) of a rudder whose flow across is a polynomial (Son and Nomoto 1982).
+
+    wash : (u_P, u_race, D_p) as of `rudder`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed. Across:
+    v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder` (-gamma_R is the
+    value of "v"). F_N and the forces of it are those of `rudder`.
+    """
+    u_P, u_race = wash[0], wash[1]
+    U = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
+    prime = {"v": nu_r[1] / U, "r": nu_r[5] * L_pp / U}
+    across = U * sum((value * cross_flow_monomial(name).value(prime) for name, value in v_R.items()), SX(1, 1))
+    still = u_P * ca.fabs(u_P)
+    race = u_race * ca.fabs(u_race) - SPEED_FLOOR**2  # the slipstream comes with a floor of its speed
+    u_R = epsilon * signed_root(still + k_x * (race - still))
+    U_R = ca.sqrt(ca.fmax(u_R**2 + across**2, SPEED_FLOOR**2))
+    F_N = rho / 2 * A_R * f_alpha * U_R * (u_R * ca.sin(delta) - across * ca.cos(delta))
+    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+
+
+def rudder_coefficients(
+    nu_r: SX,
+    delta: SX,
+    wash: SX,
+    *,
+    kappa: Annotated[SX | float, "-"] = 1.0,
+    L_pp: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+    **values: Annotated[SX, RUDDER_FLOWS],
+) -> SX:
+    """Wrench (6) of named rudder coefficients on the square of the flow at the rudder: 1/2 rho L^2 value x monomial.
+
+    Moments with L_pp^3. Factors c = u_P + kappa (u_race - u_P) [m/s] from the `wash` of the screw ahead, twice in each
+    name (`Y_|c|cdelta` turns with the flow), delta [rad], and beta = atan(-v / |u|), the drift angle. A coefficient
+    even in delta (`Y_cc|delta|`) makes one side stronger. van Berlekom and Goddard (1972); Skjetne et al. (2004).
+    """
+    _, beta = drift(nu_r)
+    factors = {"c": wash[0] + kappa * (wash[1] - wash[0]), "beta": beta, "delta": delta}
+    wrench = [SX(1, 1)] * 6
+    for name, value in values.items():
+        formula = rudder_flow(name)
+        axis = AXES.index(formula.axis)
+        lever = 1 if formula.axis in "XYZ" else L_pp
+        wrench[axis] = wrench[axis] + rho / 2 * L_pp**2 * lever * value * formula.value(factors)
+    return ca.vertcat(*wrench)
 
 
 def rudder_derivatives(

@@ -1,4 +1,4 @@
-"""Thrusters and their actuators: azimuth units from K_x, K_y polynomials, tunnel units, first-order lags."""
+"""Thrusters and their actuators: azimuth units from K_x, K_y polynomials, tunnel units; lags, rates and limits."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Annotated
 import casadi as ca
 from casadi import SX
 
-from shipid.physics.frames import force_at
+from shipid.physics.frames import force_at, given
 from shipid.physics.grammar import POSITIVE, THRUST, thrust_monomial
 
 SHAFT_FLOOR = 1e-3  # rev/s: J = u / (n D) stays finite at n = 0
+UNLIMITED = 1e9  # default limit of a command: beyond all of them
 
 
 def polynomial(coefficients: Mapping[str, SX], J: SX, J_y: SX, width: SX) -> SX:
@@ -83,9 +84,21 @@ def tunnel(
     return force_at(SX(x), SX(1, 1), SX(z), SX(1, 1), F_y)
 
 
-def first_order_output(state: SX) -> SX:
-    """The actual value of a command behind a first-order lag: the actuator state."""
-    return state
+def bounded(value: SX, low: SX | float, high: SX | float) -> SX:
+    """The value kept within low and high; a bound that no document gives stays out of the equations."""
+    if given(low, -UNLIMITED):
+        value = ca.fmax(value, low)
+    return ca.fmin(value, high) if given(high, UNLIMITED) else value
+
+
+def bounded_output(
+    state: SX,
+    *,
+    low: Annotated[SX | float, "of the command"] = -UNLIMITED,
+    high: Annotated[SX | float, "of the command"] = UNLIMITED,
+) -> SX:
+    """The actual value of a command: the actuator state, within the limits of the device."""
+    return bounded(state, low, high)
 
 
 def first_order_advance(
@@ -95,11 +108,33 @@ def first_order_advance(
     *,
     T: Annotated[SX, "s", POSITIVE],
     rate: Annotated[SX, "1/s of the command", POSITIVE],
+    low: Annotated[SX | float, "of the command"] = -UNLIMITED,
+    high: Annotated[SX | float, "of the command"] = UNLIMITED,
 ) -> SX:
     """First-order lag over dt [s], solved exactly: a+ = c + (a - c) exp(-dt / T), the change limited to rate x dt.
 
     T [s] time constant, rate in the command's unit per second. Exact for a held command while the limit does not
-    bind, so a step of 1 s with T = 0.5 s does not oscillate.
+    bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the state a are kept within low and high.
     """
-    change = (command - state) * (1 - ca.exp(-dt / T))
-    return state + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
+    reached = bounded(state, low, high)
+    change = (bounded(command, low, high) - reached) * (1 - ca.exp(-dt / T))
+    return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
+
+
+def rate_limit_advance(
+    command: SX,
+    state: SX,
+    dt: SX,
+    *,
+    rate: Annotated[SX, "1/s of the command", POSITIVE],
+    low: Annotated[SX | float, "of the command"] = -UNLIMITED,
+    high: Annotated[SX | float, "of the command"] = UNLIMITED,
+) -> SX:
+    """An actuator without lag over dt [s]: it goes to its order at `rate` and stays there.
+
+    rate in the command's unit per second; the order and the state are kept within low and high: the stops of a
+    steering gear, the greatest speed of a shaft ahead and astern.
+    """
+    reached = bounded(state, low, high)
+    change = bounded(command, low, high) - reached
+    return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)

@@ -18,6 +18,7 @@ from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
+from shipid.report.structures import group_table
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number, scientific
 
@@ -48,6 +49,7 @@ class IdentificationContent:
     manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
     colours : `signal`, `lag` [s], `correlation` of the residuals.
     profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point; without rows there is no figure.
+    groups : errors by side, helm and speed. beyond : sentences on manoeuvres that go farther than the data.
     programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`; may be empty.
     """
 
@@ -65,6 +67,8 @@ class IdentificationContent:
     colours: pd.DataFrame
     profiles: pd.DataFrame = field(default_factory=pd.DataFrame)
     programme: pd.DataFrame = field(default_factory=pd.DataFrame)
+    groups: pd.DataFrame = field(default_factory=pd.DataFrame)
+    beyond: Sequence[str] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     study_document: str = ""
@@ -309,7 +313,8 @@ def manoeuvres(content: IdentificationContent) -> Table | None:
         for row in content.manoeuvres.to_dict("records")
     ]
     head = ["manoeuvre", "measure", BEFORE, AFTER, *["band from", "to"] * banded, "unit", *["why missing"] * noted]
-    takeaway = "Simulated in calm deep water from a Froude number of 0.2."
+    takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."
+    takeaway += "".join(f" Extrapolated: {sentence}." for sentence in content.beyond)
     takeaway += " The band is what the uncertainty of the estimates leaves open." if banded else ""
     numeric = [False, False, True, True, *[True, True] * banded, False, *[False] * noted]
     return Table("manoeuvres", "Standard manoeuvres", takeaway, head, numeric, rows)
@@ -346,6 +351,12 @@ def residuals(content: IdentificationContent) -> Figure | None:
         views={"": [Panel(go.Figure(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
         chips=[Chip(name, name, category(i)) for i, name in enumerate(names)],
     )
+
+
+def sides(content: IdentificationContent) -> Table | None:
+    """Errors by side, helm and speed; None without rows."""
+    runs = "Runs held out" if content.held_out else "Fitted runs"
+    return group_table(content.groups, f"{runs}, over the horizon of the fit.")
 
 
 def profiles(content: IdentificationContent) -> Figure | None:
@@ -410,8 +421,8 @@ SECTIONS: dict[str, Section] = {
     ),
     "what-is-left": Section(
         "What is left over",
-        lambda content: (residuals(content), profiles(content)),
-        anchors=("residuals", "profiles"),
+        lambda content: (sides(content), residuals(content), profiles(content)),
+        anchors=("sides", "residuals", "profiles"),
     ),
     "next": Section(
         "What to run next", lambda content: (programme(content),), needs=("programme",), anchors=("programme",)

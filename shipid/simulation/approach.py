@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.helm import Unit
+from shipid.physics.helm import Unit, course_keeping
 from shipid.physics.signals import is_shaft, neutral, steers
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -30,6 +30,9 @@ PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = (
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
+KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
+LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
+REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
 WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
@@ -117,23 +120,42 @@ def helm_effect(controls: Controls, n: float, u: float) -> float:
     return float(yaw[1] - yaw[0]) / PROBE_HELM
 
 
-def steady(
-    controls: Controls, n: Array, *, step: float, method: Method, engine: str
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """States and actuator states (S,) of steady straight motion in calm water at shaft speeds n (S,) [rev/s].
+class NotStraight(ShipidError):
+    """The ship does not go straight ahead with the helm amidships."""
 
-    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s. Position and heading are
-    then set to 0.
+
+@dataclass(frozen=True)
+class Approach:
+    """Steady straight motion of S samples.
+
+    state, memory : name -> (S,), states, and actuator states. helm : angle command -> (S,) [rad] that holds the course.
+    """
+
+    state: dict[str, Array]
+    memory: dict[str, Array]
+    helm: dict[str, Array]
+
+
+def steady(controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False) -> Approach:
+    """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
+
+    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s, with the helm amidships,
+    or held on course by a helmsman. Position and heading are then set to 0.
 
     Raises
     ------
-    ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships.
+    ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships (`NotStraight`).
     """
-    vessel, model = controls.vessel, dynamics(controls.vessel)
-    names, count = (*model.state, *model.hidden), len(n)
+    vessel, count = controls.vessel, len(n)
+    helmsman = course_keeping(controls.commands) if held else None
+    model = dynamics(vessel, helmsman)
+    names = (*model.state, *model.hidden)
     state = {name: np.zeros(count) for name in names}
-    orders = controls.orders(n, np.zeros(count))
-    memory = {name: orders[name].copy() for name in model.memory}
+    orders = controls.orders(n, np.full(count, KEEPING if held else 0.0))
+    memory = {name: orders[name].copy() if name in orders else np.zeros(count) for name in model.memory}
+    if held:
+        memory |= {name: np.zeros(count) for name in memory if steers(name)}
+        orders |= _course(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
     for _ in range(int(LONGEST / CHUNK)):
@@ -147,6 +169,7 @@ def steady(
             every=num_steps,
             method=method,
             memory={name: values[moving] for name, values in memory.items()},
+            helmsman=helmsman,
             engine=engine,
         )
         if path.diverged.any():
@@ -156,27 +179,76 @@ def steady(
             )
         velocities = model.state[model.num_dof :]
         changed = np.max([np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities], axis=0)
+        if held:  # on course, too: a slow integral part changes the velocities little
+            changed = np.maximum(changed, np.abs(path["psi"][-1, 0]))
         for name in names:
             state[name][moving] = path[name][-1, 0]
         for name, values in memory.items():
             values[moving] = path[f"actual.{name}"][-1, 0]
         moving = moving[changed >= SETTLED]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
-            _check_straight(vessel, n, state["r"])
+            if not held:
+                _check_straight(vessel, n, state["r"])
+            helm = _held(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
-            return state | {name: np.zeros(count) for name in anew}, memory
-    raise ShipidError(
+            kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
+            return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
+    remedy = 'start from rest (approach = "rest")' if held else REMEDY
+    raise NotStraight(
         f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
-        'start from rest (approach = "rest")'
+        f"{remedy}"
     )
+
+
+def _course(controls: Controls, n: Array) -> dict[str, Array]:
+    """Inputs (S,) of the helmsman: course 0, natural frequency 2 U / L, and the effect of the helm at the speed U."""
+    length = float(controls.vessel.document.get("particulars", {}).get("L_pp", LENGTH))
+    speeds = np.array([_speed(controls, shaft) for shaft in n])
+    effects = [KEEPING * helm_effect(controls, shaft, speed) for shaft, speed in zip(n, speeds, strict=True)]
+    if min(effects) <= 0:
+        raise ShipidError(f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} rpm")
+    return {"course": np.zeros(len(n)), "omega": 2 * speeds / length, "effect": np.array(effects)}
+
+
+def _speed(controls: Controls, n: float) -> float:
+    """Speed ahead [m/s] at which the surge acceleration is 0, at shaft speed n [rev/s] and helm amidships."""
+    orders = {name: float(order[0]) for name, order in controls.orders(np.full(1, n), np.zeros(1)).items()}
+    low, high = 0.0, 0.1
+    while high < FASTEST and acceleration(controls.vessel, high, orders)[0] > 0:
+        low, high = high, 2 * high
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if acceleration(controls.vessel, middle, orders)[0] > 0 else (low, middle)
+    return high
+
+
+def _held(
+    controls: Controls,
+    model: Dynamics,
+    state: Mapping[str, Array],
+    memory: Mapping[str, Array],
+    orders: Mapping[str, Array],
+) -> dict[str, Array]:
+    """Angle command -> (S,) order [rad] that the helmsman gives in the steady state."""
+    count = len(next(iter(state.values())))
+    calm = np.zeros((len(model.environment), count))
+    rows = [
+        np.array([given[name] for name in names]).reshape(len(names), count)
+        for given, names in (
+            (state, (*model.state, *model.hidden)), (memory, tuple(model.memory)), (orders, model.commands)
+        )
+    ]  # fmt: skip
+    values = np.tile(np.array(list(controls.vessel.parameters.values()))[:, None], count)
+    given = dict(zip(model.ordered, np.array(model.orders.map(count)(*rows, calm, values)), strict=True))
+    return {name: given[name] for name in controls.helm}
 
 
 def _check_straight(vessel: Vessel, n: Array, r: Array) -> None:
     turning = np.abs(r) >= SETTLED
     if turning.any():
-        raise ShipidError(
+        raise NotStraight(
             f"{vessel.name} turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach: "
-            'start from rest (approach = "rest")'
+            f"{REMEDY}"
         )
 
 

@@ -60,9 +60,9 @@ class Draw(BaseModel):
         level = get_args(fields["orders"])[1] if "orders" in fields else None
         for key, value in _flat(self.model_extra or {}):
             if key in fields and key != "orders":
-                given[key] = value if _takes_many(fields[key]) else _drawn(key, value, at)
+                given[key] = value if takes_many(fields[key]) else _drawn(key, value, at)
             elif level is not None and key not in SHARED:
-                orders[key] = _range(key, value) if _takes_many(level) else _drawn(key, value, at)
+                orders[key] = _range(key, value) if takes_many(level) else _drawn(key, value, at)
             else:
                 remedy = "[truth] gives it for all runs" if key in SHARED else choices(key, fields)
                 raise ValueError(f"{key}: no key of {self.kind}: {remedy}")
@@ -91,12 +91,12 @@ def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return result
 
 
-def _takes_many(annotation: Any) -> bool:
+def takes_many(annotation: Any) -> bool:
     """Whether the type of a field is a tuple, list or table, so that a list is its value and not a range."""
     if get_origin(annotation) is Annotated:
-        return _takes_many(get_args(annotation)[0])
+        return takes_many(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):
-        return any(map(_takes_many, get_args(annotation)))
+        return any(map(takes_many, get_args(annotation)))
     return get_origin(annotation) in (tuple, list, dict)
 
 

@@ -6,7 +6,7 @@ Sign convention: helm > 0 turns the ship to starboard, whatever sign the command
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -42,11 +42,13 @@ class Start:
     shaft : shaft speed [rev/s] of a steady straight approach in calm water; None: no approach.
     speed : speed ahead [m/s] without an approach.
     at_order : whether actuators with lag have reached their first orders; else they are at 0.
+    held : whether a helmsman holds the approach on course; else the helm is amidships.
     """
 
     shaft: float | None = None
     speed: float = 0.0
     at_order: bool = False
+    held: bool = False
 
 
 class Manoeuvre(BaseModel, ABC):
@@ -180,13 +182,20 @@ class Approached(Manoeuvre):
 
     n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
     approach: Annotated[
-        Literal["steady", "rest"], Field(description="straight ahead at n_rpm in calm water until steady, or at rest")
+        Literal["steady", "helmsman", "rest"],
+        Field(description="in calm water at n_rpm until steady, helm amidships or by a helmsman; or at rest"),
     ] = "steady"
 
     @property
     def start(self) -> Start:
         """Initial state: steady straight ahead, or at rest."""
-        return Start(shaft=self.n_rpm * RPM) if self.approach == "steady" else Start()
+        if self.approach == "rest":
+            return Start()
+        return Start(shaft=self.n_rpm * RPM, held=self.approach == "helmsman")
+
+    def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:  # noqa: ARG002
+        """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
+        return inputs
 
     @property
     def greatest_helm(self) -> float:
@@ -220,6 +229,11 @@ class Executed(Approached):
     """A manoeuvre with straight motion until its first order is executed."""
 
     execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
+
+    def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:
+        """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
+        before = ~_from(self.execute_at, t)
+        return inputs | {name: np.where(before, angle, inputs[name]) for name, angle in helm.items()}
 
 
 class Timed(Executed):
@@ -335,6 +349,10 @@ class ReverseSpiral(Executed):
         """Length of the log [s]."""
         return self.execute_at + len(self.rates_deg) * self.hold
 
+    def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:  # noqa: ARG002
+        """The inputs as they are: its helmsman holds the course from t = 0 on."""
+        return inputs
+
     def helmsman(self, controls: Controls) -> Helmsman:
         """The yaw-rate helmsman: a PI controller of the yaw rate by the helm."""
         return helm.yaw_rate(controls.commands)
@@ -425,7 +443,7 @@ class StationKeeping(Approached):
     """Azimuth units hold a position and a heading from t = 0 on."""
 
     n_rpm: FiniteFloat = 0.0
-    approach: Literal["steady", "rest"] = "rest"
+    approach: Literal["steady", "helmsman", "rest"] = "rest"
     duration: Annotated[Positive, Field(description="s")]
     north: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0
     east: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0

@@ -17,8 +17,10 @@ from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.simulation.approach import NotStraight
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, length_of, standard
+from shipid.units import RPM
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
@@ -57,15 +59,65 @@ def measure_standard(
     side: str = "starboard",
     duration: float | None = None,
     step: float | None = None,
+    approach: str | None = None,
+    engine: str = "auto",
 ) -> Measured:
-    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`."""
-    chosen = standard(vessel, name, angles, speed=speed, side=side, duration=duration, step=step)
-    frame = perform(vessel, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    frame = frame[[column for column in frame if not str(column).startswith("actual.")]]
+    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`.
+
+    engine : of the rollout; `repeated` where many vessels of one structure follow.
+    approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.
+    """
+    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step, "approach": approach}
+    return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]
+
+
+def measure_all(
+    vessel: Vessel,
+    wanted: Sequence[tuple[str, Sequence[float], str]],
+    *,
+    speed: float | None = None,
+    duration: float | None = None,
+    step: float | None = None,
+    approach: str | None = None,
+    engine: str = "auto",
+) -> list[Measured]:
+    """Simulate standard manoeuvres from one approach, each a name, angles [deg] and side; see `measure_standard`."""
+    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step}
+    for given in (approach,) if approach else ("steady", "helmsman"):
+        chosen = list[Standard]()
+        for name, angles, side in wanted:
+            n = chosen[0].manoeuvre.n_rpm * RPM if chosen else None
+            chosen.append(standard(vessel, name, angles, side=side, approach=given, n=n, **how))
+        runs = [one.manoeuvre.model_copy(update={"name": str(number)}) for number, one in enumerate(chosen)]
+        try:
+            log = perform(vessel, runs, step=chosen[0].step, interval=chosen[0].interval, engine=engine)
+        except NotStraight:
+            if approach is not None or given == "helmsman":
+                raise
+            continue
+        break
+    log = log[[column for column in log if not str(column).startswith("actual.")]]
+    return [
+        _read(vessel, one, log[log["run"] == run.name].reset_index(drop=True))
+        for one, run in zip(chosen, runs, strict=True)
+    ]
+
+
+def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
+    """The measures of one log."""
     record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
     measures, length = MEASURES[chosen.kind](record), length_of(vessel)
     judged = criterion_rows(criteria(chosen.kind, measures, length))
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
+
+
+def approached(chosen: Standard) -> str:
+    """The approach in words."""
+    n_rpm = chosen.manoeuvre.n_rpm
+    if chosen.manoeuvre.approach == "rest":
+        return f"from rest, {n_rpm:.4g} rpm"
+    held = ", held on course by a helmsman" if chosen.manoeuvre.approach == "helmsman" else ""
+    return f"approach at {chosen.speed:.3g} m/s ({n_rpm:.4g} rpm){held}"
 
 
 def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
@@ -102,7 +154,7 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
-            "Approach": f"{chosen.speed:.4g} m/s at {chosen.manoeuvre.n_rpm:.5g} rpm, calm deep water, no wind",
+            "Approach": f"{approached(chosen)}, calm deep water, no wind",
             "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
             "shipid": __version__,
         },

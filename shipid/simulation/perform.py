@@ -16,12 +16,13 @@ from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
 from shipid.simulation.approach import Controls, steady
 from shipid.simulation.log import ON_BOARD, logged, run_names
-from shipid.simulation.manoeuvre import Manoeuvre
+from shipid.simulation.manoeuvre import Approached, Manoeuvre
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
+ROWS = 256  # orders of a helmsman that are evaluated at once
 
 
 def perform(
@@ -117,8 +118,12 @@ def _together(
     """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
     vessel, num_steps = controls.vessel, every * (batch.rows - 1)
     model, t = dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
-    start, memory = _start(batch.manoeuvres, controls, how)
+    start, memory, helms = _start(batch.manoeuvres, controls, how)
     inputs = [one.inputs(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
+    for sample, helm in helms.items():
+        one = batch.manoeuvres[sample]
+        assert isinstance(one, Approached)
+        inputs[sample] = one.held(inputs[sample], t, helm)
     commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
     if helmsman is None:
         ready = [sample for sample, one in enumerate(batch.manoeuvres) if one.start.at_order]
@@ -185,21 +190,30 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
 
 def _start(
     manoeuvres: Sequence[Manoeuvre], controls: Controls, how: Mapping[str, Any]
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """States and actuator states at t = 0, name -> (num_manoeuvres,); actuators are at 0 without an approach."""
+) -> tuple[dict[str, Array], dict[str, Array], dict[int, dict[str, float]]]:
+    """States and actuator states at t = 0, name -> (num_manoeuvres,); actuators are at 0 without an approach.
+
+    Also, for each manoeuvre whose approach a helmsman holds, angle command -> helm [rad].
+    """
     model, count = dynamics(controls.vessel), len(manoeuvres)
     starts = [one.start for one in manoeuvres]
     start = {name: np.zeros(count) for name in (*model.state, *model.hidden)}
     memory = {name: np.zeros(count) for name in model.memory}
-    moving = [sample for sample, one in enumerate(starts) if one.shaft is not None]
-    if moving:
+    helms: dict[int, dict[str, float]] = {}
+    for held in (False, True):
+        moving = [sample for sample, one in enumerate(starts) if one.shaft is not None and one.held == held]
+        if not moving:
+            continue
         speeds, which = np.unique([starts[sample].shaft for sample in moving], return_inverse=True)
-        for into, settled in zip((start, memory), steady(controls, speeds, **how), strict=True):
-            for name, values in settled.items():
+        settled = steady(controls, speeds, held=held, **how)
+        for into, values_of in ((start, settled.state), (memory, settled.memory)):
+            for name, values in values_of.items():
                 into[name][moving] = values[which]
+        for sample, place in zip(moving if held else (), which, strict=False):
+            helms[sample] = {name: float(values[place]) for name, values in settled.helm.items()}
     start["u"] = start["u"] + np.array([0.0 if one.shaft is not None else one.speed for one in starts])
     start["psi"] = start["psi"] + np.array([one.course_deg * DEGREE for one in manoeuvres])
-    return start, memory
+    return start, memory, helms
 
 
 def _orders(
@@ -225,8 +239,14 @@ def _orders(
     memory = [path.names.index(f"actual.{name}") for name in model.memory]
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
     values = np.array(list(vessel.parameters.values()))
-    # record by record: a map of all is slow to build
-    rows = model.orders.map("rows", "serial", samples, [model.orders.n_in() - 1], [])
-    parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
-    ordered = np.array([np.array(rows(*(part[k].T for part in parts), values)) for k in range(records)])
-    return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
+    count = records * samples
+    each = min(count, ROWS)  # by pieces: a map of all is slow to build
+    rows = model.orders.map("rows", "serial", each, [model.orders.n_in() - 1], [])
+    padded = np.minimum(np.arange(-(-count // each) * each), count - 1)
+    parts = [part.reshape(count, -1)[padded].T for part in (states, path.states[:, 0][..., memory], given, felt)]
+    pieces = [
+        np.array(rows(*(part[:, first : first + each] for part in parts), values))
+        for first in range(0, len(padded), each)
+    ]
+    ordered = np.concatenate(pieces, axis=1)[:, :count].reshape(len(model.ordered), records, samples)
+    return {name: ordered[channel] + 0.0 for channel, name in enumerate(model.ordered)}

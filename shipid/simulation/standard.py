@@ -27,6 +27,7 @@ from shipid.vessel.load import Vessel
 FROUDE, GRAVITY = 0.2, 9.81  # default speed: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 HALVINGS, MOST_RPM = 60, 6000.0
+APPROACHES = ("steady", "helmsman", "rest")
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
 # in ship lengths at the approach speed: log before the execute, and duration of each kind
 LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
@@ -59,6 +60,8 @@ def standard(
     side: str = "starboard",
     duration: float | None = None,
     step: float | None = None,
+    approach: str = "steady",
+    n: float | None = None,
 ) -> Standard:
     """Define a standard manoeuvre for a vessel.
 
@@ -71,11 +74,13 @@ def standard(
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
         for a zigzag, 40 for a level of a spiral, 80 for a stop.
     step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
+    approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
+    n : shaft speed [rev/s] of the approach; default: that which gives the speed.
 
     Raises
     ------
-    ShipidError : an unknown name or side, angles that do not fit, no length, a speed that no shaft speed gives, a time
-        that is not positive.
+    ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed
+        gives, a time that is not positive.
     """
     if name not in KINDS:
         raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
@@ -84,6 +89,8 @@ def standard(
         raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
+    if approach not in APPROACHES:
+        raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
         if value is not None and not value > 0:
             raise ShipidError(f"{value:g} s must be positive", path=option)
@@ -91,12 +98,13 @@ def standard(
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     asked = service_speed(vessel) if speed is None else speed
-    n_rpm = shaft_speed(Controls.of(vessel), asked) / RPM
+    n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else n) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = float(np.ceil(LEAD * passing / interval) * interval)
     course = 0.0 if name in ROUND else 90.0  # straight tracks are drawn from left to right
-    manoeuvre = build(angles, side, duration, passing, {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course})
+    how = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
+    manoeuvre = build(angles, side, duration, passing, how)
     return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
 
 

@@ -33,8 +33,8 @@ def check_folder(folder: Path) -> Checked:
     plan = store.stored_plan(folder)
     faults = seals.faults(folder)
     lines = [f"{folder / fault.file}: {WORDS[fault.kind]}" for fault in faults]
-    done = len(store.finished(folder, plan.batches))
-    lines.append(f"{done} of {len(plan.batches)} batches finished, {len(faults)} faults")
+    done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
+    lines.append(f"{done} of {plan.cells} cells finished, {len(faults)} faults")
     if held := claims.held(folder):
         lines.append(f"at work, or ended without giving back: {', '.join(held)}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]

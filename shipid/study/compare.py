@@ -19,6 +19,13 @@ ALONE = "alone"
 """Method of the rows of A, which no data improve."""
 
 
+def are_worlds(folders: Sequence[Path]) -> bool:
+    """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
+    plans = [stored_plan(folder) for folder in folders]
+    same = len({plan.digest_in_any_world for plan in plans}) == 1
+    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
+
+
 def read_worlds(folders: Sequence[Path]) -> list[Results]:
     """Read finished runs of one study in different worlds; ResultError where they are not."""
     if len(folders) < 2:

@@ -13,8 +13,9 @@ from shipid.files import write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent
-from shipid.study import advise, bands, memory, methods, store
+from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
+from shipid.study.claims import Claims
 from shipid.study.findings import findings
 from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
@@ -22,6 +23,7 @@ from shipid.study.store import write_results
 
 log = logging.getLogger(__name__)
 
+PAGES = "report"  # name of the claim on the pages
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
@@ -86,13 +88,30 @@ def write_pages(folder: Path) -> Path:
     return report
 
 
+def share_pages(folder: Path) -> Path:
+    """As `write_pages`, where several processes may end together: one writes, the others wait for it."""
+    report, parts = folder / REPORT, store.stored_plan(folder).parts
+    places = [store.part_folder(folder, name) for name in parts] or [folder]
+
+    def is_done() -> bool:
+        try:
+            tables = max(seals.seal_file(place, store.RESULTS).stat().st_mtime for place in places)
+            return report.stat().st_mtime >= tables and (folder / ANSWER).is_file()
+        except FileNotFoundError:
+            return False
+
+    with Claims(folder) as claims:
+        claims.once(PAGES, is_done, lambda: write_pages(folder))
+    return report
+
+
 def _write_parts(plan: Plan, folder: Path) -> Path:
     """Write the pages of all parts that have results, and the page that compares methods over them."""
     cells: list[pd.DataFrame] = []
     notes: dict[str, str] = {}
     for name, part in plan.parts.items():
         mine = store.part_folder(folder, name)
-        if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.batches):
+        if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
             notes[name] = "no cell is finished yet"
             continue
         write_pages(mine)

@@ -57,21 +57,54 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
     if len(counts) < FEWEST_RUNS:
         blank = np.full_like(mean, np.nan)
         return Contrasts(mean, blank, blank, blank, blank)
-    drawn, spread = _resampled(differences, weights)
-    error = np.hypot(spread, training)
+    away, spreads, spread = _bootstrap(differences, weights)
+    return _judged(mean, _distances(away, spreads, spread), np.hypot(spread, training), len(counts) - 1)
+
+
+def contrasts_apart(
+    one: Array, one_counts: Array, other: Array, other_counts: Array, training: Array | float = 0.0
+) -> Contrasts:
+    """Judge differences of mean errors over two sets of manoeuvres that are not the same ones: one less other.
+
+    Each set is resampled by itself; the degrees of freedom are Welch's (1947). Not a number for all but the mean where
+    either set has fewer than `FEWEST_RUNS` manoeuvres.
+
+    Parameters
+    ----------
+    one, other : (J, R) and (J, Q) mean error in each test manoeuvre [m].
+    one_counts, other_counts : (R,) and (Q,) windows of each manoeuvre, its weight.
+    training : standard error of each difference from training alone [m], (J,) or one for all.
+    """
+    sides = [(one, one_counts / one_counts.sum()), (other, other_counts / other_counts.sum())]
+    mean: Array = one @ sides[0][1] - other @ sides[1][1]
+    if min(len(one_counts), len(other_counts)) < FEWEST_RUNS:
+        blank = np.full_like(mean, np.nan)
+        return Contrasts(mean, blank, blank, blank, blank)
+    (here, spreads, spread), (there, more, wide) = (_bootstrap(*side, SEED + k) for k, side in enumerate(sides))
+    error = np.hypot(spread, wide)
+    shares = np.square(np.stack([spread, wide]) / np.maximum(error, 1e-300))
+    least = min(len(one_counts), len(other_counts)) - 1
+    freedom = np.maximum(
+        1 / (shares[0] ** 2 / (len(one_counts) - 1) + shares[1] ** 2 / (len(other_counts) - 1) + 1e-12), least
+    )
+    return _judged(mean, _distances(here - there, np.hypot(spreads, more), error), np.hypot(error, training), freedom)
+
+
+def _judged(mean: Array, drawn: Array, error: Array, freedom: Array | int) -> Contrasts:
+    """Intervals and chances of means from resampled distances (B, J); those of Student where they are wider."""
     ahead = mean / np.maximum(error, 1e-12 * np.abs(mean) + 1e-300)
-    student = float(stdtrit(len(counts) - 1, 1 - LEVEL))
+    student = stdtrit(freedom, 1 - LEVEL)
     lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower"), -student)
     upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher"), student)
-    chances = (_beyond(drawn, ahead, counts), _beyond(-drawn, -ahead, counts))
+    chances = (_beyond(drawn, ahead, freedom), _beyond(-drawn, -ahead, freedom))
     return Contrasts(mean, mean - upper * error, mean - lower * error, *chances)
 
 
-def _resampled(differences: Array, weights: Array) -> tuple[Array, Array]:
-    """Bootstrap-t of weighted means: (B, J) distances from the mean in standard errors; (J,) standard errors [m]."""
-    draws = _draws(len(weights))
-    mean = differences @ weights
-    sums = weights * differences  # (J, R)
+def _bootstrap(values: Array, weights: Array, seed: int = SEED) -> tuple[Array, Array, Array]:
+    """(B, J) resampled weighted means less the mean, (B, J) their standard errors, (J,) that of the mean [m]."""
+    draws = _draws(len(weights), seed)
+    mean = values @ weights
+    sums = weights * values  # (J, R)
     total = draws @ weights
     means = (draws @ sums.T) / total[:, None]
     squares = draws @ (sums**2).T - 2 * means * (draws @ (sums * weights).T)
@@ -79,22 +112,27 @@ def _resampled(differences: Array, weights: Array) -> tuple[Array, Array]:
     correction = len(weights) / (len(weights) - 1)
     spread = np.sqrt(correction * np.maximum(squares, 0.0)) / total[:, None]
     here = np.sqrt(correction * np.square(sums - mean[:, None] * weights).sum(axis=1))
-    far = np.sign(means - mean) * 1e6
+    return means - mean, spread, here
+
+
+def _distances(away: Array, spread: Array, here: Array) -> Array:
+    """(B, J) distances from the mean in standard errors (bootstrap-t)."""
     tiny = spread <= 1e-6 * np.maximum(here, 1e-300)  # one manoeuvre drawn again and again
-    return np.where(tiny, far, (means - mean) / np.where(tiny, 1.0, spread)), here
+    distances: Array = np.where(tiny, np.sign(away) * 1e6, away / np.where(tiny, 1.0, spread))
+    return distances
 
 
-def _beyond(drawn: Array, ahead: Array, counts: Array) -> Array:
+def _beyond(drawn: Array, ahead: Array, freedom: Array | int) -> Array:
     """Share of resampled distances that reach the observed one, or Student's where that is larger or none reaches."""
-    share, student = (drawn >= ahead).mean(axis=0), stdtr(len(counts) - 1, -ahead)
+    share, student = (drawn >= ahead).mean(axis=0), stdtr(freedom, -ahead)
     chance: Array = np.maximum(share, student)
     return chance
 
 
 @lru_cache(maxsize=8)
-def _draws(runs: int) -> Array:
+def _draws(runs: int, seed: int = SEED) -> Array:
     """(B, R) how often each of R manoeuvres is drawn, with replacement."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     return rng.multinomial(runs, np.full(runs, 1 / runs), RESAMPLES).astype(float)
 
 

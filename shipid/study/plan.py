@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -286,7 +287,7 @@ class Way:
 
 @dataclass(frozen=True)
 class Batch:
-    """The unit of work: every foundation with every method at one amount of data and one seed; they share windows."""
+    """Every foundation with every method at one amount of data and one seed; they share windows."""
 
     N_D: int
     seed: int
@@ -299,6 +300,23 @@ class Batch:
     def cell(self, foundation: str, method: str) -> str:
         """Name of the cell of a foundation with a method in this batch."""
         return f"{foundation}{WITH}{method}-{self.key}"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of work: cells of a batch that share more than windows, such as a decomposition or an identification.
+
+    pairs : names of a foundation and a method for each cell, in the order of the plan. key : file-safe name: that of
+        the batch, or of the first cell where the batch has several units.
+    """
+
+    batch: Batch
+    pairs: tuple[tuple[str, str], ...]
+    key: str
+
+    def foundations(self, method: str) -> tuple[str, ...]:
+        """Names of the foundations that a method meets in this unit."""
+        return tuple(foundation for foundation, name in self.pairs if name == method)
 
 
 @dataclass(frozen=True)
@@ -419,6 +437,38 @@ class Plan:
     def cells(self) -> int:
         """Number of cells."""
         return len(self.batches) * len(self.pairs)
+
+    @cached_property
+    def units(self) -> tuple[Unit, ...]:
+        """All work, the largest amounts of data first; a unit repeats hardly anything that another one does."""
+        groups = self._shared()
+        return tuple(
+            Unit(batch, group, batch.key if len(groups) == 1 else batch.cell(*group[0]))
+            for batch in self.batches
+            for group in groups
+        )
+
+    def whole(self, batch: Batch) -> Unit:
+        """All cells of a batch as one unit."""
+        return Unit(batch, tuple((name, way.name) for name, way in self.pairs), batch.key)
+
+    def _shared(self) -> list[tuple[tuple[str, str], ...]]:
+        """The cells of a batch in groups: one group shares a fit of several foundations, or an identification."""
+        known = {one.name: one for one in self.foundations}
+        groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
+        for name, way in self.pairs:
+            one = known[name]
+            shares: set[Any] = {way.name} if way.method.together else set()
+            if one.identify is not None and one.variant is not None:
+                shares.add((one.variant.name, one.identify.model_dump_json()))
+            pairs = [(name, way.name)]
+            for group in [group for group in groups if group[0] & shares]:
+                groups.remove(group)
+                shares |= group[0]
+                pairs = [*group[1], *pairs]
+            groups.append((shares, pairs))
+        order = {(name, way.name): place for place, (name, way) in enumerate(self.pairs)}
+        return sorted((tuple(sorted(pairs, key=order.__getitem__)) for _, pairs in groups), key=lambda g: order[g[0]])
 
     def cut(self, columns: int) -> Cut:
         """What decides how much memory the windows take, for a dataset of so many columns."""

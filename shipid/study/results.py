@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json
 from shipid.hybrid.bands import Bands, Region
 from shipid.metrics import error_by_axis, over_horizon, over_horizon_by_axis, over_time, position_error, summary
@@ -69,6 +70,41 @@ class Results:
         """Whether every cell of the plan is there."""
         return len(self.cells) == self.plan.cells
 
+    def to_xarray(self) -> Any:
+        """Return an `xarray.Dataset` of the metrics [m, 1, s] over foundation, method, N_D and seed; needs xarray.
+
+        Cells that are not there, or have no result, are NaN; `units` and the study's name are attributes.
+        """
+        if find_spec("xarray") is None:  # pandas makes the dataset
+            raise ShipidError("needs xarray, which is not installed: pip install xarray")
+        keys = ["foundation", "method", "N_D", "seed"]
+        dataset = self.cells.set_index(keys)[list(store.METRICS)].to_xarray()
+        for name, unit in store.UNITS.items():
+            dataset[name].attrs["units"] = unit
+        dataset.attrs.update({"study": self.plan.name, "digest": self.plan.digest})
+        return dataset
+
+
+def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
+    """Read one row per finished cell of a run, without its predictors: the quick way from a folder to a table.
+
+    Columns: cell, foundation, family, member, method, N_D, runs, minutes [min], seed, status, sentence, A, A_90, A_rms,
+    H, H_90, rms, width [m], coverage [1], seconds [s], trials (a list of dicts), and, of a study of several parts,
+    condition and part. Raises ResultError for a folder without a finished cell.
+    """
+    folder = Path(folder)
+    plan = store.stored_plan(folder)
+    if not plan.parts:
+        return store.read_rows(folder)
+    frames = [
+        store.read_rows(place).assign(condition=part.condition, part=name)
+        for name, part in plan.parts.items()
+        if (place := store.part_folder(folder, name)).is_dir() and store.finished(place, part.plan.units)
+    ]
+    if not frames:
+        raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
+    return pd.concat(frames, ignore_index=True)
+
 
 def read_results(folder: str | os.PathLike[str]) -> Results:
     """Read a run's folder and predict every test window with every stored cell."""
@@ -78,7 +114,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check(folder)
-    cells = store.read_rows(folder)
+    cells = store.read_rows(folder, plan)
     cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,12 +15,14 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
+from shipid.files import make_folder, sweep, write_table
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
 from shipid.study.plan import NO_MODEL, Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 from shipid.study.verdict import Finding
+from shipid.version import __version__
 
 KEYS = [
     *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
@@ -41,13 +46,22 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
     return [run for run in runs if run in chosen]
 
 
-def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu") -> Iterator[pd.DataFrame]:
+def rotate(
+    plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu", kept: Path | None = None
+) -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
     A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
-    [1] and width [m] of the band, naive [m], status. No
-    training window shares a moment with the test run.
+    [1] and width [m] of the band, naive [m], status. No training window shares a moment with the test run.
+
+    Parameters
+    ----------
+    kept : folder for what is finished, seed by seed, and for the trials of searches; made where it is not there. The
+        same call with the same folder goes on after an interruption, and yields the same digits. None: nothing is kept.
     """
+    if kept is not None:
+        make_folder(kept)
+        sweep(kept)
     for test in tests:
         split = plan.study.split.model_copy(update={"test": [test]})
         least = plan.study.model_copy(update={"split": split, "grid": plan.study.grid.model_copy(update={"N_D": [2]})})
@@ -56,10 +70,57 @@ def rotate(plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cp
         study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
         batches = tuple(Batch(amount, seed) for seed in sorted(set(study.grid.seeds)))
         turn = replace(plan, study=study, batches=batches)
-        prepared = prepare(turn, dataset, device)
-        floor = float(prepared.naive.mean())
-        rows = [row for batch in batches for row, _ in run_batch(turn, prepared, batch, device)]
-        yield pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
+        done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in batches}
+        if any(done.get(batch) is None for batch in batches):
+            yield _computed(turn, dataset, test, device, kept, done)
+        else:
+            yield pd.concat([done[batch] for batch in batches])
+
+
+def _computed(
+    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, done: Mapping[Batch, pd.DataFrame | None]
+) -> pd.DataFrame:
+    """Cells of a turn; those of its batches that are not done are computed, and kept."""
+    trials = None if kept is None else kept / documents.digest(test)
+    if trials is not None:
+        trials.mkdir(parents=True, exist_ok=True)
+    prepared = prepare(turn, dataset, device)
+    floor = float(prepared.naive.mean())
+    frames = []
+    for batch in turn.batches:
+        frame = done.get(batch)
+        if frame is None:
+            rows = [row for row, _ in run_unit(turn, prepared, turn.whole(batch), device, trials)]
+            frame = pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
+            if kept is not None:
+                write_table(_file(kept, test, batch), frame)
+        frames.append(frame)
+    return pd.concat(frames)
+
+
+def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
+    """Where the turns of an interrupted rotation to a file are kept: a folder of its own for all that decides them."""
+    decides = [plan.digest, dataset.digest, device, __version__]
+    return file.with_name(f"{file.name}.turns") / documents.digest(decides)
+
+
+def forget(kept: Path) -> None:
+    """Remove the folder of kept turns: its table is written."""
+    shutil.rmtree(kept, ignore_errors=True)
+    with suppress(OSError):  # of another rotation to the same file
+        kept.parent.rmdir()
+
+
+def _file(kept: Path, test: str, batch: Batch) -> Path:
+    return kept / f"{documents.digest(test)}-{batch.key}.parquet"
+
+
+def _read(file: Path) -> pd.DataFrame | None:
+    """Rows of a batch of a turn; None where it is not finished, or the file is damaged."""
+    try:
+        return pd.read_parquet(file)
+    except (OSError, ValueError):
+        return None
 
 
 def spread(frame: pd.DataFrame) -> pd.DataFrame:

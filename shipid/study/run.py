@@ -1,39 +1,37 @@
-"""Run a plan: batches on workers, results stored as they come, so that an interrupted run resumes."""
+"""Run a plan: units of work on workers, results stored as they come, so that an interrupted run resumes."""
 
 from __future__ import annotations
 
-import logging
 import os
 import platform
 import sys
 import time
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.native import engine
-from shipid.errors import ShipidError
-from shipid.files import read_json, write_json
+from shipid.files import make_folder, read_json, write_json
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.training import check_device, use_threads
+from shipid.hybrid.training import check_device, use_threads, vectors
 from shipid.metrics import position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
-from shipid.study.claims import Claims, pause
+from shipid.study.claims import WAIT, Claims, pause
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, apart, predictions
-from shipid.study.plan import Batch, Foundation, Plan, Way
+from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
 from shipid.study.prepare import (
     Prepared,
     at_instants,
@@ -49,14 +47,10 @@ from shipid.study.workers import import_for_workers, on_workers
 
 PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
-DASK = {  # a graph is never large here; a scheduler that is gone is noticed in seconds
-    "distributed.admin.large-graph-warning-threshold": "1GB",
-    "distributed.comm.timeouts.connect": "5s",
-    "distributed.comm.retry.count": 0,
-}
-DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all batches share
-Rows = list[dict[str, Any]]
-Computed = Iterator[tuple[Batch, list[tuple[dict[str, Any], Predictor | None]]]]
+DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
+SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
+Results = list[tuple[dict[str, Any], Predictor | None]]
+Computed = Iterator[tuple[Unit, Results]]
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
@@ -65,7 +59,8 @@ ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 class Event:
     """Something a user may want to see while a study runs.
 
-    kind : `note` (text), `start` (done and total cells known), `cell` (one finished: row), `end` (text: the folder).
+    kind : `note` (text), `start` (done and total cells known), `cell` (one finished: row), `others` (done: with what
+        other processes in the folder have finished), `end` (text: the folder; done: all, or less if others go on).
     """
 
     kind: str
@@ -82,81 +77,105 @@ def run_study(
     workers: int | None = None,
     scheduler: str | None = None,
     device: str = "cpu",
+    leave: bool = False,
 ) -> Iterator[Event]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
-    Numbers do not depend on the workers or on interruptions: an interrupted batch is done again, its searches go on
-    from the journal of trials.
+    Numbers do not depend on the workers or on interruptions: an interrupted unit of work is done again, its searches go
+    on from their journal. Any number of processes, on one machine or several, may run one plan in one folder.
 
     Parameters
     ----------
-    workers : local processes, one thread each; default: one per core, no more than batches.
+    workers : local processes, one thread each; default: one per core, no more than units of work.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
+    leave : end when other processes work on all that is left; the one that ends last writes the tables.
     """
     begun = time.perf_counter()
     check_device(device)
     store.open_folder(folder, plan)
     if plan.parts:
-        yield from _run_parts(plan, folder, workers, scheduler, device)
+        yield from _run_parts(plan, folder, workers, scheduler, device, leave)
         return
-    for words in (*seals.mend(folder), *_other_session(folder, device)):
-        yield Event("note", words)
     if scheduler is None:
         import_for_workers()
-    if not seals.is_sealed(folder, DATA):
-        made = plan.study.data is not None and plan.study.data.dataset is not None
-        doing = "reading the dataset" if made else "importing the log"
-        yield Event("note", "simulating the truth" if plan.study.truth else doing)
-        write_dataset(obtain(plan), folder / store.DATASET)
-        seals.write_seal(folder, DATA, [folder / store.DATASET])
-    dataset = read_dataset(folder / store.DATASET)
-    yield Event("note", "rolling out the foundations")
-    prepared = prepare(plan, dataset, device)
-    if not seals.is_sealed(folder, COMMON):
-        _write_common(plan, folder, prepared)
-    for note in prepared.notes:
-        yield Event("note", note)
-    cells = len(store.finished(folder, plan.batches)) * len(plan.pairs)
-    yield Event("start", done=cells, total=plan.cells)
-    trials = (folder / store.TRIALS).absolute()
-    Journal(trials)
-
-    def compute(batches: Iterable[Batch]) -> Computed:
-        return _compute(plan, prepared, batches, workers, scheduler, device, trials)
-
     with Claims(folder) as claims:
-        for rows in _shared(plan, folder, claims, compute):
-            for row in rows:
-                cells += 1
-                yield Event("cell", done=cells, total=plan.cells, row=row)
+        if not claims.others():  # else the first of them has looked
+            for words in seals.mend(folder):
+                yield Event("note", words)
+        for words in _other_session(folder, claims, device):
+            yield Event("note", words)
+        if not seals.is_sealed(folder, DATA):
+            made = plan.study.data is not None and plan.study.data.dataset is not None
+            doing = "reading the dataset" if made else "importing the log"
+            yield Event("note", "simulating the truth" if plan.study.truth else doing)
+            claims.once(DATA, partial(seals.is_sealed, folder, DATA), partial(_write_data, plan, folder))
+        dataset = read_dataset(folder / store.DATASET)
+        yield Event("note", "rolling out the foundations")
+        prepared = prepare(plan, dataset, device)
+        claims.once(COMMON, partial(seals.is_sealed, folder, COMMON), partial(_write_common, plan, folder, prepared))
+        for note in prepared.notes:
+            yield Event("note", note)
+        make_folder(folder / store.JOURNALS)
+
+        def compute(units: Iterable[Unit]) -> Computed:
+            return _compute(plan, prepared, units, workers, scheduler, device, folder)
+
+        cells = 0
+        for event in _shared(plan, folder, claims, compute, leave):
+            cells = event.done
+            yield event
+        if cells == plan.cells:
+            finish = partial(_finish, plan, folder, prepared, device, begun)
+            claims.once(store.RESULTS, partial(seals.is_sealed, folder, store.RESULTS), finish)
+    yield Event("end", text=str(folder), done=cells, total=plan.cells)
+
+
+def _run_parts(
+    plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool
+) -> Iterator[Event]:
+    """Run every part of a study in a folder of its own, one after the other; events count the cells of all.
+
+    What others work on is left to the end.
+    """
+    total = sum(part.plan.cells for part in plan.parts.values())
+    folders = {name: store.part_folder(folder, name) for name in plan.parts}
+    done = {name: _cells(store.finished(folders[name], part.plan.units)) for name, part in plan.parts.items()}
+    yield Event("start", done=sum(done.values()), total=total)
+    for leaves in (True, False)[: 1 if leave else 2]:
+        for name, part in plan.parts.items():
+            if not leaves and done[name] == part.plan.cells:
+                continue
+            yield Event("note", f"{name}:")
+            given = {"workers": workers, "scheduler": scheduler, "device": device, "leave": leaves}
+            for event in run_study(part.plan, folders[name], **given):  # type: ignore[arg-type]
+                if event.kind == "note":
+                    yield event
+                else:
+                    done[name] = event.done
+                if event.kind in ("cell", "others"):
+                    yield replace(event, done=sum(done.values()), total=total)
+    yield Event("end", text=str(folder), done=sum(done.values()), total=total)
+
+
+def _cells(units: Iterable[Unit]) -> int:
+    return sum(len(unit.pairs) for unit in units)
+
+
+def _write_data(plan: Plan, folder: Path) -> None:
+    """Store the runs of a study."""
+    write_dataset(obtain(plan), folder / store.DATASET)
+    seals.write_seal(folder, DATA, [folder / store.DATASET])
+
+
+def _finish(plan: Plan, folder: Path, prepared: Prepared, device: str, begun: float) -> None:
+    """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     record = read_json(folder / store.PROVENANCE)
     record["notes"] = list(prepared.notes)
     record["machine"] = {**machine(), "device": device}
     record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
     write_json(folder / store.PROVENANCE, record)
-    store.write_results(folder, store.read_rows(folder))
-    yield Event("end", text=str(folder), done=cells, total=plan.cells)
-
-
-def _run_parts(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str) -> Iterator[Event]:
-    """Run every part of a study in a folder of its own, one after the other; events count the cells of all."""
-    total = sum(part.plan.cells for part in plan.parts.values())
-    folders = {name: store.part_folder(folder, name) for name in plan.parts}
-    done = sum(
-        len(store.finished(folders[name], part.plan.batches)) * len(part.plan.pairs)
-        for name, part in plan.parts.items()
-    )
-    yield Event("start", done=done, total=total)
-    for name, part in plan.parts.items():
-        yield Event("note", f"{name}:")
-        for event in run_study(part.plan, folders[name], workers=workers, scheduler=scheduler, device=device):
-            if event.kind == "cell":
-                done += 1
-                yield replace(event, done=done, total=total)
-            elif event.kind == "note":
-                yield event
-    yield Event("end", text=str(folder), done=done, total=total)
+    store.write_results(folder, store.read_rows(folder, plan))
 
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
@@ -173,62 +192,85 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
 
 
-def _other_session(folder: Path, device: str) -> Iterator[str]:
+def _other_session(folder: Path, claims: Claims, device: str) -> Iterator[str]:
     """Note what this run is computed with; a sentence where earlier results were computed with something else."""
-    found = machine()
-    packages = found["packages"]
-    session = {"shipid": packages.pop("shipid"), "engine": engine(), "python": found["python"], "device": device}
-    changed = store.note_session(folder, {**session, "packages": packages})
+    with claims.alone(SESSIONS):
+        changed = store.note_session(folder, session_on(device))
     if changed:
         yield f"earlier results were computed otherwise: {'; '.join(changed)}"
 
 
-def _shared(plan: Plan, folder: Path, claims: Claims, compute: Callable[[Iterable[Batch]], Computed]) -> Iterator[Rows]:
-    """Rows of every batch that is not finished yet, computed here or, where another run is at work on it, there."""
-    known = set(store.finished(folder, plan.batches))
-    while left := [batch for batch in plan.batches if batch not in known]:
+def session_on(device: str) -> dict[str, Any]:
+    """What results depend on beside the plan, to the last digit: versions, engine, processor and device."""
+    found = machine()
+    packages = found["packages"]
+    session = {"shipid": packages.pop("shipid"), "engine": engine(), "processor": found["processor"]}
+    return {**session, "python": found["python"], "device": device, "packages": packages}
+
+
+def _shared(
+    plan: Plan, folder: Path, claims: Claims, compute: Callable[[Iterable[Unit]], Computed], leave: bool
+) -> Iterator[Event]:
+    """Compute every unit that is not finished yet, here or, where another process is at work on it, there."""
+    units = {unit.key: unit for unit in plan.units}
+    known = {unit.key for unit in store.finished(folder, plan.units)}
+    cells = _cells(units[key] for key in known)
+    yield Event("start", done=cells, total=plan.cells)
+    wait = WAIT
+    while left := [key for key in units if key not in known]:
         before = len(known)
-        for batch, results in compute(_free(left, folder, claims)):
-            store.write_batch(folder, batch, results)
-            claims.give_back(batch.key)
-            known.add(batch)
-            yield [row for row, _ in results]
-        for batch in store.finished(folder, left):
-            if batch not in known:  # another run has finished it
-                known.add(batch)
-                yield store.read_batch(folder, batch)
-        if len(known) == before:
-            pause()
-
-
-def _free(left: Sequence[Batch], folder: Path, claims: Claims) -> Iterator[Batch]:
-    """Batches on which nobody works, each claimed when it is taken from here."""
-    for batch in left:
-        if not store.finished(folder, [batch]) and claims.take(batch.key):
-            if store.finished(folder, [batch]):  # by another run, just before its claim ended
-                claims.give_back(batch.key)
-            else:
-                yield batch
+        free = claims.free(
+            left,
+            lambda: {unit.key for unit in store.finished(folder, plan.units)},
+            lambda key: store.is_finished(folder, units[key]),
+        )
+        for unit, results in compute(units[key] for key in free):
+            store.write_unit(folder, unit, results)
+            claims.give_back(unit.key)
+            known.add(unit.key)
+            for row, _ in results:
+                cells += 1
+                yield Event("cell", done=cells, total=plan.cells, row=row)
+        known |= {unit.key for unit in store.finished(folder, plan.units)}
+        if cells < _cells(units[key] for key in known):
+            cells = _cells(units[key] for key in known)
+            yield Event("others", done=cells, total=plan.cells)
+        if leave:
+            return
+        wait = pause(wait) if len(known) == before else WAIT
 
 
 def run_batch(
-    plan: Plan, prepared: Prepared, batch: Batch, device: str, trials: Path | None = None
+    plan: Plan, prepared: Prepared, batch: Batch, device: str
 ) -> list[tuple[dict[str, Any], Predictor | None]]:
-    """All cells of one batch: (row of results, predictor) each. Pure: the same on every worker.
+    """All cells of one batch at once: (row of results, predictor) each."""
+    return run_unit(plan, prepared, plan.whole(batch), device)
 
-    trials : the journal in which searches go on; on a machine that does not see the file, they are kept in memory.
+
+def run_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path | None = None) -> Results:
+    """All cells of one unit of work: (row of results, predictor) each. Pure: the same on every worker.
+
+    trials : the folder of the journals in which searches go on; on a machine that does not see it, they are kept in
+        memory.
     """
     use_threads(1)
     check_device(device)
-    journal = Journal(trials) if trials is not None and trials.is_file() else None
+    journal = Journal(trials / f"{unit.key}.log") if trials is not None and trials.is_dir() else None
+    batch = unit.batch
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
-    known = predictions(plan, prepared, runs, device)
+    known = predictions(plan, prepared, runs, device, {name for name, _ in unit.pairs})
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
-    fitted = {way.name: _fitted(plan, prepared, batch, windows, known, way, device, journal) for way in plan.methods}
+    ways = {way.name: replace(way, foundations=unit.foundations(way.name)) for way in plan.methods}
+    fitted = {
+        name: _fitted(plan, prepared, batch, windows, known, way, device, journal)
+        for name, way in ways.items()
+        if way.foundations
+    }
     left_out = refitted(plan, prepared, batch, windows, fitted, device)
-    results: list[tuple[dict[str, Any], Predictor | None]] = []
-    for name, way in plan.pairs:
+    results: Results = []
+    for name, method in unit.pairs:
+        way = ways[method]
         one, result = known[name], fitted[way.name][name]
         row = {"cell": batch.cell(name, way.name), **_names(one, way, prepared.test), **shared}
         errors, seconds = left_out.get((name, way.name), (None, 0.0))
@@ -264,7 +306,8 @@ def refitted(
     pairs = [
         (name, way)
         for name, way in plan.pairs
-        if fitted[way.name][name].corrector is not None
+        if name in fitted.get(way.name, {})
+        and fitted[way.name][name].corrector is not None
         and (name in identified or fitted[way.name][name].left_out is None)
     ]
     refits = plan.study.bands.refits
@@ -287,6 +330,8 @@ def refitted(
         known = predictions(plan, inside, tuple(rest.spans), device, names)
         for way in plan.methods:
             mine = [name for name, other in pairs if other.name == way.name]
+            if not mine:
+                continue
             again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
             for name in mine:
                 one, result, (errors, seconds) = known[name], again[name], found[name, way.name]
@@ -380,9 +425,12 @@ def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array,
 
 def machine() -> dict[str, Any]:
     """What the results were computed with: interpreter, packages, machine."""
-    packages = {name: version(name) for name in PACKAGES}
+    packages = {}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):  # an extra that is not installed
+            packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
-    return {**system, "cores": os.cpu_count(), "packages": packages}
+    return {**system, "processor": f"{processor()}, {vectors()}", "cores": os.cpu_count(), "packages": packages}
 
 
 def _accuracy(foundation: Foundation, prepared: Prepared) -> dict[str, Any]:
@@ -424,64 +472,31 @@ def _predictor(
 def _compute(
     plan: Plan,
     prepared: Prepared,
-    batches: Iterable[Batch],
+    units: Iterable[Unit],
     workers: int | None,
     scheduler: str | None,
     device: str,
-    trials: Path,
+    folder: Path,
 ) -> Computed:
-    """Batches and their results in the order in which they finish."""
-    if scheduler is not None:
-        yield from _on_dask(plan, prepared, batches, scheduler, device, trials)
+    """Units and their results in the order in which they finish."""
+    trials = (folder / store.JOURNALS).absolute()
+    if scheduler is None:
+        work = partial(run_unit, plan, prepared, device=device, trials=trials)
+        yield from on_workers(work, units, workers or os.cpu_count() or 1)
         return
-    work = partial(run_batch, plan, prepared, device=device, trials=trials)
-    yield from on_workers(work, batches, workers or os.cpu_count() or 1)
+    from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
+
+    shared = plan, prepared, device, trials
+    noted: list[Mapping[str, Any]] = []
+    for unit, (session, results) in on_dask(scheduler, _there, shared, {unit.key: unit for unit in units}, plan.digest):
+        if session not in noted:
+            noted.append(session)
+            with Claims(folder) as claims, claims.alone(SESSIONS):
+                store.note_session(folder, session)
+        yield unit, results
 
 
-def _on_dask(
-    plan: Plan, prepared: Prepared, batches: Iterable[Batch], scheduler: str, device: str, trials: Path
-) -> Computed:
-    """The same on the cluster of an existing scheduler; ShipidError where it, or a worker, dies."""
-    import dask
-    from dask.distributed import CancelledError, Client, KilledWorker, as_completed
-
-    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
-        warnings.simplefilter("ignore")
-        try:
-            client = Client(scheduler, timeout="10s")
-        except (OSError, ValueError) as error:
-            raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
-        try:
-            shared = client.scatter([plan, prepared], broadcast=True)
-            futures = {
-                client.submit(
-                    run_batch, *shared, batch, device, trials, key=f"{plan.name}-{plan.digest}-{batch.key}", pure=False
-                ): batch
-                for batch in batches
-            }
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except (OSError, TimeoutError, CancelledError, KilledWorker) as error:
-            kept = "what is finished is kept: go on with `shipid study resume`"
-            if isinstance(error, KilledWorker):
-                message = f"workers of the cluster die, perhaps for want of memory; {kept} and larger workers"
-            else:
-                message = f"the Dask scheduler or its workers are gone; {kept}"
-            raise ShipidError(message, path=f"--scheduler {scheduler}") from None
-        finally:
-            with suppress(Exception):  # a client whose scheduler is gone complains in many ways
-                client.close(timeout=2)
-
-
-@contextmanager
-def _without_logs(*names: str) -> Iterator[None]:
-    """Silence loggers and those below them, whose errors are said in one line."""
-    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
-    before = {logger: logger.level for logger in every}
-    try:
-        for logger in every:
-            logger.setLevel(logging.CRITICAL + 1)
-        yield
-    finally:
-        for logger, level in before.items():
-            logger.setLevel(level)
+def _there(shared: tuple[Plan, Prepared, str, Path], unit: Unit) -> tuple[dict[str, Any], Results]:
+    """A unit on a machine of a cluster: what it was computed with, and the results."""
+    plan, prepared, device, trials = shared
+    return session_on(device), run_unit(plan, prepared, unit, device, trials)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,10 +41,25 @@ def is_sealed(folder: Path, name: str) -> bool:
     return seal_file(folder, name).is_file()
 
 
+def sealed(folder: Path) -> set[str]:
+    """Names of all seals."""
+    try:
+        return {entry.name.removesuffix(".sha256") for entry in os.scandir(folder / FOLDER)}
+    except FileNotFoundError:
+        return set()
+
+
 def write_seal(folder: Path, name: str, files: Iterable[Path]) -> None:
-    """Note the digests of files in the folder, which are on the disk already, under a name."""
-    lines = [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
-    write_text(seal_file(folder, name), "".join(lines))
+    """Note the digests of files in the folder, which are on the disk already, under a name.
+
+    They are compared once more: a process that was held up may have written the same files meanwhile.
+    """
+    files = list(files)
+    while True:
+        lines = [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
+        write_text(seal_file(folder, name), "".join(lines))
+        if not any(_faults(folder, seal_file(folder, name))):
+            return
 
 
 def remove(folder: Path, name: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shipid.errors import ShipidError
-from shipid.study.contents import write_pages
+from shipid.study.contents import share_pages
 from shipid.study.plan import read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
@@ -49,7 +49,7 @@ def run(
             log.info("%s", line)
         if event.kind == "end":
             folder = Path(event.text)
-    write_pages(folder)
+    share_pages(folder)
     return read_results(folder)
 
 

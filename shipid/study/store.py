@@ -30,11 +30,13 @@ from shipid.files import (
 )
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.plan import Batch, Foundation, Plan, build_plan
+from shipid.study.plan import WITH, Foundation, Plan, Unit, build_plan
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
-DATASET, TEST, ENVELOPE, TRIALS = "dataset.parquet", "test.npz", "envelope.json", "trials.log"
+DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
+JOURNALS, TRIALS = "trials", "trials.log"
+RESULTS = "results"  # name of the seal of the tables
 PARTS = "parts"
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
@@ -58,7 +60,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
     _mend(folder, plan)
-    for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER):
+    for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER, folder / JOURNALS):
         sweep(place)
 
 
@@ -154,9 +156,14 @@ def write_patches(folder: Path, foundations: Iterable[Foundation]) -> int:
     return count
 
 
-def batch_file(folder: Path, batch: Batch) -> Path:
-    """Where the rows of a finished batch are; its presence says that the batch is done."""
-    return folder / "batches" / f"{batch.key}.json"
+def rows_file(folder: Path, key: str) -> Path:
+    """Where the rows of a finished unit of work, or of a whole batch, are."""
+    return folder / "batches" / f"{key}.json"
+
+
+def journal_file(folder: Path, key: str) -> Path:
+    """Where the searches of a unit of work are written as they go."""
+    return folder / JOURNALS / f"{key}.log"
 
 
 def cell_file(folder: Path, cell: str) -> Path:
@@ -169,39 +176,41 @@ def part_folder(folder: Path, part: str) -> Path:
     return folder / PARTS / part
 
 
-def finished(folder: Path, batches: Iterable[Batch]) -> list[Batch]:
-    """Batches whose results are stored whole: those with a seal."""
-    return [batch for batch in batches if seals.is_sealed(folder, batch.key)]
+def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
+    """Units whose results are stored whole: with a seal, or in a batch that was one unit to an earlier version."""
+    sealed = seals.sealed(folder)
+    batches = {name for name in sealed - seals.FIRST.keys() if WITH not in name}
+    return [unit for unit in units if unit.key in sealed or (batches and unit.batch.key in batches)]
 
 
-def write_batch(folder: Path, batch: Batch, results: Sequence[tuple[dict[str, Any], Predictor | None]]) -> None:
-    """Store the rows and predictors of a batch; the seal comes last, when all the rest is on the disk."""
+def is_finished(folder: Path, unit: Unit) -> bool:
+    """Whether the results of one unit are stored whole."""
+    return seals.is_sealed(folder, unit.key) or seals.is_sealed(folder, unit.batch.key)
+
+
+def write_unit(folder: Path, unit: Unit, results: Sequence[tuple[dict[str, Any], Predictor | None]]) -> None:
+    """Store the rows and predictors of a unit; the seal comes last, when all the rest is on the disk."""
+    if is_finished(folder, unit):  # by a process that took it over while this one was held up
+        return
     files = []
     for row, predictor in results:
         if predictor is not None:
             files.append(predictor.save(cell_file(folder, row["cell"])))
-    write_json(batch_file(folder, batch), [row for row, _ in results])
-    seals.write_seal(folder, batch.key, [batch_file(folder, batch), *files])
-
-
-def read_batch(folder: Path, batch: Batch) -> list[dict[str, Any]]:
-    """The rows of a finished batch."""
-    rows: list[dict[str, Any]] = read_json(batch_file(folder, batch))
-    return rows
+    write_json(rows_file(folder, unit.key), [row for row, _ in results])
+    seals.remove(folder, RESULTS)  # of the tables, which do not hold this unit
+    seals.write_seal(folder, unit.key, [rows_file(folder, unit.key), *files])
 
 
 def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
-    """Note in the provenance what a run is computed with; returns a sentence per difference to the runs before.
+    """Note in the provenance what a run is computed with; returns a sentence per difference to the one noted last.
 
-    session : entries such as `shipid`, `engine` and `packages`, as plain data.
+    session : entries such as `shipid`, `engine`, `processor` and `packages`, as plain data; each kind is noted once.
     """
     record = _provenance(folder)
     before = record.get("sessions", [])
-    if before and before[-1] == dict(session):
-        return []
-    words = [] if not before else differences(before[-1], session)
-    write_json(folder / PROVENANCE, {**record, "sessions": [*before, dict(session)]})
-    return words
+    if dict(session) not in before:
+        write_json(folder / PROVENANCE, {**record, "sessions": [*before, dict(session)]})
+    return differences(before[-1], session) if before else []
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -211,27 +220,33 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
 
 
-def read_rows(folder: Path) -> pd.DataFrame:
-    """One row per finished cell, with its trials; ordered by N_D, seed, foundation and method."""
+def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
+    """One row per finished cell, with its trials; ordered by N_D, seed and, with the plan, foundation and method."""
     rows = [row for file in sorted((folder / "batches").glob("*.json")) for row in read_json(file)]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     frame = pd.DataFrame(rows)
     for name in METRICS:
         frame[name] = frame[name].astype(float) if name in frame else np.nan
-    return frame.sort_values(["N_D", "seed"], kind="stable").reset_index(drop=True)
+    place = {pair: number for number, pair in enumerate(plan.whole(plan.batches[0]).pairs)} if plan is not None else {}
+    frame["place"] = [place.get(pair, 0) for pair in zip(frame["foundation"], frame["method"], strict=True)]
+    return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
 
 
 def write_results(folder: Path, rows: pd.DataFrame) -> Path:
     """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial."""
-    seals.remove(folder, "results")
+    seals.remove(folder, RESULTS)
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
-    seals.write_seal(folder, "results", [folder / "results.parquet", folder / "trials.parquet"])
+    if journals := sorted((folder / JOURNALS).glob("*.log")):
+        from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
+
+        merge(journals, folder / TRIALS)
+    seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"
 
 

@@ -31,7 +31,8 @@ def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -
         elif parameter.kind == "list":
             result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]
         elif parameter.kind == "table":
-            result[name] = {key: f"{path}.{name}.{key}" for key in block[name]}
+            if name in block or not parameter.optional:
+                result[name] = {key: f"{path}.{name}.{key}" for key in block[name]}
         elif name in block:
             result[name] = f"{path}.{name}"
         elif name in SHARED:

@@ -143,7 +143,9 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
     kept = CORIOLIS[vessel.document.get("added_mass", {}).get("coriolis", "full")]
-    force = _added_mass_force(M_A, nu_r, nu_c_dot, kept) - coriolis(M_RB, nu)
+    force = _added_mass_force(M_A, nu_r, nu_c_dot, kept)
+    if vessel.document["inertia"].get("coriolis", "full") == "full":
+        force -= coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
     summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
@@ -338,8 +340,9 @@ def _actuators(
             name = f"{path.rsplit('.', 1)[-1]}.{command}"
             member = ACTUATORS[actuator["kind"]]
             memory[name] = SX.sym(name)
-            actual[name] = member.output(memory[name])
             keywords = _values(bound[f"{path}.actuator.{command}"], value_of)
+            taken = {parameter.name for parameter in declared(member.output)}
+            actual[name] = member.output(memory[name], **{k: v for k, v in keywords.items() if k in taken})
             advanced.append(member.advance(orders[name], memory[name], dt, **keywords))
     return memory, actual, advanced
 

@@ -19,6 +19,7 @@ from shipid.errors import DocumentError, choices
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES
 from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import bindings, units
 from shipid.vessel.ranges import UNUSUAL, out_of_range
@@ -266,8 +267,10 @@ def _check_degrees(path: str, block: Mapping[str, Any], file: str) -> None:
 
 def _check_numbers(vessel: Vessel) -> None:
     """Checks of the values of a document whose names are valid."""
-    for path, _, block in term_blocks(vessel.document):
+    for path, key, block in term_blocks(vessel.document):
         _check_order(path, block, vessel.file)
+        if key == "thruster.four_quadrant":
+            _check_circle(path, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
     fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
@@ -294,6 +297,8 @@ def _check_sense(vessel: Vessel) -> None:
         if group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0] and value > 0:
             message = f"{value:g}: added mass is on the force side, so {name} is negative"
             raise DocumentError(message, file=vessel.file, path=path)
+        if ".actuator." in path and name in ("low", "high"):
+            _check_limit(path, value, values.get(f"{group}.low", -np.inf), vessel.file)
         if name == "x_fwd" and value <= values.get(f"{group}.x_aft", -np.inf):
             raise DocumentError(f"{value:g}: must be ahead of x_aft", file=vessel.file, path=path)
     sizes = vessel.document.get("particulars", {})
@@ -303,6 +308,15 @@ def _check_sense(vessel: Vessel) -> None:
         if not LEAST_BLOCK < share < MOST_BLOCK:
             message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which no ship is: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
+
+
+def _check_limit(path: str, value: float, low: float, file: str) -> None:
+    """DocumentError for limits of an actuator that leave no range, or for an angle in degrees."""
+    row = row_of(path.rsplit(".", 2)[-2])
+    if row is not None and row.angle and abs(value) > MOST_RADIANS:
+        raise DocumentError(f"{value:g}: is in rad, and that is more than a full turn", file=file, path=path)
+    if path.endswith(".high") and value <= low:
+        raise DocumentError(f"{value:g}: must be above low, {low:g}", file=file, path=path)
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:
@@ -323,6 +337,17 @@ def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
     for key, value in block.items():
         if isinstance(value, list) and key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
             raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
+
+
+def _check_circle(path: str, block: Mapping[str, Any], file: str) -> None:
+    """DocumentError for a propeller in four quadrants whose table has a gap at 180 deg."""
+    beta, thrust = block["beta_deg"], block["C_T"]
+    if (beta[0], beta[-1]) != (-180, 180):
+        message = f"goes from {beta[0]:g} to {beta[-1]:g}: must go from -180 to 180"
+        raise DocumentError(message, file=file, path=f"{path}.beta_deg")
+    if thrust[0] != thrust[-1]:
+        message = f"{thrust[0]:g} at -180 deg and {thrust[-1]:g} at 180 deg: must be equal"
+        raise DocumentError(message, file=file, path=f"{path}.C_T")
 
 
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:

@@ -111,7 +111,7 @@ class Perturbation(BaseModel):
         """Check the keys and values of rules, so that a complaint names key and value."""
         if isinstance(raw, cls):
             return raw
-        return _block_model(tuple(RULES.items())).model_validate(raw).model_dump(exclude_unset=True)
+        return perturbation_model().model_validate(raw).model_dump(exclude_unset=True)
 
     @model_validator(mode="after")
     def _one_meaning(self) -> Perturbation:
@@ -142,6 +142,11 @@ class Perturbation(BaseModel):
 
 def _either(keys: Iterable[str]) -> str:
     return " or ".join(f"`{key}`" for key in keys)
+
+
+def perturbation_model() -> type[BaseModel]:
+    """Pydantic model of a `[[family.perturb]]` block: the keys of all rules with the types of their arguments."""
+    return _block_model(tuple(RULES.items()))
 
 
 @cache

@@ -34,13 +34,17 @@ SHARED = {**dict.fromkeys(PARTICULARS, "particulars"), **dict.fromkeys(CONSTANTS
 
 @dataclass(frozen=True)
 class Parameter:
-    """One keyword argument of a physics function: its unit (or grammar), shape and default."""
+    """One keyword argument of a physics function: its unit (or grammar), shape and default.
+
+    optional : whether a block may do without it, though it has no default: a table that is None by default.
+    """
 
     name: str
     unit: str | Grammar
     kind: Literal["number", "list", "table", "open"]
     positive: bool
     default: float | None
+    optional: bool = False
 
 
 @cache
@@ -61,8 +65,8 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
             kind = "list"
         elif isinstance(unit, Grammar):
             kind = "table"
-        default = None if argument.default is argument.empty else float(argument.default)
-        result.append(Parameter(name, unit, kind, POSITIVE in marks, default))
+        default = None if argument.default in (argument.empty, None) else float(argument.default)
+        result.append(Parameter(name, unit, kind, POSITIVE in marks, default, argument.default is None))
     return tuple(result)
 
 
@@ -110,6 +114,7 @@ class Block(BaseModel):
 
 
 _CORIOLIS = Annotated[Literal["full", "mmg", "none"], Field(description="what the hull's derivatives do not hold")]
+_TURNING = Annotated[Literal["full", "none"], Field(description="whether the mass turns with the ship")]
 _Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
 
 
@@ -126,7 +131,12 @@ def _checked_table(grammar: Grammar) -> Any:
         grammar.check(table)
         return table
 
-    return Annotated[dict[str, FiniteFloat], AfterValidator(check)]
+    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole(grammar.names)}})
+    return Annotated[dict[str, FiniteFloat], AfterValidator(check), named]
+
+
+def _whole(names: str) -> str:
+    return f"^(?:{names})$"
 
 
 def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[Block]:
@@ -138,7 +148,9 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
-            config = ConfigDict(extra="allow", strict=True)
+            names: dict[str, Any] = {"patternProperties": {_whole(grammar.names): {"type": "number"}}}
+            editors = {**names, "additionalProperties": False}
+            config = ConfigDict(extra="allow", strict=True, json_schema_extra=editors)
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
             continue
@@ -150,7 +162,10 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
             )
         elif parameter.kind == "table":
             assert isinstance(parameter.unit, Grammar)
-            fields[parameter.name] = (Annotated[_checked_table(parameter.unit), note], ...)
+            table = _checked_table(parameter.unit)
+            fields[parameter.name] = (
+                (Annotated[table | None, note], None) if parameter.optional else (Annotated[table, note], ...)
+            )
         elif parameter.name in SHARED:
             fields[parameter.name] = (Annotated[_number(parameter) | None, note], None)
         elif parameter.default is not None:
@@ -245,7 +260,7 @@ def vessel_model() -> type[BaseModel]:
         UNUSUAL: (Annotated[list[str], Field(description="paths of numbers that may be outside their range")], []),
         "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
-        "inertia": (block_model("inertia", parameters(rigid_body)), ...),
+        "inertia": (block_model("inertia", parameters(rigid_body), coriolis=(_TURNING, "full")), ...),
         "added_mass": (block_model("added_mass", parameters(added_mass), coriolis=(_CORIOLIS, "full")) | None, None),
         **{group: (_fixed(group) | None, None) for group in FIXED},
         "wind": (_named("wind") | None, None),

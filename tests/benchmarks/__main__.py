@@ -38,6 +38,7 @@ ASKED = {
     "bands": 1,
     "verdicts": 1,
     "guess": 1,
+    "sharing": 1,
 }  # the same, of what is no matter of time and takes minutes: only where named
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
@@ -114,18 +115,11 @@ def write(figures: dict[str, dict[str, Any]], ratios: list[Ratio]) -> None:
         | {"worse_by": round(one.worse_by, 3), "regressed": one.regressed, "promise": one.promise, "kept": one.kept}
         for one in ratios
     ]
-    report = {"date": date.today().isoformat(), "machine": machine() | {"processor": processor()}}
+    report = {"date": date.today().isoformat(), "machine": machine()}
     report |= {"threads": {name: GROUPS[name] for name in figures}, "figures": figures, "ratios": compared}
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(report, indent=1) + "\n")
     print(f"-> {RESULTS}")
-
-
-def processor() -> str:
-    """Name of the processor, where the system tells."""
-    file = Path("/proc/cpuinfo")
-    lines = file.read_text().splitlines() if file.exists() else []
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
 
 
 def verdict(ratios: list[Ratio]) -> int:

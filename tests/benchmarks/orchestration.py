@@ -27,7 +27,7 @@ from shipid.hybrid import ridge
 from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
-from shipid.study.plan import Batch, Plan, read_plan
+from shipid.study.plan import Plan, Unit, read_plan
 from shipid.study.prepare import Prepared, obtain, prepare
 from tests.benchmarks.timing import best_of, clock
 
@@ -38,7 +38,7 @@ KNOWN = {"grid.N_D": [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]}  # 60 cells
 REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "method.0.trials": 30}
 PRODUCT, PRODUCTS = 1500, 40  # order of the matrices, and how many products each of two tasks is
 
-run_batch, tune_ridge = study.run_batch, ridge.tune_ridge
+run_unit, tune_ridge = study.run_unit, ridge.tune_ridge
 
 
 def run() -> dict[str, Any]:
@@ -52,8 +52,8 @@ def overhead() -> dict[str, Any]:
     prepared = prepare(plan, obtain(plan))  # compiled once, so that neither way compiles
     preparing = best_of({"prepare": lambda: prepare(plan, obtain(plan))}, rounds=3)["prepare"]
     with _processes(2, plan, prepared) as pool:
-        bare = clock(lambda: list(pool.map(_bare_batch, plan.batches)))
-    with patch.object(study, "run_batch", known_batch):
+        bare = clock(lambda: list(pool.map(_bare_unit, plan.units)))
+    with patch.object(study, "run_unit", known_unit):
         whole, moments = _study(plan, 2)
     first, last = moments["cell"][0], moments["cell"][-1]
     waves = len(plan.batches) / 2 * len(plan.pairs) * CELL
@@ -71,10 +71,10 @@ def overhead() -> dict[str, Any]:
     }
 
 
-def known_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> Any:
-    """As `run_batch`, with cells that take a known time."""
+def known_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path | None = None) -> Any:
+    """As `run_unit`, with cells that take a known time."""
     with patch.object(ridge, "tune_ridge", _known_tune):
-        return run_batch(plan, prepared, batch, device)
+        return run_unit(plan, prepared, unit, device, trials)
 
 
 def _known_tune(task: Task, method: PathDrawn) -> dict[str, Fitted]:
@@ -154,5 +154,5 @@ def _receive(ready: Any, shared: tuple[Any, ...]) -> None:
     ready.wait()
 
 
-def _bare_batch(batch: Batch) -> int:
-    return len(known_batch(*_shared, batch, "cpu"))
+def _bare_unit(unit: Unit) -> int:
+    return len(known_unit(*_shared, unit, "cpu"))

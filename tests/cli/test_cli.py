@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import shipid
@@ -39,9 +42,29 @@ def test_help_names_every_command() -> None:
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
 
 
+def every_command(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    yield path, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command(inner, (*path, name))
+
+
+COMMANDS = dict(every_command(typer.main.get_command(app)))
+
+
+@pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
+def test_help_keeps_every_word(path: tuple[str, ...]) -> None:
+    """Square brackets are no markup: what a help text says is on the page, word for word."""
+    command = COMMANDS[path]
+    shown = CliRunner().invoke(app, [*path, "--help"], env={"COLUMNS": "250", "TERMINAL_WIDTH": "250"}).output
+    letters = re.sub(r"\W+", "", shown)
+    for text in [command.help, *(parameter.help for parameter in command.params if hasattr(parameter, "help"))]:
+        meant = (text or "").replace("\\[", "[")
+        assert re.sub(r"\W+", "", meant) in letters, text
+        assert all(words in shown for words in re.findall(r"\[[^\]]+\]", meant)), text
+
+
 MISTAKES = {
     "unknown vessel": (["vessel", "show", "gunerus-28.9"], "did you mean 'gunnerus-28.9'?"),
-    "no vessel": (["vessel", "show"], "name a vessel"),
     "unknown study": (["study", "run", "quik"], "did you mean 'quick'?"),
     "broken study": (["study", "run", BAD / "studies" / "no-question.toml"], "no-question.toml: question: missing"),
     "no --set path": (["study", "run", "quick", "--set", "grid.N_D"], "write --set path=value"),

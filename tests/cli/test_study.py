@@ -84,7 +84,7 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     text = said("study", "resume", folder, "--workers", "1")
     assert "missing: computed again" in text
     assert "4 of 8 cells to do" in text
-    assert said("study", "check", folder).strip() == "2 of 2 batches finished, 0 faults"
+    assert said("study", "check", folder).strip() == "8 of 8 cells finished, 0 faults"
 
     cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
     text = said("predict", folder, folder / DATASET, "--cell", cell)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 
 
@@ -21,6 +25,51 @@ def test_digits() -> None:
     assert [digits(value) for value in (1.23456, -0.00001, float("nan"), 1.6e9)] == ["1.235", "0", "-", "1600000000.0"]
 
 
+class Still:
+    """A watch that sees two searches of which one moves."""
+
+    looks = 0
+
+    def look(self, done: object = ()) -> list[Any]:  # noqa: ARG002
+        from shipid.study.progress import Searching
+
+        self.looks += 1
+        return [Searching("a[b]-N0004-s0", self.looks, 50, 0.25), Searching("c-N0004-s0", 1, 50, 1.0)]
+
+
+def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a terminal there is a line when nothing was said for a while; on one, a second bar."""
+    import io
+
+    import rich.console
+
+    from shipid.cli import terminal
+    from shipid.study.run import Event
+
+    monkeypatch.setattr(terminal, "SILENCE", 0.02)
+    monkeypatch.setattr(terminal, "LOOK", 0.02)
+
+    def slow(watch: Still) -> Iterator[Event]:
+        yield Event("start", done=0, total=2)
+        while watch.looks < 3:
+            time.sleep(0.01)
+        yield Event("end", text="folder")
+
+    watch = Still()
+    terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == [
+        "2 of 2 cells to do",
+        "... a[b]-N0004-s0: trial 1/50, best so far 0.5 m rms (2 searches go on)",
+    ]
+    screen = io.StringIO()
+    made = rich.console.Console
+    monkeypatch.setattr(rich.console, "Console", lambda: made(file=screen, force_terminal=True, width=150))
+    watch = Still()
+    terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
+    assert "a[b]-N0004-s0: trial " in screen.getvalue()
+
+
 def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     from shipid.cli.terminal import draw
     from shipid.study.run import Event
@@ -34,13 +83,26 @@ def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.Capt
         Event("cell", done=2, total=2, row=bad),
         Event("end", text="folder"),
     ]
-    draw(events)
+    draw(events, Still())  # type: ignore[arg-type]
     assert capsys.readouterr().out.splitlines() == [
         "rolling out the models",
         "2 of 2 cells to do",
         "[1/2] a-N0004-s0: H 1.000 m, H_90 2.000 m, 0.5 s",
         "[2/2] b-N0004-s0: diverged: it left the sea, 0.1 s",
     ]
+
+
+def test_an_interruption_says_what_is_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    from shipid.cli.terminal import counted
+
+    def blocks() -> Iterator[list[int]]:
+        yield [1]
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as end:
+        list(counted(blocks(), 3, "cells", "what is finished is kept"))
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "what is finished is kept\n"
 
 
 def test_counted_passes_every_block_on() -> None:

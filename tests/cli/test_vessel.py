@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -33,8 +32,6 @@ def test_vessels() -> None:
         shown = re.search(rf"^\s*{re.escape(path)} +(\S+)", text, re.MULTILINE)
         assert shown, path
         assert float(shown[1]) == pytest.approx(value, rel=1e-9)
-    schema = json.loads(said("vessel", "show", "--schema"))
-    assert "hull" in schema["properties"]
 
 
 def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:

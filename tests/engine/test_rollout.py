@@ -18,7 +18,7 @@ from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
-from tests.conftest import pace
+from tests.conftest import OF_LAWS, pace
 
 Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 LAG = {"kind": "first_order", "T": 2.0, "rate": 1e3}
@@ -49,6 +49,7 @@ def test_turning_the_chart_turns_the_path(vessel: Vessel, draw_inputs: Draw) -> 
     assert not first.diverged.any()
 
 
+@pytest.mark.parametrize("bundled_vessel", OF_LAWS, indirect=True)
 def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> None:
     """Of a ship whose screw, if there is but one, works alike on both sides."""
     values = bundled_vessel.parameters
@@ -67,6 +68,7 @@ def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> Non
     assert to_starboard * found["psi"][-1, 0, 0] > 0.5
 
 
+@pytest.mark.parametrize("bundled_vessel", OF_LAWS, indirect=True)
 def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
     """From anywhere in the envelope with u >= 0, shafts stopped, no wind: no start gains, all fade within 10 minutes.
 
@@ -108,7 +110,8 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
 
 def smooth(vessel: Vessel) -> Vessel:
     """The lag without its rate limit, a kink that no order survives, and not shorter than a step resolves."""
-    lags = {path: value for path, value in vessel.parameters.items() if ".actuator." in path}
+    numbers = vessel.parameters.items()
+    lags = {path: value for path, value in numbers if ".actuator." in path and path.endswith((".T", ".rate"))}
     limits = {path: 1e3 if path.endswith(".rate") else max(value, 1.0) for path, value in lags.items()}
     calm = {"wind.off": True} if "wind" in vessel.document else {}
     return vessel.with_values({**calm, **limits})

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 from shipid.errors import ShipidError
@@ -20,39 +20,31 @@ from tests.study.tiny import tiny_plan
 
 
 @contextmanager
-def a_cluster(place: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
-    """Address of a scheduler on this machine with one worker, and their processes: scheduler, worker."""
-    command = [
-        sys.executable,
-        "-m",
-        "distributed.cli.dask_scheduler",
-        "--host",
-        "127.0.0.1",
-        "--port",
-        "0",
-        "--no-dashboard",
-    ]
-    log = (place / "scheduler.log").open("w")
-    processes = [subprocess.Popen(command, stderr=log, stdout=log, text=True, cwd=place)]
-    try:
+def a_cluster(place: Path, workers: int = 1) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """Address of a scheduler on this machine with some workers, and their processes: scheduler, worker, ..."""
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    with ExitStack() as stack:
+        processes = [stack.enter_context(_process("scheduler", options, place))]
         address = _address(place / "scheduler.log")
-        worker = [
-            sys.executable,
-            "-m",
-            "distributed.cli.dask_worker",
-            address,
-            "--nthreads",
-            "1",
-            "--no-dashboard",
-            "--no-nanny",
-        ]
-        processes.append(subprocess.Popen(worker, stderr=log, stdout=log, text=True, cwd=place))
+        processes += [stack.enter_context(a_worker(address, place, "--no-nanny")) for _ in range(workers)]
         yield address, processes
-    finally:
-        for process in processes:
+
+
+def a_worker(address: str, place: Path, *more: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    """A worker of a scheduler, killed in the end."""
+    return _process("worker", [address, "--nthreads", "1", "--no-dashboard", *more], place)
+
+
+@contextmanager
+def _process(kind: str, options: list[str], place: Path) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *options]
+    with (place / f"{kind}.log").open("w") as log:
+        process = subprocess.Popen(command, stderr=log, stdout=log, text=True, cwd=place)
+        try:
+            yield process
+        finally:
             process.kill()
             process.wait()
-        log.close()
 
 
 def _address(log: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from multiprocessing import get_context
 from pathlib import Path
@@ -14,7 +15,7 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from shipid.errors import ResultError
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import Journal, merge
 from shipid.hybrid.settings import Span
 
 SPACE: dict[str, Any] = {"scale": Span(1.0, 16.0), "layers": Span(1, 3, log=False, whole=True), "mirror": (0.0, 1.0)}
@@ -92,6 +93,37 @@ def _write(file: Path, name: str) -> None:
     journal.decide([name], 30)
     for number in range(30):
         journal.add({name: rows(1, number, first=number)}, SPACE)
+
+
+def test_journals_of_units_are_merged(tmp_path: Path) -> None:
+    """One file holds the studies of all, each with its trials; half a line and rubbish are left out."""
+    written = [{"a": rows(5, 1), "b": rows(3, 2)}, {}, {"c": rows(4, 3)}, {"d": rows(2, 4)}]
+    files = [tmp_path / f"{number}.log" for number in range(len(written))]
+    for file, mine in zip(files, written, strict=True):
+        journal = Journal(file)
+        journal.add(mine, SPACE)
+        journal.decide(list(mine), 7)
+    with files[1].open("ab") as stream:
+        stream.write(b'[1]\n{"x": 2}\nhello\n{"op_code": 4')
+    merge(files, tmp_path / "all.log")
+    found = Journal(tmp_path / "all.log")
+    for mine in written:
+        for cell, expected in mine.items():
+            assert told(found.rows(cell)) == told(expected)
+            assert found.count(cell) == 7
+    found.add({"c": rows(2, 5, first=4)}, SPACE)
+    assert len(Journal(tmp_path / "all.log").rows("c")) == 6
+
+
+def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl")
+
+    def refused(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    Journal(tmp_path / "t.log").add({"a": rows(3)}, SPACE)
+    assert told(Journal(tmp_path / "t.log").rows("a")) == told(rows(3))
 
 
 def test_several_processes_write_at_once(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.identification.plausible import KINDS, verdict
+from shipid.identification.plausible import KINDS, verdict, within
 from shipid.vessel.load import Vessel, load_vessel
 
 
@@ -43,3 +43,22 @@ def test_added_mass_is_judged_by_the_mass_that_was_fitted_too() -> None:
 def test_what_has_no_range_is_not_judged() -> None:
     assert verdict(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr", {"hull.mmg.Y_vvr": 1e6}) == ""
     assert all(kind.low < kind.high for kind in KINDS)
+
+
+@pytest.mark.parametrize(
+    "path", ["added_mass.Y_vdot", "added_mass.N_rdot", "inertia.I_z", "hull.mmg.Y_v", "thruster.rudder.ell_R"]
+)
+def test_factors_within_the_range_have_no_complaint_and_those_beyond_have(path: str) -> None:
+    vessel = load_vessel("kvlcc2-l7")
+    low, high = within(vessel, path)
+    assert low < 1 < high
+    for end, sense in ((low, -1), (high, 1)):
+        if abs(end) < 1e3:
+            inside, outside = ((end - sense * share) * vessel.parameters[path] for share in (1e-3, -1e-3))
+            assert "no ship" not in verdict(vessel, path, {path: inside})
+            assert "no ship" in verdict(vessel, path, {path: outside})
+
+
+def test_what_has_no_range_has_no_bounds() -> None:
+    low, high = within(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr")
+    assert (low, high) == (-float("inf"), float("inf"))

@@ -405,3 +405,46 @@ def test_a_number_that_is_zero_needs_its_size() -> None:
     dataset = trials(truth, runs=3, steps=40)
     found = identify(SHIP, dataset, dataset.runs, settings(parameters=["inertia.x_G"], scale={"inertia.x_G": 1.0}))
     assert found.values["inertia.x_G"] == pytest.approx(-0.8, rel=1e-4)
+
+
+def walked(dataset: Dataset, seed: int) -> Dataset:
+    """The log with errors that remember each other for about 10 s, as a model that lacks something leaves them."""
+    rng, columns = np.random.default_rng(seed), {}
+    for name, width in (("u", 0.02), ("v", 0.02), ("r", 2e-3)):
+        noise = rng.normal(0, width, len(dataset.frame))
+        for row in range(1, len(noise)):
+            noise[row] = 0.9 * noise[row - 1] + 0.43 * noise[row]
+        columns[name] = dataset.frame[name] + noise
+    return changed(dataset, **columns)
+
+
+def test_discounted_residuals_let_priors_count() -> None:
+    """They are counted as fewer, and a factor goes less far from its base than where all of them count."""
+    data, prior = walked(trials(SHIP, runs=4, steps=60), 1), {"hull.*": 0.05}
+    plain = identify(degraded(SHIP), data, data.runs, settings(prior=prior))
+    less = identify(degraded(SHIP), data, data.runs, settings(prior=prior, discount=True))
+    assert not plain.effective
+    assert all(len(less.residuals) / 3 / count > 2 for count in less.effective.values())
+    assert np.square(less.factors - 1).sum() < np.square(plain.factors - 1).sum()
+    assert all(less.settings.weights[name] > plain.settings.weights[name] for name in SHARP)
+    again = identify(degraded(SHIP), data, data.runs, less.settings)  # the settings in a patch give the same numbers
+    assert again.factors == pytest.approx(less.factors, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", ["white", "process"])
+def test_intervals_of_discounted_fits_cover(noise: str) -> None:
+    """Bases drawn from the prior about the truth: at least 90 % of intervals of 95 %, less two standard errors."""
+    held = []
+    for seed in range(15):
+        rng, clean = np.random.default_rng(seed), trials(SHIP, runs=8, steps=60, seed=seed)
+        if noise == "process":
+            data = walked(clean, seed)
+        else:
+            widths = {"u": 0.02, "v": 0.02, "r": 2e-3}
+            data = changed(clean, **{n: clean.frame[n] + rng.normal(0, w, len(clean.frame)) for n, w in widths.items()})
+        base = SHIP.with_values({path: SHIP.parameters[path] / rng.normal(1, 0.1) for path in FEW})
+        found = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
+        known, true = statistics(LinearFit.of(found)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
+        held += ((known.low <= true) & (true <= known.high)).tolist()
+    assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5

@@ -8,6 +8,8 @@ import pytest
 
 from shipid.physics import hull
 
+UPRIGHT = ca.SX(6, 1)
+
 
 def numbers(expression: Any) -> np.ndarray:
     return np.array(ca.evalf(ca.densify(expression))).ravel()
@@ -16,15 +18,17 @@ def numbers(expression: Any) -> np.ndarray:
 def test_derivatives_sum_on_their_axes() -> None:
     u, v, r = 2.0, 0.5, -0.1
     nu_r = ca.SX(ca.DM([u, v, 0, 0, 0, r]))
-    wrench = numbers(hull.derivatives(nu_r, **{"X_u|u|": -10.0, "Y_uv": 3.0, "Y_v|v|": -4.0, "N_r": 7.0, "K_v": 2.0}))
+    wrench = numbers(
+        hull.derivatives(nu_r, UPRIGHT, **{"X_u|u|": -10.0, "Y_uv": 3.0, "Y_v|v|": -4.0, "N_r": 7.0, "K_v": 2.0})
+    )
     np.testing.assert_allclose(wrench, [-10 * u * u, 3 * u * v - 4 * v * abs(v), 0, 2 * v, 0, 7 * r])
 
 
-def cross_flow(strips: int, v: float, r: float) -> np.ndarray:
+def cross_flow(strips: int, v: float, r: float, **other: float) -> np.ndarray:
     """Wrench of the bundled formula, all strips summed."""
     columns = hull.strips(strips=strips)
     nu_r = ca.SX(ca.DM([1.0, v, 0, 0, 0, r]))
-    numbers_of = {"C_d": 1.2, "x_aft": -15.0, "x_fwd": 18.0, "T": 2.6, "rho": 1025.0}
+    numbers_of = {"C_d": 1.2, "x_aft": -15.0, "x_fwd": 18.0, "T": 2.6, "rho": 1025.0, **other}
     rows = zip(columns["fraction"], columns["share"], strict=True)
     return sum(numbers(hull.cross_flow(nu_r, fraction, share, **numbers_of)) for fraction, share in rows)
 
@@ -47,6 +51,36 @@ def test_cross_flow_converges_to_the_integral() -> None:
     assert errors[2] < 2e-4
 
 
+def test_cross_flow_along_the_hull_gives_force_and_moment_their_own_coefficients() -> None:
+    """Pure sway: the force of C_d, its centre k_fwd L / 6 forward. Pure yaw about the middle: 1 + k_ends / 2."""
+    uniform, along = (cross_flow(400, 0.5, 0.0, **more) for more in ({}, {"k_fwd": 0.4, "k_ends": 0.6}))
+    assert along[1] == pytest.approx(uniform[1], rel=1e-4)
+    assert along[5] / along[1] == pytest.approx(1.5 + 0.4 * 33.0 / 6, rel=1e-4)
+    ends = {"x_aft": -16.5, "x_fwd": 16.5}
+    plain, strong = (cross_flow(400, 0.0, 0.04, k_ends=k, **ends)[5] for k in (0.0, 0.6))
+    assert strong / plain == pytest.approx(1.3, rel=1e-3)
+
+
+def test_cross_flow_of_neutral_shape_is_the_uniform_one() -> None:
+    """To the last digit, and as the same expression: bundled vessels do not change."""
+    numbers_of = {name: ca.SX.sym(name) for name in ("C_d", "x_aft", "x_fwd", "T", "rho")}
+    nu_r, row = ca.SX.sym("nu", 6), (ca.SX.sym("fraction"), ca.SX.sym("share"))
+    neutral = {"k_fwd": 0.0, "k_ends": 0.0}
+    plain, neutral = (hull.cross_flow(nu_r, *row, **numbers_of, **more) for more in ({}, neutral))
+    assert str(plain) == str(neutral)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cross_flow_of_any_shape_takes_energy_and_is_mirrored(seed: int) -> None:
+    """Also of shapes that would be negative somewhere along the hull."""
+    rng = np.random.default_rng(seed)
+    v, r = rng.uniform(-2, 2), rng.uniform(-0.2, 0.2)
+    shape = {"k_fwd": rng.uniform(-3, 3), "k_ends": rng.uniform(-3, 3)}
+    wrench = cross_flow(11, v, r, **shape)
+    assert wrench[1] * v + wrench[5] * r <= 0
+    np.testing.assert_allclose(cross_flow(11, -v, -r, **shape), -wrench, rtol=1e-12)
+
+
 def test_strips_cover_the_length_once() -> None:
     columns = hull.strips(strips=7)
     assert columns["share"].sum() == pytest.approx(1.0)
@@ -61,11 +95,50 @@ def test_resistance_polynomial() -> None:
         np.testing.assert_allclose(wrench, [sign * expected, 0, 0, 0, 0, 0])
 
 
+def test_astern_the_hull_has_more_resistance() -> None:
+    """k_astern times that ahead, continuous at rest, always against the motion."""
+    mmg = {"R_0": 0.02, "L_pp": 7.0, "T": 0.46, "rho": 1000.0}
+    kinds = (
+        lambda nu, **k: hull.mmg(nu, UPRIGHT, **mmg, **k),
+        lambda nu, **k: hull.resistance(nu, R_0=70.0, R_2=3.0, **k),
+    )
+    for kind in kinds:
+        ahead, astern = (numbers(kind(ca.SX(ca.DM([u, 0.1, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (0.8, -0.8))
+        assert astern == pytest.approx(-1.4 * ahead)
+        assert ahead < 0 < astern
+        assert ahead == numbers(kind(ca.SX(ca.DM([0.8, 0.1, 0, 0, 0, 0]))))[0]
+        near = [numbers(kind(ca.SX(ca.DM([u, 0, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (-1e-6, 1e-6)]
+        assert np.abs(near).max() < 1e-3
+
+
 def test_prime_derivatives_are_si_ones_at_their_speed() -> None:
     """Y_v' = -0.3: Y = -0.3 x 1/2 rho L^2 U v; the floor of the speed does not show at 4 m/s."""
     u, v = 4.0, 0.3
-    found = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), L_pp=20.0, rho=1000.0, Y_v=-0.3))
+    found = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), UPRIGHT, L_pp=20.0, rho=1000.0, Y_v=-0.3))
     assert found[1] == pytest.approx(-0.3 * 0.5 * 1000 * 400 * np.hypot(u, v) * v, rel=1e-5)
+
+
+def test_heel_is_a_factor_without_a_scale() -> None:
+    """Y_phi' phi and N_vvphi' v'^2 phi in each scaling; the order of a derivative does not count heel."""
+    nu_r, eta, L = ca.SX(ca.DM([4.0, 0.3, 0, 0, 0, 0.05])), ca.SX(ca.DM([0, 0, 0, -0.2, 0, 0])), 20.0
+    names, U = {"Y_phi": -0.01, "N_vvphi": 0.02}, np.hypot(4.0, 0.3)
+    monomials = np.array([-0.01 * -0.2, 0.02 * 0.3**2 * -0.2])
+    np.testing.assert_allclose(numbers(hull.derivatives(nu_r, eta, **names))[[1, 5]], monomials)
+    prime = numbers(hull.prime_derivatives(nu_r, eta, L_pp=L, rho=1000.0, **names))[[1, 5]]
+    np.testing.assert_allclose(prime, monomials * [500 * L**2 * U**2, 500 * L**3], rtol=1e-12)
+    bis = numbers(hull.bis_derivatives(nu_r, eta, nabla=90.0, L_pp=L, rho=1000.0, g=9.81, **names))[[1, 5]]
+    np.testing.assert_allclose(bis, monomials * [90e3 * 9.81, 90e3], rtol=1e-12)
+
+
+def test_bis_derivatives_by_hand() -> None:
+    """Norrbin (1970): m sqrt(g / L) X_u'' u, m Y_ur'' u r and m L N_uv'' / L u v; linear damping holds at rest."""
+    m, L, g, (u, v, r) = 1025.0 * 5000, 76.2, 9.81, (0.8, -0.3, 0.01)
+    values = {"X_u": -0.0358, "Y_ur": -0.7, "N_uv": -0.45, "N_r": -0.03, "K_p": -0.01}
+    nu_r = ca.SX(ca.DM([u, v, 0, 0.02, 0, r]))
+    found = numbers(hull.bis_derivatives(nu_r, UPRIGHT, nabla=5000.0, L_pp=L, rho=1025.0, g=g, **values))
+    rate = np.sqrt(g / L)
+    expected = [-0.0358 * m * rate * u, -0.7 * m * u * r, 0, -0.01 * m * L**2 * rate * 0.02, 0]
+    np.testing.assert_allclose(found, [*expected, m * -0.45 * u * v - 0.03 * m * L**2 * rate * r], rtol=1e-12)
 
 
 def test_the_mmg_hull_is_its_formula() -> None:
@@ -77,13 +150,13 @@ def test_the_mmg_hull_is_its_formula() -> None:
     X = force * (-0.02 - 0.04 * v_**2 + 0.77 * v_**4)
     Y, N = force * (-0.315 * v_ + 0.083 * r_), force * L * (-0.049 * r_ - 0.294 * v_**2 * r_)
     values = {"X_vv": -0.04, "X_vvvv": 0.77, "Y_v": -0.315, "Y_r": 0.083, "N_r": -0.049, "N_vvr": -0.294}
-    found = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
+    found = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
     np.testing.assert_allclose(numbers(found), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
 
 
 def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
     ahead, astern = (
-        numbers(hull.mmg(ca.SX(ca.DM([u, 0.2, 0, 0, 0, 0])), R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0))[0]
+        numbers(hull.mmg(ca.SX(ca.DM([u, 0.2, 0, 0, 0, 0])), UPRIGHT, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0))[0]
         for u in (1.0, -1.0)
     )
     assert ahead == -astern < 0

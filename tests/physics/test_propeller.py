@@ -8,7 +8,17 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.propeller import controllable_pitch, controllable_wash, propeller, service_speed, wash
+from shipid.physics.propeller import (
+    controllable_pitch,
+    controllable_wash,
+    four_quadrant,
+    four_quadrant_wash,
+    propeller,
+    quadratic,
+    quadratic_wash,
+    service_speed,
+    wash,
+)
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import check_vessel, load_vessel
 
@@ -71,6 +81,179 @@ def test_turning_is_drift_at_the_screw() -> None:
     """beta_P = beta - x r / U: r = U tan-like 0.1 at x = -3.36 m is a drift of 0.336."""
     still, turning = (washed([1.0, 0, 0, 0, 0, r], 10.0)[0] for r in (0.0, 0.1))
     assert turning / still == pytest.approx(1 + (1 - np.exp(-2 * 0.336)) * 0.6, rel=1e-3)
+
+
+@pytest.mark.parametrize("function", [propeller, wash])
+def test_neutral_numbers_leave_the_expressions_as_they_were(function: Any) -> None:
+    """So bundled vessels keep every digit."""
+    nu_r, n = ca.SX.sym("nu", 6), ca.SX.sym("n")
+    names = {"x", "D_p", "w_P0", "C_1", "C_2_plus", "C_2_minus"} | ({"t_P", "rho"} if function is propeller else set())
+    numbers = {name: ca.SX.sym(name) for name in sorted(names)} | {"K_T": {"1": ca.SX.sym("a"), "J": ca.SX.sym("b")}}
+    neutral = {"tau": 0.0, "C_P": 0.0, "k_suction": 0.0, "K_T_astern": None, "k_astern": 1.0}
+    assert str(function(nu_r, n, **numbers)) == str(function(nu_r, n, **numbers, **neutral))
+
+
+@pytest.mark.parametrize(("v", "r"), [(-0.3, 0.0), (0.3, 0.05), (0.0, -0.1)])
+def test_wake_by_tau_and_C_P(v: float, r: float) -> None:
+    """1 - w_P = 0.6 + tau |v_P| + C_P v_P^2, the same to both sides."""
+    v_P = (v - 3.36 * r) / np.hypot(1.0, v)
+    plain = {"C_1": 0.0, "tau": 0.2, "C_P": 0.9}
+    expected = 0.6 + 0.2 * abs(v_P) + 0.9 * v_P**2
+    assert washed([1.0, v, 0, 0, 0, r], 10.0, **plain)[0] == pytest.approx(expected, rel=1e-12)
+    assert washed([1.0, -v, 0, 0, 0, -r], 10.0, **plain)[0] == pytest.approx(expected, rel=1e-12)
+    given = {**VARIABLE, **plain, "t_P": 0.0, "rho": RHO}
+    nu_r = ca.SX(np.array([1.0, v, 0, 0, 0, r]))
+    thrust_there = float(ca.evalf(controllable_pitch(nu_r, ca.SX(8.0), ca.SX(0.5), **given))[0])
+    by_hand = RHO * 0.216**4 * (VARIABLE["k_P"] * 0.5 * 64 - VARIABLE["k_J"] * 8 * expected / 0.216)
+    assert thrust_there == pytest.approx(by_hand, rel=1e-12)
+
+
+ASTERN = {"1": 0.25, "J": 0.30, "JJ": 0.05}
+
+
+@pytest.mark.parametrize("u", [1.0, 0.0, -0.6])
+def test_astern_thrust_has_its_own_curve(u: float) -> None:
+    """X = -(1 - t_P) k_astern rho n^2 D^4 K(J), J = 0.6 u / (n D), negative on a ship that still goes ahead."""
+    n, J = -9.0, 0.6 * u / (-9.0 * 0.216)
+    K = 0.25 + 0.30 * J + 0.05 * J**2
+    found = thrust(u, n, K_T_astern=ASTERN, k_astern=0.9)[0]
+    assert found == pytest.approx(-0.78 * 0.9 * RHO * 81 * 0.216**4 * K)
+    assert thrust(u, n, K_T_astern=SCREW["K_T"])[0] == thrust(u, n)[0]
+    assert thrust(u, 9.0, K_T_astern=ASTERN)[0] == thrust(u, 9.0)[0]
+
+
+@pytest.mark.parametrize("u", [1.3, -1.3])
+def test_thrust_is_continuous_where_the_screw_stops(u: float) -> None:
+    for more in ({}, {"K_T_astern": ASTERN, "k_astern": 0.7, "k_drag": 0.15, "Y_astern": {"1": -0.02}}):
+        sides = [thrust(u, n, **more) for n in (-1e-4, 1e-4)]
+        np.testing.assert_allclose(*sides, atol=1e-5)
+
+
+def test_a_stopped_screw_drags_by_its_disc() -> None:
+    """k_drag rho D^2 u_P|u_P| (1 - t_P); the drag takes energy, and is nothing inside the curve."""
+    for u in (1.2, -0.8):
+        u_P = 0.6 * u
+        assert thrust(u, 0.0, k_drag=0.15)[0] == pytest.approx(-0.78 * 0.15 * RHO * 0.216**2 * u_P * abs(u_P))
+    assert thrust(1.179, 10.4, k_drag=0.15)[0] == thrust(1.179, 10.4)[0]
+    rng = np.random.default_rng(3)
+    for u, n in rng.uniform([-2, -12], [2, 12], (100, 2)):
+        assert (thrust(u, n, k_drag=0.3)[0] - thrust(u, n)[0]) * u <= 0
+
+
+def test_drag_of_a_driven_screw_has_no_step_at_the_ends_of_its_curve() -> None:
+    for J in (0.8, -0.5):
+        u = J * 6.0 * 0.216 / 0.6
+        inside, outside = (thrust(u * k, 6.0, k_drag=0.2, J_max=0.8, J_min=-0.5)[0] for k in (1 - 1e-9, 1 + 1e-9))
+        assert inside == pytest.approx(outside, abs=1e-6)
+
+
+def test_a_screw_astern_pushes_the_stern_aside() -> None:
+    """Y = rho n^2 D^4 Y_astern(J), N = rho n^2 D^5 N_astern(J), only astern; a left-handed screw is its mirror."""
+    aside = {"Y_astern": {"1": -0.03, "J": 0.02}, "N_astern": {"1": 0.4}}
+    n, u, unit = -8.0, 0.5, RHO * 64 * 0.216**4
+    found = thrust(u, n, **aside)
+    J = 0.6 * u / (n * 0.216)
+    np.testing.assert_allclose(found[[1, 5]], [unit * (-0.03 + 0.02 * J), unit * 0.216 * 0.4])
+    assert found[0] == thrust(u, n)[0]
+    np.testing.assert_array_equal(thrust(u, 8.0, **aside), thrust(u, 8.0))
+    left = {"Y_astern": {"1": 0.03, "J": -0.02}, "N_astern": {"1": -0.4}}
+    np.testing.assert_allclose(thrust(u, n, **left), found * [1, -1, 1, -1, 1, -1])
+
+
+def test_a_screw_astern_draws_water_past_the_rudder() -> None:
+    """u_P - k (sqrt(u_P^2 + 8 K n^2 D^2 / pi) - |u_P|), over the whole rudder; nothing of it ahead."""
+    n, u_P = -9.0, 0.6
+    J = u_P / (n * 0.216)
+    K = 0.2931 - 0.2753 * J - 0.1385 * J**2
+    added = np.sqrt(u_P**2 + 8 / np.pi * K * (n * 0.216) ** 2) - u_P
+    found = washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4)
+    np.testing.assert_allclose(found, [u_P - 0.4 * added, u_P - 0.4 * added, 0.216], rtol=1e-3)
+    assert found[0] < 0.1 * u_P
+    np.testing.assert_array_equal(washed([1.0, 0, 0, 0, 0, 0], 9.0, k_suction=0.4), washed([1.0, 0, 0, 0, 0, 0], 9.0))
+    near = [washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4) for n in (-1e-5, 1e-5)]
+    np.testing.assert_allclose(*near, atol=1e-3)
+
+
+def in_four_quadrants(u: float, n: float, **other: Any) -> tuple[float, np.ndarray]:
+    """Surge force and slipstream of KVLCC2's screw, whose polynomial is laid on the quadrants n > 0."""
+    beta = np.linspace(-180, 180, 721)
+    J = np.clip(0.7 * np.pi * np.tan(np.radians(beta)), -1.0, 1.5)
+    K = 0.2931 - 0.2753 * J - 0.1385 * J**2
+    ahead = np.cos(np.radians(beta)) ** 2 * 8 / np.pi * K / (0.7 * np.pi) ** 2
+    C_T = np.where(np.abs(beta) < 90, ahead, -0.8 * ahead[::-1])
+    C_T[0] = C_T[-1] = -0.1
+    given = {**WAKE, "x": -3.36, "D_p": 0.216, "beta_deg": list(ca.SX(beta).nz), "C_T": list(ca.SX(C_T).nz), **other}
+    nu_r = ca.SX(np.array([u, 0, 0, 0, 0, 0]))
+    force = float(ca.evalf(four_quadrant(nu_r, ca.SX(n), t_P=0.22, rho=RHO, **given))[0])
+    return force, np.array(ca.evalf(four_quadrant_wash(nu_r, ca.SX(n), **given))).ravel()
+
+
+@pytest.mark.parametrize(("u", "n"), [(1.179, 10.4), (0.0, 8.0), (-0.4, 9.0), (1.0, 5.0)])
+def test_a_screw_in_four_quadrants_is_its_polynomial_ahead(u: float, n: float) -> None:
+    force, flow = in_four_quadrants(u, n)
+    assert force == pytest.approx(thrust(u, n)[0], rel=1e-3)
+    if u >= 0:
+        np.testing.assert_allclose(flow, washed([u, 0, 0, 0, 0, 0], n), rtol=1e-3)
+
+
+def test_a_screw_in_four_quadrants_is_continuous_and_finite_at_rest() -> None:
+    for u in (1.0, -1.0):
+        sides = [in_four_quadrants(u, n)[0] for n in (-1e-6, 1e-6)]
+        assert sides[0] == pytest.approx(sides[1], abs=1e-2)
+    assert in_four_quadrants(0.0, 0.0)[0] == 0
+
+
+QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4, "rho": 1014.0}
+
+
+def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
+    nu_r = ca.SX(np.array([u, 0.1, 0, 0, 0, 0]))
+    return np.array(ca.evalf(quadratic(nu_r, ca.SX(n), **{**QUADRATIC, **other}))).ravel()
+
+
+def quadratic_flow(u: float, n: float, **other: Any) -> np.ndarray:
+    nu_r = ca.SX(np.array([u, 0.1, 0, 0, 0, 0]))
+    given = {name: value for name, value in {**QUADRATIC, **other}.items() if name != "x"}
+    return np.array(ca.evalf(quadratic_wash(nu_r, ca.SX(n), **given))).ravel()
+
+
+def test_quadratic_thrust_by_hand() -> None:
+    """T = T_nn n|n| - T_nu |n| u - T_uu u|u|; Y and N are shares of T."""
+    u, n = 0.7, 20.0
+    T = 3.6e-3 * 400 - 1.5e-4 * 20 * u - 0.2 * u**2
+    found = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2)
+    np.testing.assert_allclose(found, [0.9 * T, 0.04 * T, 0, 0, 0, -0.3 * T - 0.2 * 0.9 * T], atol=1e-12)
+    astern = quadratic_wrench(u, -n, k_astern=1.4, dT_nu=3e-4)[0]
+    assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 4.5e-4 * 20 * u)
+
+
+def test_a_driven_screw_gives_its_share_against_its_sense() -> None:
+    """Between the shaft speeds at which the water drives it, a screw with k_driven = 0 gives nothing."""
+    for u, n in ((1.0, 0.02), (-1.0, -0.02)):
+        driven = quadratic_wrench(u, n)[0]
+        assert driven * n < 0
+        assert quadratic_wrench(u, n, k_driven=0.0)[0] == 0
+        assert quadratic_wrench(u, n, k_driven=0.5)[0] == pytest.approx(driven / 2)
+    assert quadratic_wrench(1.0, 20.0, k_driven=0.0)[0] == quadratic_wrench(1.0, 20.0)[0]
+
+
+def test_race_of_a_quadratic_screw() -> None:
+    """Momentum theory, or c^2 = c_un u n + c_nn n^2; a screw astern takes at most all flow of a ship going ahead."""
+    u, n = 0.7, 20.0
+    T = 3.6e-3 * 400 - 1.5e-4 * 20 * u
+    race = np.sqrt(u**2 + 8 * T / (np.pi * 1014 * 0.06**2))
+    np.testing.assert_allclose(quadratic_flow(u, n, D_p=0.06), [u, race, 0.06], rtol=1e-12)
+    flow = quadratic_flow(u, n, c_un=0.6, c_nn=38.0)
+    np.testing.assert_allclose(flow, [u, np.sqrt(0.6 * u * n + 38 * n**2), 0], rtol=1e-12)
+    assert quadratic_flow(u, -n, D_p=0.06)[1] == 0
+    assert quadratic_flow(-u, -n, D_p=0.06)[1] == pytest.approx(-u)
+
+
+@pytest.mark.parametrize("more", [{"D_p": 0.06}, {"c_un": 0.6, "c_nn": 38.0}])
+def test_race_of_a_quadratic_screw_is_continuous(more: dict[str, float]) -> None:
+    for u, n in ((0.0, 10.0), (0.0, -10.0), (0.8, 0.0), (-0.8, 0.0)):
+        across = [quadratic_flow(u + du, n + dn, **more)[1] for du, dn in ((-1e-7, -1e-7), (1e-7, 1e-7))]
+        assert across[0] == pytest.approx(across[1], abs=1e-3)
 
 
 def test_a_ship_at_the_speed_of_her_shaft_has_no_thrust_to_spare() -> None:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.rudder import rudder, rudder_derivatives
+from shipid.physics.rudder import rudder, rudder_coefficients, rudder_derivatives, rudder_polynomial
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
 RUDDER: dict[str, Any] = {
@@ -70,3 +70,65 @@ def test_derivatives_by_hand() -> None:
     u, v = 6.0 / 7.5 - 1, -1.0 / 7.5
     Y = force * 0.2 * (-0.003 - 0.006 * u - 0.01 * v**2)
     np.testing.assert_allclose(np.array(found).ravel(), [0, Y, 0, 0, 0, force * 160 * 0.0014 * 0.2], rtol=1e-12)
+
+
+def side_force(delta: float, **other: float) -> float:
+    return float(wrench([1.0, 0, 0, 0, 0, 0], delta, [0.6, 1.4, D_P], **other)[1])
+
+
+@pytest.mark.parametrize("delta", [0.2, 0.6])
+def test_a_rudder_force_may_differ_by_side_and_angle(delta: float) -> None:
+    """F_N times 1 + f_angle |s| + f_side sign(s) + f_angle_side s, s = sin(delta) in flow from ahead."""
+    shape = {"f_angle": -0.2, "f_side": 0.05, "f_angle_side": 0.1}
+    for sense in (1, -1):
+        s = np.sin(sense * delta)
+        factor = 1 - 0.2 * abs(s) + 0.05 * sense + 0.1 * s
+        assert side_force(sense * delta, **shape) == pytest.approx(factor * side_force(sense * delta))
+    mirrored = {**shape, "f_side": -0.05, "f_angle_side": -0.1}  # a screw that turns the other way
+    assert side_force(-delta, **mirrored) == pytest.approx(-side_force(delta, **shape))
+    both = side_force(delta, f_angle=-0.2), side_force(-delta, f_angle=-0.2)
+    assert both[0] == -both[1]
+
+
+def test_a_rudder_force_by_side_is_continuous_amidships() -> None:
+    near = [side_force(delta, f_side=0.2, f_angle_side=0.3) for delta in (-1e-9, 1e-9)]
+    assert near[0] == pytest.approx(near[1], abs=1e-6)
+
+
+def test_neutral_sides_leave_the_expression_as_it_was() -> None:
+    inputs = ca.SX.sym("nu", 6), ca.SX.sym("delta"), ca.SX.sym("wash", 3)
+    numbers = {name: ca.SX.sym(name) for name in RUDDER}
+    neutral = {"f_angle": 0.0, "f_side": 0.0, "f_angle_side": 0.0}
+    assert str(rudder(*inputs, **numbers)) == str(rudder(*inputs, **numbers, **neutral))
+
+
+POLYNOMIAL: dict[str, Any] = {
+    **{"x": -3.5, "z": 0.2, "A_R": 0.0539, "f_alpha": 2.747, "epsilon": 1.09, "k_x": 0.6, "t_R": 0.387, "a_H": 0.312},
+    **{"x_H": -3.248, "L_pp": L, "rho": 1000.0, "v_R": {"v": -0.5, "r": 0.3, "rrv": -1.1}},
+}
+
+
+def test_a_rudder_with_a_polynomial_flow_by_hand() -> None:
+    u, v, r, delta, u_P, race = 1.1, -0.2, 0.08, 0.3, 0.7, 1.5
+    U = np.hypot(u, v)
+    v_, r_ = v / U, r * L / U
+    v_R = U * (-0.5 * v_ + 0.3 * r_ - 1.1 * r_**2 * v_)
+    u_R = 1.09 * np.sqrt(u_P**2 + 0.6 * (race**2 - u_P**2))
+    F_N = 500 * 0.0539 * 2.747 * (u_R**2 + v_R**2) * np.sin(delta - np.arctan2(v_R, u_R))
+    X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
+    N = (3.5 + 0.312 * 3.248) * F_N * np.cos(delta)
+    given = ca.SX(np.array([u, v, 0, 0, 0, r])), ca.SX(delta), ca.SX(np.array([u_P, race, D_P]))
+    found = np.array(ca.evalf(rudder_polynomial(*given, **POLYNOMIAL))).ravel()
+    np.testing.assert_allclose(found, [X, Y, 0, -0.2 * Y, 0.2 * X, N], rtol=2e-4)
+
+
+def test_rudder_coefficients_by_hand() -> None:
+    """1/2 rho L^2 (Y |c|c delta + ...), moments with L^3; c between inflow and race; even parts favour one side."""
+    values = {"Y_|c|cdelta": -0.02, "Y_cc|delta|": -0.001, "X_ccdeltadelta": -0.01, "N_|c|c|beta|betadelta": 0.03}
+    u, v, delta = 2.0, -0.4, 0.3
+    c, beta = 1.5 + 0.5 * (2.5 - 1.5), np.arctan2(-v, u)
+    given = ca.SX(np.array([u, v, 0, 0, 0, 0])), ca.SX(delta), ca.SX(np.array([1.5, 2.5, D_P]))
+    found = np.array(ca.evalf(rudder_coefficients(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))).ravel()
+    force = 500 * L**2 * c**2
+    Y, N = force * (-0.02 * delta - 0.001 * delta), force * L * 0.03 * abs(beta) * beta * delta
+    np.testing.assert_allclose(found, [force * -0.01 * delta**2, Y, 0, 0, 0, N], rtol=1e-9)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -138,9 +139,35 @@ def test_lag_keeps_its_rate_limit(sense: float) -> None:
     assert abs(state) == pytest.approx(0.2 * 6.0)
 
 
-def test_lag_output_is_its_state() -> None:
+def test_output_is_the_state_where_no_limit_is_given() -> None:
     state = ca.SX.sym("state")
-    assert ca.is_equal(thruster.first_order_output(state), state)
+    assert ca.is_equal(thruster.bounded_output(state), state)
+    assert [float(thruster.bounded_output(ca.SX(a), high=ca.SX(0.6))) for a in (-2.0, 0.5, 0.7)] == [-2.0, 0.5, 0.6]
+
+
+LIMITS = {"rate": ca.SX(0.1), "low": ca.SX(-0.3), "high": ca.SX(0.6)}
+ADVANCES = [thruster.rate_limit_advance, partial(thruster.first_order_advance, T=ca.SX(0.5))]
+
+
+@pytest.mark.parametrize("advance", ADVANCES)
+@pytest.mark.parametrize(("order", "reached"), [(2.0, 0.6), (-2.0, -0.3), (0.4, 0.4)])
+def test_an_actuator_keeps_its_limits_and_its_rate(advance: Any, order: float, reached: float) -> None:
+    state, path = 0.0, [0.0]
+    for _ in range(150):
+        state = float(advance(ca.SX(order), ca.SX(state), ca.SX(0.1), **LIMITS))
+        path.append(state)
+    assert np.abs(np.diff(path)).max() == pytest.approx(0.01)
+    assert path[-1] == pytest.approx(reached, abs=1e-6)
+    assert -0.3 <= min(path) <= max(path) <= 0.6
+
+
+def test_a_rate_limit_has_no_lag() -> None:
+    """At its order after order / rate, to the last digit, in any number of steps."""
+    for steps in (1, 7):
+        state = 0.0
+        for _ in range(steps):
+            state = float(thruster.rate_limit_advance(ca.SX(0.5), ca.SX(state), ca.SX(5.0 / steps), rate=ca.SX(0.1)))
+        assert state == pytest.approx(0.5, rel=1e-14)
 
 
 @pytest.mark.parametrize(("J", "J_y"), [(2.0, 0.1), (1.4, -0.5), (-1.0, 0.2), (0.8, 1.1), (0.5, -0.9), (2.2, 0.8)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError, ShipidError
-from shipid.simulation.approach import Controls, acceleration, helm_effect, steady, thrust_sharing
+from shipid.simulation.approach import Controls, NotStraight, acceleration, helm_effect, steady, thrust_sharing
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import PATCHED
@@ -63,18 +63,19 @@ def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
 def test_no_approach_depends_on_its_company() -> None:
     """A fast and a slow ship settle at different times: each start is what it is alone, bit for bit."""
     n = np.array([0.8, 3.5])
-    together, _ = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    together = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi").state
     for place, one in enumerate(n):
-        alone, _ = steady(Controls.of(SHIP), np.array([one]), step=0.1, method="rk4", engine="casadi")
+        alone = steady(Controls.of(SHIP), np.array([one]), step=0.1, method="rk4", engine="casadi").state
         assert {name: values[place] for name, values in together.items()} == {name: v[0] for name, v in alone.items()}
 
 
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
-    state, memory = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    found = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    state = found.state
     np.testing.assert_allclose(state["u"], [2.27, 4.39, 6.06], atol=0.02)
-    assert memory == {}
+    assert found.memory == {}
     for shaft, u in zip(n, state["u"], strict=True):
         assert np.abs(acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
     for name in ("north", "east", "psi", "v", "r"):
@@ -83,7 +84,8 @@ def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
 
 def test_hidden_states_and_actuators_are_steady_too() -> None:
     vessel = load_vessel("gunnerus-28.9-6dof")
-    state, memory = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
+    found = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
+    state, memory = found.state, found.memory
     assert set(state) == {*dynamics(vessel).state, *dynamics(vessel).hidden}
     assert memory == {name: pytest.approx(2.0 if name.endswith(".n") else 0.0) for name in dynamics(vessel).memory}
     for name in ("p", "q"):
@@ -98,7 +100,7 @@ def test_an_approach_that_never_settles_or_diverges_is_told() -> None:
     ponderous = Controls.of(
         SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1, "unusual": ["added_mass.X_udot"]})
     )
-    with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: start from rest"):
+    with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: let a helmsman"):
         steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
 
 
@@ -106,6 +108,45 @@ def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() 
     lame = Controls.of(SHIP.with_values({"thruster.starboard.off": True}))
     with pytest.raises(ShipidError, match="turns with the helm amidships at 120 rpm"):
         steady(lame, np.array([2.0]), step=0.1, method="rk4", engine="casadi")
+
+
+LAGS = {"thruster.port.actuator.alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21}}
+
+
+@pytest.mark.parametrize(
+    ("key", "changes", "n"),
+    [
+        ("gunnerus-28.9", {"thruster.starboard.off": True}, [2.0, 3.0]),
+        ("gunnerus-28.9", {"thruster.starboard.off": True} | LAGS, [2.0]),
+        ("kvlcc2-l7", {"hull.mmg.N_u": 4e-4, "hull.mmg.Y_u": -1e-3}, [10.229]),  # course-unstable, and uneven
+    ],
+)
+def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str, object], n: list[float]) -> None:
+    """No velocity changes with the helm that he holds, and the yaw rate is nil."""
+    vessel = load_vessel(key).with_values(changes)
+    controls, model = Controls.of(vessel), dynamics(vessel)
+    how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
+    with pytest.raises(NotStraight, match="helmsman"):
+        steady(controls, np.array(n), **how)  # type: ignore[arg-type]
+    found = steady(controls, np.array(n), held=True, **how)  # type: ignore[arg-type]
+    assert set(found.helm) == set(controls.helm)
+    assert set(found.memory) == set(model.memory)
+    for place, shaft in enumerate(n):
+        helm = {name: values[place] for name, values in found.helm.items()}
+        orders = {name: shaft if name in controls.drives else 0.0 for name in model.commands} | helm
+        state = [found.state[name][place] for name in (*model.state, *model.hidden)]
+        memory = [found.memory[name][place] for name in model.memory]
+        rates = np.array(
+            model.rates(
+                state, memory, [orders[name] for name in model.commands], np.zeros(len(model.environment)),
+                list(vessel.parameters.values()), np.zeros(model.num_dof),
+            )
+        ).ravel()  # fmt: skip
+        assert np.abs(rates[3:]).max() < 1e-4 * found.state["u"][place]
+        assert abs(found.state["r"][place]) < 1e-4
+        assert 0.001 < max(map(abs, helm.values())) < 0.3
+    alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
+    assert alone.state["u"][0] == found.state["u"][0]  # whatever the company
 
 
 def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:

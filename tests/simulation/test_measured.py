@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from shipid.simulation.measured import manoeuvre_content, measure_standard
+from shipid.errors import ShipidError
+from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
 from shipid.vessel.load import load_vessel
 
 
@@ -18,3 +19,16 @@ def test_a_manoeuvre_is_simulated_measured_and_shown(name):
     np.testing.assert_array_equal(content.log["t"], done.record.t)
     assert np.ptp(content.outline[:, 0]) == pytest.approx(31.25)  # over all [m]
     assert content.answer[0].figure == "measures"
+
+
+def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
+    lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
+    done = measure_standard(lame, "turning", (20,), duration=120.0)
+    assert done.standard.manoeuvre.approach == "helmsman"
+    assert approached(done.standard).endswith("held on course by a helmsman")
+    assert np.isfinite({row["measure"]: row["value"] for row in done.measures}["advance"])
+    with pytest.raises(ShipidError, match="turns with the helm amidships"):
+        measure_standard(lame, "turning", (20,), approach="steady")
+    rest = measure_standard(lame, "turning", (20,), approach="rest", duration=60.0)
+    assert rest.record.u[0] == 0
+    assert approached(rest.standard).startswith("from rest")

@@ -93,6 +93,21 @@ def test_from_rest_and_from_a_steady_speed(vessel: Vessel) -> None:
         assert rest["actual.port.n"].iloc[0] == 0
 
 
+def test_a_helmsman_holds_the_approach_of_a_ship_that_does_not_go_straight() -> None:
+    """On one screw: the course and the yaw rate stay until the execute, then the order of the manoeuvre counts."""
+    lame = SHIP.with_values({"thruster.starboard.off": True})
+    circle = TurningCircle(name="circle", approach="helmsman", n_rpm=145, execute_at=10, duration=20, angle_deg=20)
+    zigzag = Zigzag(name="zigzag", approach="helmsman", n_rpm=145, execute_at=10, duration=20, course_deg=90)
+    frame = perform(lame, [circle, zigzag], step=0.1)
+    for run, angle in (("circle", 20), ("zigzag", 20)):
+        log = frame[frame["run"] == run].reset_index(drop=True)
+        assert np.abs(log["r"].iloc[:100]).max() < 1e-4
+        assert np.ptp(log["psi"].iloc[:100]) < 1e-3
+        assert np.ptp(log["port.alpha"].iloc[:100]) == 0
+        assert abs(log["port.alpha"].iloc[0]) > 0.01
+        assert log["port.alpha"].iloc[101] == pytest.approx(-angle * DEGREE)
+
+
 def test_wind_is_one_for_all_or_one_for_each_and_none_before_the_start() -> None:
     three = [CIRCLE.model_copy(update={"angle_deg": 1e-9})] * 3
     still = perform(SHIP, three, step=0.1)

@@ -16,7 +16,7 @@ from tests.study.tiny import tiny_plan
 
 def test_a_sound_folder_has_no_fault(tiny_run: Path) -> None:
     found = check_folder(tiny_run)
-    assert found.lines == ["2 of 2 batches finished, 0 faults"]
+    assert found.lines == ["8 of 8 cells finished, 0 faults"]
     assert not found.faults
 
 
@@ -36,6 +36,6 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
 
 def test_a_run_that_has_just_begun(tmp_path: Path) -> None:
     store.open_folder(tmp_path / "run", tiny_plan(tmp_path))
-    assert check_folder(tmp_path / "run").lines == ["0 of 2 batches finished, 0 faults"]
+    assert check_folder(tmp_path / "run").lines == ["0 of 8 cells finished, 0 faults"]
     with pytest.raises(ResultError, match=r"no study\.toml"):
         check_folder(tmp_path)

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
+import random
+import socket
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -87,3 +94,136 @@ def test_rubbish_is_no_claim_of_anyone_until_it_is_late(tmp_path: Path) -> None:
     with Claims(tmp_path) as mine:
         assert not mine.take("a")
         os.utime(tmp_path / "claims" / "a", (1.0, 1.0))
+
+
+def free(mine: Claims, units: list[str], finished: set[str]) -> Iterator[str]:
+    return mine.free(units, lambda: finished, finished.__contains__)
+
+
+def test_one_process_takes_units_in_their_order(tmp_path: Path) -> None:
+    units = [f"u{k}" for k in range(30)]
+    with Claims(tmp_path) as mine:
+        assert list(free(mine, units, {"u3", "u7"})) == [unit for unit in units if unit not in ("u3", "u7")]
+        assert list(free(mine, units, set())) == ["u3", "u7"]  # it is at work on the others
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_unit_is_done_once_by_workers_that_die_and_join(tmp_path: Path, seed: int) -> None:
+    """Many workers in turns: some die with a claim, others join; what the dead had is done by others, nothing twice."""
+    rng = random.Random(seed)
+    units = [f"u{k}" for k in range(rng.randrange(1, 200))]
+    finished: set[str] = set()
+    done: list[str] = []
+    with ExitStack() as stack:
+
+        def joined() -> tuple[Claims, Iterator[str]]:
+            mine = stack.enter_context(Claims(tmp_path))
+            return mine, free(mine, units, finished)
+
+        workers = [joined() for _ in range(rng.randrange(1, 20))]
+        die = rng.randrange(5)
+        while len(finished) < len(units):
+            place = rng.randrange(len(workers))
+            mine, left = workers[place]
+            unit = next(left, None)
+            if unit is None:
+                workers[place] = mine, free(mine, units, finished)
+            elif die:
+                die -= 1
+                _gone(tmp_path, mine, unit)
+                workers[place] = joined()
+            else:
+                done.append(unit)
+                finished.add(unit)
+                mine.give_back(unit)
+    assert sorted(done) == sorted(units)
+    assert list(tmp_path.iterdir()) == []
+
+
+def _gone(folder: Path, mine: Claims, unit: str) -> None:
+    """A claim of a process of another machine, not renewed any more."""
+    (folder / "claims" / unit).unlink()
+    (folder / "claims" / unit).write_text('{"host": "elsewhere", "process": 1, "system": ""}')
+    os.utime(folder / "claims" / unit, (1.0, 1.0))
+    mine._mine.discard(unit)
+
+
+def test_a_claim_says_who_works_and_since_when(tmp_path: Path) -> None:
+    with Claims(tmp_path) as mine:
+        mine.take("a")
+        words = json.loads((tmp_path / "claims" / "a").read_text())
+    assert words["host"] == socket.gethostname()
+    assert words["process"] == os.getpid()
+    assert words["owner"]
+    assert datetime.fromisoformat(words["since"]).tzinfo is not None
+
+
+def test_what_one_process_has_lost_it_does_not_give_back(tmp_path: Path) -> None:
+    """A process that was held up for long: its claim is another one's now."""
+    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+        assert slow.take("a")
+        (tmp_path / "claims" / "a").unlink()
+        assert other.take("a")
+        slow.give_back("a")
+        assert held(tmp_path) == ["a"]
+
+
+def test_once_is_once(tmp_path: Path) -> None:
+    """Of several that need a thing at the same time one makes it, the others wait; none makes what is there."""
+    made: list[int] = []
+
+    def make() -> None:
+        time.sleep(0.1)
+        made.append(1)
+
+    def work() -> None:
+        with Claims(tmp_path) as mine:
+            mine.once("thing", lambda: bool(made), make)
+            assert made == [1]
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert made == [1]
+    with Claims(tmp_path) as mine:
+        mine.once("thing", lambda: bool(made), make)
+    assert made == [1]
+
+
+def test_alone_keeps_others_out(tmp_path: Path) -> None:
+    inside: list[int] = []
+
+    def work() -> None:
+        with Claims(tmp_path) as mine, mine.alone("record"):
+            inside.append(1)
+            time.sleep(0.02)
+            assert inside == [1]
+            inside.clear()
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not inside
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_others_are_those_that_live(tmp_path: Path) -> None:
+    with Claims(tmp_path) as one:
+        assert not one.others()
+        with Claims(tmp_path):
+            assert one.others()
+        process = os.fork()
+        if not process:
+            Claims(tmp_path).take("a")
+            os._exit(0)
+        os.waitpid(process, 0)
+        assert not one.others()
+
+
+def test_waits_grow() -> None:
+    assert claims.pause(0.0) == 0.0
+    assert claims.pause(0.001) == pytest.approx(0.0015)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -105,6 +106,7 @@ def test_failed_cells_are_left_out(made: Any) -> None:
 def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
     worlds = [made(grid({**H, "good": (good,)}, (30,)), runs=8) for good in (1.0, 1.5)]
+    monkeypatch.setattr(compare, "are_worlds", lambda _: True)
     monkeypatch.setattr(compare, "read_worlds", lambda _: worlds)
     result = CliRunner().invoke(app, ["study", "compare", "one", "other"])
     assert result.exit_code == 0, result.output
@@ -116,7 +118,29 @@ def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPat
     assert "none - 9.00 [9.00, 9.00]" in lines
 
 
-def test_the_command_wants_one_study_and_says_so_in_one_line(tmp_path: Path, tiny_run: Path) -> None:
+def test_which_folders_are_worlds_of_one_study(tmp_path: Path, tiny_run: Path, other_world: Path) -> None:
+    run_here(tiny_plan(tmp_path, {"grid.N_D": [4]}), tmp_path / "run")
+    assert compare.are_worlds([tiny_run, other_world])
+    assert not compare.are_worlds([tiny_run, tmp_path / "run"])
+    assert not compare.are_worlds([tiny_run, tiny_run])
+
+
+def test_several_methods_in_several_worlds(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
+    worlds = [made(grid(H, (30,)), runs=8) for _ in range(2)]
+    for results in worlds:
+        again = results.cells.assign(method="other", H=2 * results.cells["H"])
+        object.__setattr__(results, "cells", pd.concat([results.cells, again], ignore_index=True))
+    monkeypatch.setattr(compare, "are_worlds", lambda _: True)
+    monkeypatch.setattr(compare, "read_worlds", lambda _: worlds)
+    result = CliRunner().invoke(app, ["study", "compare", "one", "other"])
+    assert result.exit_code == 0, result.output
+    lines = [" ".join(line.split()) for line in result.output.splitlines()]
+    assert "good 2.00 [2.00, 2.00] -" in lines
+    assert "good + other - 2.00 [2.00, 2.00]" in lines
+
+
+def test_a_folder_without_a_run_is_refused_in_one_line(tmp_path: Path, tiny_run: Path) -> None:
     result = CliRunner().invoke(app, ["study", "compare", str(tiny_run), str(tmp_path)])
     assert isinstance(result.exception, ResultError)
     assert str(result.exception) == f"{tmp_path}: is not the folder of a run: it holds no study.toml"

@@ -13,6 +13,7 @@ from shipid.study.evidence import (
     at_least,
     by_chance,
     contrasts,
+    contrasts_apart,
     holm,
     over_worlds,
     resampled_means,
@@ -67,6 +68,40 @@ def test_differences_that_are_all_alike() -> None:
     assert found.above[0] < 1e-6
     assert (found.low[1], found.high[1]) == (0.0, 0.0)
     assert found.above[1] >= 0.5
+
+
+@pytest.mark.parametrize(("runs", "others"), [(6, 6), (6, 30), (20, 8)])
+def test_intervals_of_manoeuvres_that_are_no_pairs_cover(runs: int, others: int) -> None:
+    """As above, for two sets of manoeuvres of unequal number and spread."""
+    rng = np.random.default_rng([runs, others])
+    one, other = rng.normal(2.0, 1.0, (400, runs)), rng.lognormal(0, 0.5, (400, others)) + 2.0 - np.exp(0.125)
+    found = contrasts_apart(one, np.ones(runs), other, rng.integers(30, 60, others).astype(float))
+    limit = stats.binom.ppf(0.999, 400, 0.05)
+    assert (found.low > 0).sum() <= limit
+    assert (found.high < 0).sum() <= limit
+
+
+def test_pairs_are_narrower_than_manoeuvres_apart() -> None:
+    """What is hard in both runs cancels in pairs alone; the mean is the same, and turning round changes the sign."""
+    rng = np.random.default_rng(5)
+    hard = rng.lognormal(0, 0.6, (50, 12))
+    one, other, counts = 1.2 * hard, hard + rng.normal(0, 0.05, hard.shape), np.ones(12)
+    paired, apart = contrasts(one - other, counts), contrasts_apart(one, counts, other, counts)
+    np.testing.assert_allclose(apart.mean, paired.mean)
+    assert np.median((apart.high - apart.low) / (paired.high - paired.low)) > 3
+    back = contrasts_apart(other, counts, one, counts)
+    np.testing.assert_allclose(back.mean, -apart.mean)
+    np.testing.assert_allclose(back.high, -apart.low, rtol=0.2, atol=0.1)
+    wide = contrasts_apart(one, counts, other, counts, 1.0)
+    assert (wide.high - wide.low > apart.high - apart.low).all()
+
+
+def test_a_set_without_spread_and_one_that_is_too_small() -> None:
+    same = contrasts_apart(np.ones((1, 6)), np.ones(6), np.full((1, 8), 0.5), np.ones(8))
+    assert (same.mean[0], same.low[0], same.high[0]) == pytest.approx((0.5, 0.5, 0.5))
+    few = contrasts_apart(np.ones((1, 9)), np.ones(9), np.ones((1, FEWEST_RUNS - 1)), np.ones(FEWEST_RUNS - 1))
+    assert few.mean[0] == pytest.approx(0.0)
+    assert np.isnan([few.low[0], few.high[0], few.above[0], few.below[0]]).all()
 
 
 def test_too_few_manoeuvres_have_no_interval() -> None:

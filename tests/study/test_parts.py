@@ -13,7 +13,7 @@ from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.study import store
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
-from shipid.study.results import read_results
+from shipid.study.results import read_cells, read_results
 from tests.study.tiny import events_here, run_here, tiny_plan
 
 METHODS = [
@@ -97,13 +97,18 @@ def test_results_of_several_parts_are_read_one_by_one(four: tuple[Plan, Path], t
     plan, folder = four
     with pytest.raises(ResultError, match="several parts"):
         read_results(folder)
+    cells = read_cells(folder)
+    assert len(cells) == sum(part.plan.cells for part in plan.parts.values())
+    assert set(cells["part"]) == set(plan.parts)
+    assert set(cells["condition"]) == {part.condition for part in plan.parts.values()}
     tiny_plan(tmp_path)
     with pytest.raises(ShipidError, match="several parts"):
         shipid.run(tmp_path / "tiny.toml", set=FOUR)
     empty = tmp_path / "run"
     store.open_folder(empty, plan)
-    with pytest.raises(ResultError, match="no cell is finished"):
-        write_pages(empty)
+    for read in (write_pages, read_cells):
+        with pytest.raises(ResultError, match="no cell is finished"):
+            read(empty)
 
 
 BAD: dict[str, tuple[dict[str, Any], str, str]] = {

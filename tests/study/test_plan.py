@@ -14,7 +14,7 @@ from shipid.hybrid.path_trained import PathTrained
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
-from tests.study.tiny import tiny_plan
+from tests.study.tiny import mixed_plan, tiny_plan
 
 
 @pytest.mark.parametrize(
@@ -255,3 +255,25 @@ def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(
     assert fitted.identify is not None
     assert again.identify is not None
     assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
+
+
+def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:
+    """Networks that are trained by themselves are a unit each; the whole closed form at one amount of data is one."""
+    plan = read_plan("simulation")
+    sizes = [len(unit.pairs) for unit in plan.units]
+    assert (len(plan.units), max(sizes), sum(sizes)) == (210, 1, plan.cells)
+    assert len({unit.key for unit in plan.units}) == 210
+    assert [unit.key for unit in tiny_plan(tmp_path).units] == ["N0006-s0", "N0004-s0"]
+    stacked = read_plan("simulation", {"method.0.layers": 2, "method.0.units": 32})  # one architecture trains as one
+    assert [len(unit.pairs) for unit in stacked.units] == [20, 1] * 10
+
+
+def test_an_identification_is_in_one_unit(tmp_path: Path) -> None:
+    """Cells of one identified foundation are together, whatever their methods; every cell is in one unit."""
+    plan = mixed_plan(tmp_path)
+    for unit in plan.units:
+        fitted = {method for foundation, method in unit.pairs if foundation == "fitted"}
+        assert fitted in (set(), {"drawn", "trained", "alone"})
+    every = [pair for unit in plan.units for pair in unit.pairs]
+    assert sorted(every) == sorted((name, way.name) for name, way in plan.pairs)
+    assert len({unit.key for unit in plan.units}) == len(plan.units) > 5

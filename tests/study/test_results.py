@@ -10,11 +10,12 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
+from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
 from shipid.study import store
 from shipid.study.plan import build_plan, read_plan
-from shipid.study.results import Results, read_results
+from shipid.study.results import Results, read_cells, read_results
 
 
 @pytest.fixture(scope="module")
@@ -201,3 +202,27 @@ def test_published_envelope_in_the_same_units(read: Results) -> None:
     assert "published" not in set(frames.envelope_frame(read)["set"])
     assert frames.provenance_words(shown)["published envelope"] == "a paper"
     assert {"world", "published envelope"}.isdisjoint(frames.provenance_words(read))
+
+
+def test_cells_in_one_call_are_those_of_the_whole_results(read: Results, tiny_run: Path) -> None:
+    cells = read_cells(tiny_run)
+    columns = list(cells.columns)
+    pd.testing.assert_frame_equal(cells, read.cells[columns])
+    assert {"foundation", "method", "N_D", "seed", "A", "H", "status"} <= set(columns)
+
+
+def test_results_over_their_keys(read: Results) -> None:
+    pytest.importorskip("xarray")
+    data = read.to_xarray()
+    assert data["H"].dims == ("foundation", "method", "N_D", "seed")
+    assert data["H"].attrs["units"] == "m"
+    for row in read.cells.itertuples():
+        keys = {"foundation": row.foundation, "method": row.method, "N_D": row.N_D, "seed": row.seed}
+        there = data.sel(keys)  # as a dict: `method` is an argument of sel
+        assert float(there["H"]) == row.H
+
+
+def test_without_xarray_is_one_line(read: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frames, "find_spec", lambda _: None)
+    with pytest.raises(ShipidError, match="needs xarray"):
+        read.to_xarray()

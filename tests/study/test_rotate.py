@@ -12,10 +12,11 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
+from shipid.study import rotate as rotate_module
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.rotate import rotate, spread, turn_findings, turns
-from shipid.study.run import run_batch
+from shipid.study.run import run_batch, run_unit
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -63,6 +64,50 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
         assert (turn["N_D"] == 5).all()
         for name in ("A", "H"):
             np.testing.assert_allclose(turn[name], [row[name] for row in rows], rtol=1e-12)
+
+
+@pytest.mark.parametrize("after", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2, 4))])
+def test_an_interrupted_rotation_goes_on_to_the_same_digits(
+    after: int, recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Interrupted in the n-th batch, whatever turn it is of: nothing that was finished is computed again."""
+    plan, dataset = recorded(
+        weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5], "seeds": [0, 1]}
+    )
+    whole = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
+    kept, begun = rotate_module.kept_folder(tmp_path / "rows.csv", plan, dataset), []
+
+    def counted(*arguments: Any) -> Any:
+        begun.append(arguments)
+        if len(begun) == after:
+            raise KeyboardInterrupt
+        return run_unit(*arguments)
+
+    monkeypatch.setattr(rotate_module, "run_unit", counted)
+    with pytest.raises(KeyboardInterrupt):
+        list(rotate(plan, dataset, ["a", "b"], kept=kept))
+    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=kept)))
+    assert len(begun) == 4 + 1, "the interrupted batch alone is begun twice"
+    pd.testing.assert_frame_equal(again, whole, check_exact=True)
+    rotate_module.forget(kept)
+    assert not (tmp_path / "rows.csv.turns").exists()
+
+
+def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
+    """Another setting, other data or another device has a folder of its own; a damaged file is computed again."""
+    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
+    file = tmp_path / "rows.csv"
+    other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
+    moved = Dataset(dataset.frame.assign(u=dataset.frame["u"] + 0.1), dataset.metadata)
+    folders = [
+        rotate_module.kept_folder(file, *one)
+        for one in ((plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda"))
+    ]
+    assert len(set(folders)) == 4
+    first = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
+    next(folders[0].glob("*.parquet")).write_bytes(b"PAR1 no more")
+    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
+    pd.testing.assert_frame_equal(again, first, check_exact=True)
 
 
 def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,12 +21,13 @@ from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
 from shipid.study import store
+from shipid.study.claims import Claims
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import read_results
-from shipid.study.run import run_batch, run_study
+from shipid.study.run import run_batch, run_study, run_unit
 from shipid.vessel.load import load_vessel
-from tests.study.tiny import run_here, tiny_plan
+from tests.study.tiny import events_here, mixed_plan, run_here, tiny_plan
 
 
 def numbers(folder: Path) -> list[dict[str, Any]]:
@@ -88,6 +91,85 @@ def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> No
         twin = wider[row["cell"]]
         assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round in their own way
         assert twin["A"] == pytest.approx(row["A"], nan_ok=True) if row["A"] is not None else twin["A"] is None
+
+
+def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
+    """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
+    plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
+    prepared = prepare(plan, obtain(plan))
+    whole = {row["cell"]: (row, one) for row, one in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    found = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
+    assert len(found) == len(whole) == plan.cells
+    for row, predictor in found:
+        expected, other = whole[row["cell"]]
+        assert _plain(row) == _plain(expected)
+        assert predictor is not None
+        assert other is not None
+        predictor.save(tmp_path / "one.npz")
+        other.save(tmp_path / "other.npz")
+        assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+
+
+def _plain(row: dict[str, Any]) -> str:
+    """A row without what a clock measured."""
+    trials = [{key: value for key, value in trial.items() if key != "seconds"} for trial in row["trials"]]
+    return repr({**row, "trials": trials, "seconds": 0})
+
+
+def test_one_process_leaves_what_another_works_on(tmp_path: Path, tiny_run: Path) -> None:
+    """It ends without tables; the other one, which comes back from far away, ends the run and writes them."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    store.open_folder(folder, plan)
+    with Claims(folder) as other:
+        assert other.take("N0004-s0")
+        *_, end = events_here(plan, folder, leave=True)
+        assert (end.kind, end.done, end.total) == ("end", 4, 8)
+        assert not (folder / "results.parquet").exists()
+    *_, end = events_here(plan, folder, leave=True)
+    assert (end.done, end.total) == (8, 8)
+    assert (folder / "results.parquet").is_file()
+    assert numbers(folder) == numbers(tiny_run)
+
+
+def test_what_another_process_finishes_is_waited_for(tmp_path: Path, tiny_run: Path) -> None:
+    """Its cells are counted, and what it has left behind, here with the claim of a dead one, is taken over."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    run_here(plan, folder)
+    (folder / "seals" / "N0004-s0.sha256").unlink()
+    seal = (folder / "seals" / "N0006-s0.sha256").rename(tmp_path / "seal")
+    claims = folder / "claims"
+    claims.mkdir()
+    for key in ("N0004-s0", "N0006-s0"):
+        (claims / key).write_text('{"host": "elsewhere", "process": 1, "system": ""}')
+    events, kinds = events_here(plan, folder), []
+    for event in events:
+        kinds.append((event.kind, event.done))
+        if event.kind == "start":
+            seal.rename(folder / "seals" / "N0006-s0.sha256")
+            os.utime(claims / "N0004-s0", (1.0, 1.0))
+    assert [kind for kind in kinds if kind[0] != "note"] == [
+        ("start", 0),
+        *(("cell", done) for done in range(1, 5)),
+        ("others", 8),
+        ("end", 8),
+    ]
+    assert numbers(folder) == numbers(tiny_run)
+
+
+def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:
+    """Rows that an earlier version stored by batch count for all units of the batch, and keep their order."""
+    plan, folder = mixed_plan(tmp_path), tmp_path / "run"
+    store.open_folder(folder, plan)
+    batch = plan.whole(plan.batches[0])
+    row = dict.fromkeys(store.METRICS, 1.0) | {"trials": [], "N_D": 4, "seed": 0, "status": "ok"}
+    rows = [{**row, "cell": f"{f}+{m}", "foundation": f, "method": m} for f, m in batch.pairs]
+    store.write_unit(folder, batch, [(row, None) for row in rows])
+    assert store.finished(folder, plan.units) == list(plan.units)
+    found = store.read_rows(folder, plan)
+    assert list(zip(found["foundation"], found["method"], strict=True)) == list(batch.pairs)
+    one = plan.units[1]
+    store.write_unit(folder, one, [(rows[-1], None)])  # finished already: nothing is stored twice
+    assert len(store.read_rows(folder, plan)) == len(rows)
 
 
 def test_seeds_change_the_numbers(tmp_path: Path) -> None:
@@ -188,6 +270,12 @@ def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(dask.distributed, "Client", unreachable)
     with pytest.raises(ShipidError, match="no Dask scheduler answers there"):
+        list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
+
+
+def test_a_scheduler_without_dask_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(ShipidError, match=r"pip install 'shipid\[dask\]'"):
         list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler="tcp://127.0.0.1:1"))
 
 

@@ -51,7 +51,7 @@ def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: 
         file.write_bytes(b"" if kind == "empty" else content[: len(content) // 2])
     elif pattern.startswith("seals"):
         assert seals.faults(folder) == []  # then the batch is not done
-        assert len(store.finished(folder, store.stored_plan(folder).batches)) == 1
+        assert len(store.finished(folder, store.stored_plan(folder).units)) == 1
         return
     with pytest.raises(ResultError, match="missing or damaged"):
         seals.check(folder)

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
+from shipid.files import read_json
 from shipid.study import seals, store
-from shipid.study.plan import Batch
+from shipid.study.plan import Batch, Unit
 from tests.study.tiny import tiny_plan
 
 
@@ -50,13 +51,13 @@ def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
 
 
 def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
-    batches = [Batch(4, 1), Batch(4, 0), Batch(2, 0)]
-    row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right"}
-    for batch in batches[:2]:
-        file = store.batch_file(tmp_path, batch)
+    batches = [Unit(batch, (("right", "drawn"),), batch.key) for batch in (Batch(4, 1), Batch(4, 0), Batch(2, 0))]
+    row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right", "method": "drawn"}
+    for unit in batches[:2]:
+        file = store.rows_file(tmp_path, unit.key)
         file.parent.mkdir(exist_ok=True)
-        file.write_text(json.dumps([{**row, "N_D": batch.N_D, "seed": batch.seed, "H": None}]))
-        seals.write_seal(tmp_path, batch.key, [file])
+        file.write_text(json.dumps([{**row, "N_D": unit.batch.N_D, "seed": unit.batch.seed, "H": None}]))
+        seals.write_seal(tmp_path, unit.key, [file])
     assert store.finished(tmp_path, batches) == batches[:2]
     rows = store.read_rows(tmp_path)
     assert rows["seed"].tolist() == [0, 1]
@@ -91,3 +92,13 @@ def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path)
     (tmp_path / store.TEST).write_bytes(b"no archive")
     with pytest.raises(ResultError, match="damaged"):
         store.read_test(tmp_path)
+
+
+def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
+    """Two kinds of processors in turns, as the tasks of an array come: two entries, and a sentence at each change."""
+    folder = tmp_path / "run"
+    store.open_folder(folder, tiny_plan(tmp_path))
+    one, other = ({"shipid": "1", "processor": name, "packages": {"torch": "2"}} for name in ("one", "other"))
+    said = [store.note_session(folder, session) for session in (one, one, other, one, other)]
+    assert said == [[], [], ["processor was one, now other"], ["processor was other, now one"], []]
+    assert read_json(folder / store.PROVENANCE)["sessions"] == [one, other]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
-from shipid.study import run
-from shipid.study.plan import Batch, Plan, read_plan
+from shipid.study import run, store
+from shipid.study.plan import Plan, Unit, build_plan, read_plan
 from shipid.study.prepare import Prepared
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -25,20 +25,49 @@ def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     return read_plan(file, changes)
 
 
+MIXED = [
+    {"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4},
+    {"name": "trained", "kind": "path-trained", "trials": 2, "epochs": 3, "units": [4, 5], "layers": [1, 2]},
+    {
+        "name": "stacked",
+        "kind": "path-trained",
+        "trials": 1,
+        "epochs": 3,
+        "units": 4,
+        "layers": 1,
+        "families": ["wrong"],
+    },
+    {"name": "step", "kind": "one-step", "trials": 1, "units": 8, "families": ["wrong"]},
+    {"name": "alone", "kind": "alone"},
+]
+FITTED = {
+    "name": "fitted",
+    "extends": "right",
+    "identify": {"parameters": ["hull.derivatives.N_ur"], "weights": {"u": 0.01, "v": 0.01, "r": 0.001}},
+}
+
+
+def mixed_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
+    """A tiny study whose work is cut into several units: six methods, one family identified."""
+    document = tiny_plan(folder).document
+    document |= {"method": MIXED, "grid": {"N_D": [4]}, "family": [*document["family"], FITTED], **(changes or {})}
+    return build_plan(document, folder / "tiny.toml")
+
+
 def run_here(plan: Plan, folder: Path) -> list[run.Event]:
     """Run a study in this process, without a cluster."""
     return list(events_here(plan, folder))
 
 
-def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
+def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.Event]:
     """The same, event by event."""
 
-    def compute(plan: Plan, prepared: Prepared, batches: Sequence[Batch], *rest: Any) -> Iterator[Any]:
-        for batch in batches:
-            yield batch, run.run_batch(plan, prepared, batch, "cpu", rest[-1])
+    def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
+        for unit in units:
+            yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
 
     with patch.object(run, "_compute", compute):
-        yield from run.run_study(plan, folder)
+        yield from run.run_study(plan, folder, leave=leave)
 
 
 def logged(runs: Mapping[str, Mapping[str, Any]], t: np.ndarray, **metadata: Any) -> Dataset:

@@ -176,3 +176,32 @@ def test_actuator_memory_stands_for_the_command(draw_inputs: Callable[..., Mappi
     np.testing.assert_allclose(np.array(through), np.array(direct), rtol=1e-14)
     after = float(model.advance(state, [1.0], [1.1, 0, 0, 0], environment, values(lagged), 0.5))
     assert after == pytest.approx(1.1 + (1.0 - 1.1) * np.exp(-0.5))
+
+
+def test_a_steering_gear_that_is_off_keeps_its_numbers_and_does_nothing() -> None:
+    ship = load_vessel("kvlcc2-l7")
+    off = ship.with_values({"thruster.rudder.actuator.delta.off": True})
+    assert dict(dynamics(ship).memory) == {"rudder.delta": "rad"}
+    assert dict(dynamics(off).memory) == {}
+    assert off.document["thruster"]["rudder"]["actuator"]["delta"]["T"] == 0.1
+    assert not [path for path in off.parameters if ".actuator." in path]
+    assert rates(off, u=1.0, rudder_delta=0.3)["r"] == rates(ship, u=1.0, rudder_delta=0.3)["r"] != 0
+
+
+def test_a_limit_holds_from_the_first_instant() -> None:
+    """An order beyond the stops of the rudder acts as the stops do, also where a run begins beyond them."""
+    gear = {"kind": "rate_limit", "rate": 0.3, "low": -0.6, "high": 0.5}
+    ship = load_vessel("kvlcc2-l7").with_values({"thruster.rudder.actuator.delta": gear})
+    for order, stop in ((0.9, 0.5), (-0.9, -0.6)):
+        assert rates(ship, u=1.0, rudder_delta=order)["r"] == rates(ship, u=1.0, rudder_delta=stop)["r"] != 0
+
+
+def test_without_coriolis_the_mass_does_not_turn() -> None:
+    """`[inertia] coriolis = "none"` leaves m v r and -m u r out."""
+    ship = load_vessel("gunnerus-28.9")
+    still = ship.with_values({"inertia.coriolis": "none"})
+    m, M = ship.document["inertia"]["m"], mass_matrix(ship)
+    v, r, u = 0.4, 0.05, 3.0
+    full, none = (rates(vessel, u=u, v=v, r=r) for vessel in (ship, still))
+    difference = np.array([full[name] - none[name] for name in ("u", "v", "r")])
+    np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)

@@ -14,6 +14,8 @@ from shipid.vessel.load import Vessel, load_vessel
         ("gunnerus-33.9", "hull.crossflow.x_fwd", -16.0, "ahead of x_aft"),
         ("gunnerus-28.9", "inertia.m", 410.9, "is the unit kg"),
         ("gunnerus-28.9", "inertia.m", 4.1e8, "is the unit kg"),
+        ("kvlcc2-l7", "thruster.rudder.actuator.delta.high", 35.0, "is in rad"),
+        ("kvlcc2-l7", "thruster.rudder.actuator.delta.low", -35.0, "is in rad"),
     ],
 )
 def test_nonsense_is_refused(vessel: str, path: str, value: float, remedy: str) -> None:
@@ -24,3 +26,26 @@ def test_nonsense_is_refused(vessel: str, path: str, value: float, remedy: str) 
 
 def test_coupling_terms_of_added_mass_may_have_either_sign(bundled_vessel: Vessel) -> None:
     assert bundled_vessel.with_values({"added_mass.Y_rdot": 1.0, "added_mass.N_vdot": -1.0})
+
+
+def test_limits_of_an_actuator_leave_a_range() -> None:
+    limits = {"thruster.rudder.actuator.delta": {"kind": "rate_limit", "rate": 0.04, "low": 0.6, "high": -0.6}}
+    with pytest.raises(DocumentError, match="above low") as caught:
+        load_vessel("kvlcc2-l7").with_values(limits)
+    assert caught.value.path == "thruster.rudder.actuator.delta.high"
+
+
+@pytest.mark.parametrize(
+    ("beta", "thrust", "key", "remedy"),
+    [
+        ([0.0, 90.0, 180.0], [0.5, -0.6, -0.3], "beta_deg", "from -180 to 180"),
+        ([-180.0, 20.0, 180.0], [-0.4, 0.5, -0.3], "C_T", "must be equal"),
+    ],
+)
+def test_a_screw_in_four_quadrants_has_the_whole_circle(
+    beta: list[float], thrust: list[float], key: str, remedy: str
+) -> None:
+    block = {"kind": "four_quadrant", "x": -3.4, "D_p": 0.2, "beta_deg": beta, "C_T": thrust}
+    with pytest.raises(DocumentError, match=remedy) as caught:
+        load_vessel("kvlcc2-l7").with_values({"thruster.propeller": block})
+    assert caught.value.path == f"thruster.propeller.{key}"

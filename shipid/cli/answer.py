@@ -1,0 +1,64 @@
+"""What a command has found: tables and lines for people, or one JSON object for programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shipid.cli.terminal import show
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from rich.table import Table
+
+Json = Annotated[bool, typer.Option("--json", help="print one JSON object instead of tables; all else goes to stderr")]
+
+
+class Answer:
+    """Collects what a command has found, for JSON, or prints it at once.
+
+    Parameters
+    ----------
+    as_json : whether standard output is to hold one JSON object and nothing else.
+    """
+
+    def __init__(self, as_json: bool) -> None:
+        self.as_json = as_json
+        self.found: dict[str, Any] = {}
+
+    def say(self, text: str = "", **values: Any) -> None:
+        """Print a line, if it is not empty; for programs only its values, by name."""
+        if self.as_json:
+            self.found.update(values)
+        elif text:
+            typer.echo(text)
+
+    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: Table | None) -> None:
+        """Print a table, if there is one to be shown; for programs its rows under a name, SI and not rounded."""
+        if self.as_json:
+            self.found[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
+        elif shown is not None:
+            show(shown)
+
+
+@contextmanager
+def answering(as_json: bool) -> Iterator[Answer]:
+    """Give an `Answer`, and print it as JSON at the end of the block, also where that ends with an exit status."""
+    answer = Answer(as_json)
+    try:
+        yield answer
+    except typer.Exit:
+        _write(answer)
+        raise
+    _write(answer)
+
+
+def _write(answer: Answer) -> None:
+    if answer.as_json:
+        from shipid.files import json_text
+
+        sys.stdout.write(json_text(answer.found) + "\n")

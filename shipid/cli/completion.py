@@ -1,0 +1,51 @@
+"""What the shell offers when TAB is pressed: bundled names, names in a folder, and files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import typer
+
+Offer = Callable[[str], list[str]]
+
+
+def bundled_or_file(kind: str) -> Offer:
+    """Offer the bundled documents of a kind (`models`, `studies`, `studies/mappings`), then TOML files."""
+
+    def offer(incomplete: str) -> list[str]:
+        from shipid.document import bundled
+
+        return [*beginning(incomplete, bundled(kind)), *files(".toml")(incomplete)]
+
+    return offer
+
+
+def files(*endings: str) -> Offer:
+    """Offer folders, and files of these endings."""
+
+    def offer(incomplete: str) -> list[str]:
+        head, slash, start = incomplete.rpartition("/")
+        try:
+            found = sorted(Path(head + slash or ".").iterdir())
+        except OSError:
+            return []
+        named = ((head + slash + path.name, path) for path in found if start or not path.name.startswith("."))
+        return [
+            name + "/" * path.is_dir()
+            for name, path in named
+            if name.startswith(incomplete) and (path.is_dir() or path.suffix in endings)
+        ]
+
+    return offer
+
+
+def cells(context: typer.Context, incomplete: str) -> list[str]:
+    """Offer the cells of the folder that the command names."""
+    folder = context.params.get("folder") or next(iter(context.args), None)  # not parsed while the line is not whole
+    return beginning(incomplete, sorted(file.stem for file in Path(folder, "cells").glob("*.npz"))) if folder else []
+
+
+def beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+    """Return the names that begin so."""
+    return [name for name in names if name.startswith(incomplete)]

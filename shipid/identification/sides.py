@@ -1,0 +1,152 @@
+"""Errors by side, rudder level and speed: where a model is wrong, which no total says.
+
+Free runs of one horizon are compared with the log, row by row. A row belongs to the side to which the ship turns, to a
+level of its rudder or azimuth angle, and to a third of the speeds. The error of the turning is the predicted yaw rate
+less the measured one, over the measured one, each summed over the rows of the group: of a half cycle of a zigzag, the
+error of its change of heading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.identification.free_run import MEASURED
+from shipid.physics.signals import steers
+from shipid.units import DEGREE
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+Array = NDArray[np.float64]
+LEVELS = (2.5, 7.5, 12.5, 17.5, 22.5, 27.5, 32.5)  # deg, between levels of helm that trials have
+TURNING = 0.1  # of the greatest yaw rate: slower rows turn to no side
+WORSE, LEAST = 2.0, 0.05  # a side is worse from this ratio of errors on, and from this error of the turning on
+FEWEST = 20  # rows that make a group
+SURE = 2.0  # standard errors of the difference of the sides
+COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning", "error")
+
+
+def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
+    """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
+
+    u, v [m/s], r [rad/s]. turning, error : relative error of the change of heading [1], its standard error.
+
+    Parameters
+    ----------
+    series : `FreeRuns.series`. model : the model among its models. dataset : of the runs, for the commands.
+    """
+    log, mine = (series[series["model"] == name].reset_index(drop=True) for name in (MEASURED, model))
+    helm = _helm(vessel, dataset, log)
+    begin = ~log.duplicated(["run", "piece"])
+    away = {name: mine[name].to_numpy() - log[name].to_numpy() for name in ("u", "v", "r")}
+    seen = ~begin.to_numpy() & np.isfinite(away["r"])
+    r, speed = log["r"].to_numpy(), np.hypot(log["u"].to_numpy(), log["v"].to_numpy())
+    pieces = log.groupby(["run", "piece"], sort=False).ngroup().to_numpy()
+    rows = [
+        {
+            "group": group,
+            "side": side,
+            "rows": int(mask.sum()),
+            **{name: float(np.sqrt((values[mask] ** 2).mean())) for name, values in away.items()},
+            **(_turned(away["r"][mask], r[mask], pieces[mask]) if side else {"turning": np.nan, "error": np.nan}),
+        }
+        for group, side, mask in _groups(seen, r, helm, speed)
+        if mask.sum() >= FEWEST
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
+    """Relative error of the change of heading, with its standard error from the pieces, which are independent."""
+    _, place = np.unique(pieces, return_inverse=True)
+    a, b = np.bincount(place, away), np.bincount(place, r)
+    share, count = float(a.sum() / b.sum()), len(a)
+    error = float(np.sqrt(count / (count - 1) * ((a - share * b) ** 2).sum()) / abs(b.sum())) if count > 1 else np.inf
+    return {"turning": share, "error": error}
+
+
+def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array:
+    """Mean magnitude (N,) [rad] of the angles that steer, at the rows of the free runs."""
+    names = [name for name in dynamics(vessel).commands if steers(name)]
+    if not names:
+        return np.zeros(len(log))
+    helm = np.zeros(len(log))
+    for run, rows in log.groupby("run", sort=False):
+        of_run = dataset.frame[dataset.frame["run"] == run]
+        angles = np.abs(of_run[names].to_numpy(dtype=float)).mean(axis=1)
+        places = np.searchsorted(of_run["t"].to_numpy(), rows["t"].to_numpy() + 1e-6, side="right") - 1
+        helm[rows.index] = angles[np.clip(places, 0, len(angles) - 1)]
+    return helm
+
+
+def _groups(
+    seen: NDArray[np.bool_], r: Array, helm: Array, speed: Array
+) -> Iterator[tuple[str, str, NDArray[np.bool_]]]:
+    least = TURNING * (np.abs(r[seen]).max(initial=0.0))
+    sides = {"starboard": seen & (r > least), "port": seen & (r < -least)}
+    yield from (("all", side, mask) for side, mask in sides.items())
+    edges = np.array(LEVELS) * DEGREE
+    level = np.digitize(helm, edges)
+    for number in range(len(edges) + 1):
+        here = level == number
+        if (here & seen).sum() < FEWEST:
+            continue
+        name = f"helm about {np.median(helm[here & seen]) / DEGREE:.0f} deg"
+        yield from ((name, side, mask & here) for side, mask in sides.items())
+    thirds = np.quantile(speed[seen], [1 / 3, 2 / 3]) if seen.any() else np.zeros(2)
+    for number in range(3):
+        here = seen & (np.digitize(speed, thirds) == number)
+        if here.any():
+            yield f"speed {speed[here].min():.3g} to {speed[here].max():.3g} m/s", "", here
+
+
+def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
+    """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate."""
+    said = []
+    rows = [row for row in groups.to_dict("records") if row["side"]]
+    for group in dict.fromkeys(row["group"] for row in rows):
+        of = [row for row in rows if row["group"] == group]
+        if len(of) < len(("starboard", "port")):
+            continue
+        where = "" if group == "all" else f" at {group}"
+        better, worse = sorted(of, key=lambda row: abs(float(row["turning"])))
+        apart = abs(worse["turning"]) - abs(better["turning"])
+        sure = apart > SURE * float(np.hypot(worse["error"], better["error"]))
+        if sure and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
+            said.append(
+                f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
+                f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
+                f"next: turns to both sides{where}"
+            )
+            continue
+        better, worse = sorted(of, key=lambda row: float(row["r"]))
+        if np.isfinite([worse["error"], better["error"]]).all() and worse["r"] > WORSE * better["r"]:
+            said.append(
+                f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
+                f"as to {better['side']}"
+            )
+    return tuple(said)
+
+
+def shown(groups: pd.DataFrame) -> list[list[str]]:
+    """Rows of a table: group, side, rows, u, v [m/s], r [deg/s], error of the turning [%]."""
+    return [
+        [
+            str(row["group"]),
+            str(row["side"]),
+            str(row["rows"]),
+            *(f"{row[name]:.3g}" for name in ("u", "v")),
+            f"{row['r'] / DEGREE:.3g}",
+            "" if row["turning"] != row["turning"] else f"{100 * row['turning']:+.1f} +-{100 * row['error']:.1f}",
+        ]
+        for row in groups.to_dict("records")
+    ]
+
+
+HEADS = ("group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]")
+"""Columns of `shown`."""

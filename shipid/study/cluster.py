@@ -1,0 +1,146 @@
+"""Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is said in one line."""
+
+from __future__ import annotations
+
+import logging
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
+from typing import Any, TypeVar
+
+from shipid.errors import ShipidError
+
+DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+    "distributed.comm.timeouts.connect": "5s",
+    "distributed.comm.timeouts.tcp": "15s",
+    "distributed.comm.retry.count": 0,
+}
+KEPT = "what is finished is kept: go on with `shipid study resume`"
+LOOK = 2.0  # s between looks at the scheduler while nothing comes
+SILENT = 30.0  # s that a scheduler may take to answer
+PATIENCE = 20.0  # s without any worker until that is said
+
+Shared = TypeVar("Shared")
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+log = logging.getLogger(__name__)
+
+
+def on_dask(
+    scheduler: str, work: Callable[[Shared, Task], Result], shared: Shared, tasks: Mapping[str, Task], name: str
+) -> Iterator[tuple[Task, Result]]:
+    """Tasks and what `work(shared, task)` makes of them, in the order in which they finish.
+
+    A task whose worker dies is done by another one. While there is no worker at all it waits for one, and says so.
+
+    Parameters
+    ----------
+    scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
+    shared : sent once to each worker. tasks : by a key. name : of the whole work, so that no other has its keys.
+
+    Raises
+    ------
+    ShipidError : the scheduler does not answer, or dies; a task has killed worker after worker. All other tasks are
+        done before that.
+    """
+    try:
+        import dask
+        from dask.distributed import Client
+    except ImportError:
+        message = "a Dask scheduler needs the package dask: pip install 'shipid[dask]'"
+        raise ShipidError(message, path=f"--scheduler {scheduler}") from None
+
+    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
+        warnings.simplefilter("ignore")
+        try:
+            client = Client(scheduler, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
+        try:
+            yield from _results(client, scheduler, work, shared, tasks, name)
+        finally:
+            with suppress(Exception):  # a client whose scheduler is gone complains in many ways
+                client.close(timeout=2)
+
+
+def _results(
+    client: Any,
+    scheduler: str,
+    work: Callable[[Shared, Task], Result],
+    shared: Shared,
+    tasks: Mapping[str, Task],
+    name: str,
+) -> Iterator[tuple[Task, Result]]:
+    from dask.distributed import CancelledError, KilledWorker
+
+    def gone() -> ShipidError:
+        return ShipidError(f"the Dask scheduler is gone; {KEPT}", path=f"--scheduler {scheduler}")
+
+    ended: SimpleQueue[Any] = SimpleQueue()
+    killed: list[str] = []
+    try:
+        given = client.submit(_given, shared, key=f"shipid-{name}-shared", pure=False)  # made again if its worker dies
+        left = {}
+        for key, task in tasks.items():
+            future = client.submit(work, given, task, key=f"shipid-{name}-{key}", pure=False)
+            left[future.key] = (key, future)
+            future.add_done_callback(ended.put)
+        watch = _Watch(client)
+        while left:
+            try:
+                future = ended.get(timeout=LOOK)
+            except Empty:
+                watch.look()
+                continue
+            key, _ = left.pop(future.key)
+            try:
+                found = future.result(timeout=SILENT)
+            except KilledWorker:
+                killed.append(key)
+                continue
+            yield tasks[key], found
+            del future, found  # a worker may forget them
+    except (OSError, TimeoutError, CancelledError):
+        raise gone() from None
+    if killed:
+        words = f"workers of the cluster die, perhaps for want of memory, at {', '.join(killed[:3])}"
+        more = f" and {len(killed) - 3} more" if len(killed) > 3 else ""
+        raise ShipidError(f"{words}{more}; {KEPT} and larger workers", path=f"--scheduler {scheduler}")
+
+
+def _given(shared: Shared) -> Shared:
+    return shared
+
+
+class _Watch:
+    """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while."""
+
+    def __init__(self, client: Any) -> None:
+        self._client, self._alone, self._said = client, time.monotonic(), False
+
+    def look(self) -> None:
+        if self._client.status not in ("running", "connecting"):
+            raise OSError("closed")
+        workers = self._client.sync(self._client.scheduler.identity, callback_timeout=SILENT)["workers"]
+        if workers:
+            self._alone, self._said = time.monotonic(), False
+        elif not self._said and time.monotonic() - self._alone > PATIENCE:
+            log.warning("the Dask scheduler has no workers: waiting for one")
+            self._said = True
+
+
+@contextmanager
+def _without_logs(*names: str) -> Iterator[None]:
+    """Silence loggers and those below them, whose errors are said in one line."""
+    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
+    before = {logger: logger.level for logger in every}
+    try:
+        for logger in every:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)

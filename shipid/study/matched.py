@@ -1,0 +1,276 @@
+"""Any two or more runs side by side, cell by cell: the same family, member, method, N_D and seed.
+
+Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
+manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else each run has manoeuvres of
+its own, and they are resampled apart.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.windows import Windows
+from shipid.errors import DocumentError, ResultError, ShipidError, choices
+from shipid.metrics import over_time, position_error
+from shipid.study.differences import document_differences
+from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_noise
+from shipid.study.plan import NO_MODEL, WORLDS, Plan
+from shipid.study.results import Results, read_results
+from shipid.study.verdict import manoeuvres, shown, too_few
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+ALONE = "alone"
+"""Method of the rows of A, which no data improve; their N_D is 0."""
+KEYS = ["family", "member", "method", "N_D", "seed"]
+GROUP = ["family", "method", "N_D"]
+MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Several runs beside the first of them.
+
+    names : of the folders, the first one first.
+    documents : a row per value that differs: path, and a column of text per name.
+    errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
+        them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
+        empty, corrected for the number of rows), `paired`, and `coverage_first`, `coverage_other` [1] of their bands.
+        N_D = 0 is A of the physics alone.
+    notes : sentences about what could not be matched, and what the intervals rest on.
+    """
+
+    names: tuple[str, ...]
+    documents: pd.DataFrame
+    errors: pd.DataFrame
+    notes: tuple[str, ...]
+
+
+def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] | None = None) -> Comparison:
+    """Set finished cells of any runs beside those of the first.
+
+    Parameters
+    ----------
+    folders : two or more folders of runs.
+    pairs : family or method of the first run -> its counterpart in the others. Equal names match without; where one
+        family, or one method, is left over in both runs, they match too.
+
+    Raises ResultError for a folder without a result, ShipidError where no cell matches.
+    """
+    if len(folders) < 2:
+        raise ShipidError("name two folders or more")
+    places = [Path(folder) for folder in folders]
+    if len({place.resolve() for place in places}) < len(places):
+        raise ShipidError("a folder is named twice")
+    return compare_results([read_results(place) for place in places], pairs)
+
+
+def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
+    """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
+    names = _names([results.folder for results in runs])
+    notes = []
+    for name, results in zip(names, runs, strict=True):
+        good = int((results.cells["status"] == "ok").sum())
+        if not good:
+            raise ResultError("has no cell with a result", file=results.folder)
+        if good < results.plan.cells:
+            notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
+    frames, called = [], [dict[str, str]()]
+    for name, results in zip(names[1:], runs[1:], strict=True):
+        frame, matched, said = _beside(runs[0], results, pairs or {})
+        frames.append(frame.assign(folder=name))
+        called.append(matched)
+        notes += [f"{name}: {words}" for words in said]
+    sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
+    documents = document_differences([results.plan for results in runs], sessions, called)
+    documents.columns = pd.Index(["path", *names])
+    errors = pd.concat(frames, ignore_index=True)
+    return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
+
+
+def _names(folders: Sequence[Path]) -> tuple[str, ...]:
+    """The last parts of folders that tell them apart, as few as do."""
+    parts = [folder.resolve().parts for folder in folders]
+    for count in range(1, max(map(len, parts)) + 1):
+        short = ["/".join(part[-count:]) for part in parts]
+        if len(set(short)) == len(short):
+            return tuple(short)
+    return tuple(map(str, folders))
+
+
+def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, dict[str, str], list[str]]:
+    """Rows of `Comparison.errors` for one run, without its name; name there -> name in the first; notes."""
+    mine, theirs = _cells(first), _cells(other)
+    known = {*mine["family"], *mine["method"]}
+    wrong = next((name for name in pairs if name not in known), None)
+    if wrong is not None:
+        raise DocumentError(
+            f"{wrong!r} is no family or method of the first run: {choices(wrong, known)}", path="--pair"
+        )
+    notes: list[str] = []
+    called: dict[str, str] = {}
+    for key in ("family", "method"):
+        matched, words = _counterparts(mine[key], theirs[key], pairs)
+        called |= matched
+        notes += words
+        theirs = theirs[theirs[key].isin(matched)].assign(
+            **{key: theirs[key].map(matched), f"{key} there": theirs[key]}
+        )
+    both = mine.merge(theirs, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
+    if not (both["N_D"] > 0).any():
+        raise ShipidError(
+            f"no cell of {other.folder} matches one of {first.folder}: {_spans(first)}; there: {_spans(other)}; "
+            "name counterparts by --pair FIRST=OTHER",
+        )
+    here, there, paired, words = _windows(first, other)
+    notes += words
+    groups = [part for _, part in both.groupby(GROUP, sort=False)]
+    one = _side(first, groups, "first", here)
+    two = _side(other, groups, "other", there)
+    training = np.hypot(one.training, two.training)
+    found = (
+        contrasts(two.errors - one.errors, one.counts, training)
+        if paired
+        else contrasts_apart(two.errors, two.counts, one.errors, one.counts, training)
+    )
+    few = too_few(min(len(one.counts), len(two.counts)))
+    if few:
+        notes.append(few)
+    frame = pd.DataFrame(
+        {
+            **{key: [_label(part, key) for part in groups] for key in ("family", "method")},
+            "N_D": [int(part["N_D"].iloc[0]) for part in groups],
+            "cells": [len(part) for part in groups],
+            "first": one.errors @ (one.counts / one.counts.sum()),
+            "other": two.errors @ (two.counts / two.counts.sum()),
+            **{"difference": found.mean, "low": found.low, "high": found.high},
+            "verdict": _verdicts(found),
+            "paired": paired,
+            **{f"coverage_{side}": [part[f"coverage_{side}"].mean() for part in groups] for side in ("first", "other")},
+        }
+    )
+    return frame, called, notes
+
+
+def _cells(results: Results) -> pd.DataFrame:
+    """Keys, predictor and band of every cell with a result; one more row per foundation for A, where it is known."""
+    good = results.cells[results.cells["status"] == "ok"].reindex(
+        columns=["cell", "foundation", *KEYS, "H", "coverage"]
+    )
+    learning = {way.name for way in results.plan.methods if way.method.compensates}
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed, trained=good["method"].isin(learning))
+    every = results.cells.drop_duplicates("foundation")
+    known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
+    alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
+    alone = alone.assign(cell="", method=ALONE, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
+    alone = alone[~alone["family"].isin(results.plan.identified)]
+    return pd.concat([alone, good], ignore_index=True).astype({"coverage": float, "H": float, "trained": bool})
+
+
+def _counterparts(here: pd.Series, there: pd.Series, pairs: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """Name there -> name here, of families or methods; a note for names that match without being equal."""
+    mine, theirs = list(dict.fromkeys(here)), list(dict.fromkeys(there))
+    matched = {pairs[name]: name for name in mine if pairs.get(name) in theirs}
+    matched |= {name: name for name in mine if name in theirs and name not in pairs and name not in matched}
+    left = [name for name in mine if name not in matched.values()]
+    over = [name for name in theirs if name not in matched]
+    if len(left) == len(over) == 1 and left[0] not in pairs:
+        matched[over[0]] = left[0]
+        return matched, [f"{over[0]} is set beside {left[0]}, the only one left (--pair says it otherwise)"]
+    lonely = [f"{what} {', '.join(names)}" for what, names in (("only the first has", left), ("only this has", over))
+              if names]  # fmt: skip
+    return matched, ["; ".join(lonely)] if lonely else []
+
+
+def _spans(results: Results) -> str:
+    cells = results.cells
+    said = {key: ", ".join(map(str, dict.fromkeys(cells[key]))) for key in ("family", "method", "N_D", "seed")}
+    return "; ".join(f"{key} {words}" for key, words in said.items())
+
+
+def _label(part: pd.DataFrame, key: str) -> str:
+    here, there = part[key].iloc[0], part[f"{key} there"].iloc[0]
+    return str(here) if here == there else f"{here} ~ {there}"
+
+
+def _windows(first: Results, other: Results) -> tuple[Index, Index, bool, list[str]]:
+    """Places of the windows that are judged in each run, whether they are pairs, and a note on it."""
+    place = {key: k for k, key in enumerate(_moments(other.test))}
+    here = np.array([k for k, key in enumerate(_moments(first.test)) if key in place], dtype=np.int64)
+    there = np.array([place[key] for key in _moments(first.test) if key in place], dtype=np.int64)
+    if len(here) and (_same_recording(first.test, other.test, here, there) or _same_draws(first.plan, other.plan)):
+        common = manoeuvres(len(set(first.test.run[here])))
+        all_of = len(here) == len(first.test) == len(other.test)
+        said = f"paired over {common}" + ("" if all_of else f", on the {len(here)} windows that both have")
+        return here, there, True, [said]
+    counts = [len(set(results.test.run)) for results in (first, other)]
+    said = f"other test manoeuvres ({counts[1]}, the first has {counts[0]}): not paired, so the intervals are wide"
+    return np.arange(len(first.test)), np.arange(len(other.test)), False, [said]
+
+
+def _moments(test: Windows) -> list[tuple[str, float]]:
+    return [(str(run), round(float(t), 4)) for run, t in zip(test.run, test.t, strict=True)]
+
+
+def _same_recording(one: Windows, two: Windows, here: Index, there: Index) -> bool:
+    """Whether windows of the same name and moment hold the same measured motion."""
+    names = [name for name in MEASURED if name in one.columns and name in two.columns]
+    return all(
+        np.allclose(one.columns[name][here], two.columns[name][there], rtol=1e-6, atol=1e-9) for name in names
+    ) and bool(names)
+
+
+def _same_draws(one: Plan, two: Plan) -> bool:
+    """Whether two simulated truths draw the same manoeuvres: then runs of one name are pairs, whatever the ship."""
+    truths = [plan.study.truth for plan in (one, two)]
+    drawn = [truth.model_dump(include={"seed", "manoeuvre", "wind_speed", "waves"}) for truth in truths if truth]
+    return len(drawn) == 2 and drawn[0] == drawn[1]
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One run's part: errors (J, R) [m] by group and manoeuvre, windows (R,), standard errors of training (J,) [m]."""
+
+    errors: Array
+    counts: Array
+    training: Array
+
+
+def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: Index) -> _Side:
+    """Mean error of each group of cells in every test manoeuvre, on some windows."""
+    test = results.test
+    order, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
+    future = test.future[:, windows]
+
+    def by_run(path: Array) -> Array:
+        error = over_time(position_error(path[:, windows], future))
+        return np.bincount(place, weights=error, minlength=len(order)) / counts
+
+    errors, training = np.zeros((len(groups), len(order))), np.zeros(len(groups))
+    for row, part in enumerate(groups):
+        cells = part.rename(columns={f"{name}_{side}": name for name in ("cell", "foundation", "H", "trained")})
+        paths = (
+            results.physics[str(r.foundation)] if r.N_D == 0 else results.paths[str(r.cell)] for r in cells.itertuples()
+        )
+        errors[row] = np.mean([by_run(path) for path in paths], axis=0)
+        if not cells["trained"].all():
+            continue
+        by_seed = [np.asarray(one["H"], dtype=float) for _, one in cells.groupby("foundation", sort=False)]
+        noise = training_noise(by_seed)
+        training[row] = noise * np.sqrt(sum((H.mean() / len(by_seed)) ** 2 / len(H) for H in by_seed))
+    return _Side(errors, counts.astype(float), training)
+
+
+def _verdicts(found: Contrasts) -> list[str]:
+    """What is shown of each difference, corrected for their number in each direction."""
+    if not np.isfinite(found.below).all():
+        return [""] * len(found)
+    lower, higher = shown(found.below), shown(found.above)
+    return ["lower" if low else "higher" if high else "" for low, high in zip(lower, higher, strict=True)]

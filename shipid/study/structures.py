@@ -1,0 +1,521 @@
+"""Structures of the hull compared on the same runs, and chosen by runs that no fit has seen.
+
+The runs are dealt into folds. Every structure is fitted to all folds but one and predicts that one, fold after fold, so
+each run is predicted by a fit without it. The structure with the least mean error of the position is chosen; intervals
+of the differences are paired over runs. Then every structure is fitted to all runs, and performs the standard
+manoeuvres: those that are as good on the runs may differ there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import tomlkit
+from numpy.typing import NDArray
+
+from shipid import document as documents
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError, ShipidError
+from shipid.files import write_new
+from shipid.identification.bands import Measure, bands, check_level, refusal
+from shipid.identification.design import Candidate, Limits, candidates, performed, steps_between
+from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.outcome import SIGNALS, TRIED, pick_runs, residual_level, residual_spacing
+from shipid.identification.reach import Reach, beyond, of_log, reach_of
+from shipid.identification.settings import Identify
+from shipid.identification.sides import by_group, uneven
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
+from shipid.physics.signals import is_shaft
+from shipid.report.structures import StructuresContent
+from shipid.simulation.measured import Measured, measure_all
+from shipid.study.evidence import FEWEST_RUNS, contrasts
+from shipid.study.new import proposed_horizon
+from shipid.version import __version__
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+
+Array = NDArray[np.float64]
+Said = Callable[[str], object]
+FOLDS = 3
+SIDES = ("starboard", "port")
+MEASURES = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
+LEVEL = 0.95
+FIRST = 8  # manoeuvres to run next
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A structure fitted to all runs: vessel, solution and its statistics; `caution` where its intervals mislead."""
+
+    vessel: Vessel
+    solution: Solution
+    statistics: Statistics
+    caution: str
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Result of a comparison of structures.
+
+    vessel : the base. runs, test : of the folds, and held out of all. ahead : length of a free run [s], 0: whole runs.
+    errors : `structure`, `set` (`folds`, `test`), `run` (`all` at first), RMS `u`, `v` [m/s], `r` [rad/s], `position`
+        [m] of runs that the fit has not seen.
+    table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
+        runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
+        it is not shown to be worse; `note`.
+    fits : structure -> the fit to all runs; structures that could not be fitted are missing.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
+    spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
+        and `width`, the greatest width of the interval within one of them.
+    beyond : sentences on manoeuvres that go farther than the data.
+    groups : errors by side, helm and speed of the chosen structure on runs that the fit has not seen.
+    uneven : sentences on sides.
+    programme : `manoeuvre`, `hours`, `apart`: manoeuvres to run next, by how far apart the structures are in them, in
+        standard deviations of the residuals; empty where only one structure was fitted.
+    """
+
+    vessel: Vessel
+    runs: tuple[str, ...]
+    test: tuple[str, ...]
+    digest: str
+    ahead: float
+    level: float | None
+    errors: pd.DataFrame
+    table: pd.DataFrame
+    chosen: str
+    fits: Mapping[str, Fitted]
+    manoeuvres: pd.DataFrame
+    spread: pd.DataFrame
+    beyond: tuple[str, ...]
+    groups: pd.DataFrame
+    uneven: tuple[str, ...]
+    programme: pd.DataFrame
+
+    @property
+    def sentences(self) -> list[str]:
+        """What was chosen and why, and what follows."""
+        rows = {str(row["structure"]): row for row in _records(self.table)}
+        others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
+        said = [
+            f"{self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the fit has "
+            f"not seen: {rows[self.chosen]['position']:.3g} m"
+        ]
+        if len(self.runs) < FEWEST_RUNS:
+            said.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
+        elif others:
+            said.append(f"not shown to be worse: {', '.join(others)}")
+        elif len(rows) > 1:
+            said.append("all others are shown to be worse")
+        wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
+        if wide:
+            worst = max(wide, key=lambda row: float(row["spread"] / abs(row["greatest"])))
+            said.append(
+                "structures differ by more than the interval within one in "
+                f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
+                f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
+            )
+        said += [*self.beyond, *self.uneven]
+        if len(self.programme):
+            first = self.programme.iloc[0]
+            said.append(
+                f"to run next: {first['manoeuvre']}, in which the structures are {first['apart']:.2g} standard "
+                "deviations of the residuals apart"
+            )
+        return said
+
+    def document(self) -> str:
+        """The vessel with the chosen structure, fitted to all runs, as TOML."""
+        document = {
+            **self.fits[self.chosen].vessel.document,
+            "name": f"{self.vessel.name}, {self.chosen}",
+            "source": f"structure {self.chosen} identified from {len(self.runs)} runs of dataset {self.digest} by "
+            f"shipid {__version__}, on {self.vessel.key}, digest {self.vessel.digest}",
+        }
+        return tomlkit.dumps(documents.plain(document))
+
+
+def _length(ahead: float) -> str:
+    return f"{ahead:g} s" if ahead else "whole runs"
+
+
+def write_chosen(found: Compared, file: Path) -> Path:
+    """Write the vessel with the chosen structure; it is read again to be sure. An existing file is kept."""
+    written = write_new(found.document(), file, "vessel")
+    load_vessel(str(written.resolve()))
+    return written
+
+
+def compare_structures(
+    vessel: Vessel,
+    dataset: Dataset,
+    settings: Identify,
+    names: Sequence[str],
+    runs: Sequence[str] = (),
+    held_out: Sequence[str] = (),
+    *,
+    ahead: float | None = None,
+    folds: int = FOLDS,
+    level: float | None = LEVEL,
+    say: Said | None = None,
+) -> Compared:
+    """Compare structures of the hull on the same runs.
+
+    Parameters
+    ----------
+    settings : numbers outside of the hull that are free, weights, horizon and solver; see `exchange`.
+    names : of `shipid.identification.structures.STRUCTURES`, or `present`.
+    runs, held_out : names or patterns, as `pick_runs` takes them; runs held out choose nothing.
+    ahead : length of the free runs [s], 0 for whole runs; default: the horizon that a new study would have.
+    folds : parts into which the runs are dealt. level : of the intervals on manoeuvres; None: none.
+    say : called with each step.
+
+    Raises
+    ------
+    DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
+    ShipidError : fewer than two structures or runs, or no structure that can be fitted.
+    """
+    check_structures(names)
+    check_level(level)
+    if not names:
+        raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
+    fitted, tested = pick_runs(dataset, runs, held_out)
+    if folds < 2:
+        raise ShipidError(f"{folds} is too few: two folds or more hold runs out", path="folds")
+    if len(fitted) < 2:
+        raise DataError("only one run: it cannot be held out of its own fit; give two or more", path="runs")
+    length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
+    tell = say or (lambda _: None)
+    parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]
+    errors, fits, notes, series = list[pd.DataFrame](), dict[str, Fitted](), dict[str, str](), dict[str, Any]()
+    counts: dict[str, int] = {}
+    for name in names:
+        try:
+            frames, whole, seen = _judged(vessel, name, dataset, settings, parts, fitted, tested, length, tell)
+        except ShipidError as error:
+            if isinstance(error, DataError):
+                raise
+            notes[name] = error.message
+            continue
+        errors += [frame.assign(structure=name) for frame in frames]
+        fits[name], series[name], counts[name] = whole, seen, len(whole.solution.paths)
+    if not fits:
+        raise ShipidError("; ".join(f"{name}: {note}" for name, note in notes.items()))
+    every = pd.concat(errors, ignore_index=True)
+    table = _table(names, every, counts, notes, fitted)
+    if not np.isfinite(table["position"].iloc[0]):
+        raise ShipidError(
+            "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead"
+        )
+    chosen = str(table["structure"].iloc[0])
+    equal = [str(name) for name in table.loc[table["equal"], "structure"]]
+    tell("standard manoeuvres")
+    reach = reach_of(vessel, dataset, fitted)
+    manoeuvres, far = _manoeuvres(fits, chosen, reach, equal, level)
+    groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
+    tell("manoeuvres to run next")
+    return Compared(
+        vessel=vessel,
+        runs=fitted,
+        test=tested,
+        digest=dataset.digest,
+        ahead=length,
+        level=level,
+        errors=every,
+        table=table,
+        chosen=chosen,
+        fits=fits,
+        manoeuvres=manoeuvres,
+        spread=_spread(manoeuvres, equal),
+        beyond=far,
+        groups=groups,
+        uneven=uneven(groups),
+        programme=_programme(dataset, fitted, fits, chosen, table),
+    )
+
+
+def _judged(
+    vessel: Vessel,
+    name: str,
+    dataset: Dataset,
+    settings: Identify,
+    parts: Sequence[Sequence[str]],
+    fitted: Sequence[str],
+    tested: Sequence[str],
+    ahead: float,
+    tell: Said,
+) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
+    """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
+
+    def fit(runs: Sequence[str], start: Solution | None = None) -> tuple[Vessel, Solution]:
+        tell(f"{name}: {len(runs)} of {len(fitted)} runs")
+        solution = identify(other.vessel, dataset, runs, other.settings, start=start)
+        if solution.status != "ok":
+            raise ShipidError(solution.sentence)
+        return other.vessel.with_values(solution.values), solution
+
+    other = exchange(vessel, name, dataset, fitted, settings)
+    whole, solution = fit(fitted)
+    frames, series = [], []
+    for part in parts:
+        rest = [run for run in fitted if run not in part]
+        found = free_runs({name: fit(rest, solution)[0]}, dataset, part, settings, ahead)
+        frames.append(found.errors[found.errors["run"] != ALL])
+        series.append(found.series)
+    errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
+    if tested:
+        test: FreeRuns = free_runs({name: whole}, dataset, tested, settings, ahead)
+        errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
+    judged = statistics(LinearFit.of(solution))
+    caution = refusal(solution, judged, residual_spacing(solution))
+    return errors, Fitted(whole, solution, judged, caution), pd.concat(series, ignore_index=True)
+
+
+def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
+    """Errors of runs below their mean over runs; a run whose prediction diverges makes it infinite."""
+    known = errors.assign(**{name: errors[name].fillna(np.inf) for name in SIGNALS})
+    mean = {name: float(known[name].mean()) for name in SIGNALS}
+    return pd.concat([pd.DataFrame([{"run": ALL, **mean}]), known.drop(columns=["model", "samples"])])
+
+
+def _table(
+    names: Sequence[str],
+    errors: pd.DataFrame,
+    counts: Mapping[str, int],
+    notes: Mapping[str, str],
+    fitted: Sequence[str],
+) -> pd.DataFrame:
+    """One row for each structure, best first; those that could not be fitted last."""
+    means = {(row["set"], row["structure"]): row for row in _records(errors[errors["run"] == ALL])}
+    of_run = errors[(errors["set"] == "folds") & (errors["run"] != ALL)]
+    position = {name: of_run[of_run["structure"] == name].set_index("run")["position"].to_dict() for name in counts}
+    known = sorted(counts, key=lambda name: float(means["folds", name]["position"]))
+    best = known[0]
+    sound = [name for name in known if np.isfinite(list(position[name].values())).all()]
+    intervals: dict[str, tuple[float, float]] = {}
+    if best in sound and len(sound) > 1:
+        apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
+        found = contrasts(apart, np.ones(len(fitted)))
+        intervals = dict(zip(sound[1:], zip(found.low.tolist(), found.high.tolist(), strict=True), strict=True))
+    rows: list[dict[str, Any]] = []
+    for name in known:
+        low, high = intervals.get(name, (np.nan, np.nan))
+        here = means["folds", name]
+        rows.append(
+            {
+                "structure": name,
+                "numbers": counts[name],
+                **{signal: float(here[signal]) for signal in SIGNALS},
+                "test": float(means["test", name]["position"]) if ("test", name) in means else np.nan,
+                "more": float(here["position"] - means["folds", best]["position"]) if name in sound else np.inf,
+                "low": low,
+                "high": high,
+                "equal": name == best or (name in sound and not low > 0),
+                "note": "" if name in sound else "diverges on a run that was held out",
+            }
+        )
+    nothing = dict.fromkeys((*SIGNALS, "test", "more", "low", "high"), np.nan)
+    rows += [
+        {"structure": name, "numbers": 0, **nothing, "equal": False, "note": notes[name]}
+        for name in names
+        if name in notes
+    ]
+    return pd.DataFrame(rows)
+
+
+def with_gear(vessel: Vessel) -> Vessel:
+    """The vessel with every actuator that its document holds: one that is off for a log of measured angles, too."""
+    off = {
+        f"thruster.{name}.actuator.{command}.off": False
+        for name, block in vessel.document.get("thruster", {}).items()
+        for command, actuator in (block.get("actuator") or {}).items()
+        if isinstance(actuator, Mapping) and actuator.get("off", False)
+    }
+    return vessel.with_values(off) if off else vessel
+
+
+TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
+
+
+def _title(kind: str, angles: Sequence[float], side: str) -> str:
+    return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}"
+
+
+def _measured(vessel: Vessel) -> dict[str, Measured]:
+    """Title -> every standard manoeuvre."""
+    ship, titles = with_gear(vessel), [_title(*trial) for trial in TRIALS]
+    try:
+        return dict(zip(titles, measure_all(ship, TRIALS, engine="repeated"), strict=True))
+    except ShipidError:  # one of them: the others may be performed
+        done: dict[str, Measured] = {}
+        for trial, title in zip(TRIALS, titles, strict=True):
+            with suppress(ShipidError):
+                done[title] = measure_all(ship, [trial], engine="repeated")[0]
+        if not done:
+            raise
+        return done
+
+
+def _manoeuvres(
+    fits: Mapping[str, Fitted], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
+    rows, far = list[dict[str, Any]](), list[str]()
+    for name, fit in fits.items():
+        try:
+            done = _measured(fit.vessel)
+        except ShipidError as error:
+            rows.append({"manoeuvre": "all", "measure": "", "structure": name, "note": error.message})
+            continue
+        units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
+        if name == chosen:
+            far += [beyond(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
+        if level is None or name not in equal:
+            found = [
+                {"manoeuvre": title, "measure": measure, "value": value}
+                for title, one in done.items()
+                for measure, value in _values(one).items()
+            ]
+        else:
+            known = {fit.vessel.digest: done}
+            measures = [(title, _measure(title, known)) for title in done]
+            found = _records(bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level))
+        missing = [_title(*trial) for trial in TRIALS if _title(*trial) not in done]
+        rows += [{"manoeuvre": title, "measure": "", "structure": name, "note": "diverges"} for title in missing]
+        rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in found]
+    columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
+    return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
+
+
+def _values(one: Measured) -> dict[str, float]:
+    """The measures that are compared."""
+    found = {row["measure"]: float(row["value"]) for row in one.measures}
+    return {name: found[name] for name in MEASURES[one.standard.kind] if name in found}
+
+
+def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
+    """Measures of one manoeuvre; `known` holds all manoeuvres of vessels by digest, which come from one approach."""
+
+    def measure(one: Vessel) -> dict[str, float]:
+        if one.digest not in known:
+            known[one.digest] = _measured(one)
+        if title not in known[one.digest]:
+            raise ShipidError("diverges within the interval of the numbers")
+        return _values(known[one.digest][title])
+
+    return measure
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
+
+
+def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
+    """Range of every measure over the structures that are equally good, and the greatest interval within one."""
+    rows = []
+    good = [row for row in _records(manoeuvres) if row["structure"] in equal and row["measure"]]
+    for manoeuvre, measure in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in good):
+        of = [row for row in good if (row["manoeuvre"], row["measure"]) == (manoeuvre, measure)]
+        values = np.array([row["value"] for row in of], dtype=float)
+        wide = np.array([row["high"] - row["low"] for row in of], dtype=float)
+        least, greatest = (float(f(values)) if np.isfinite(values).any() else np.nan for f in (np.nanmin, np.nanmax))
+        rows.append(
+            {
+                "manoeuvre": manoeuvre,
+                "measure": measure,
+                "unit": of[0]["unit"],
+                "least": least,
+                "greatest": greatest,
+                "spread": greatest - least,
+                "width": float(np.nanmax(wide)) if np.isfinite(wide).any() else np.nan,
+            }
+        )
+    return pd.DataFrame(rows, columns=["manoeuvre", "measure", "unit", "least", "greatest", "spread", "width"])
+
+
+def _programme(
+    dataset: Dataset, runs: Sequence[str], fits: Mapping[str, Fitted], chosen: str, table: pd.DataFrame
+) -> pd.DataFrame:
+    """Manoeuvres in which the good structures are farthest apart; of one good structure and the next best."""
+    columns = ["manoeuvre", "hours", "apart"]
+    good = [str(name) for name in table.loc[table["equal"], "structure"]]
+    if len(good) < len((chosen, "another")):
+        good = [str(name) for name in table["structure"] if name in fits][:2]
+    if len(good) < 2:
+        return pd.DataFrame(columns=columns)
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    speed = float(np.median(np.hypot(rows["u"], rows["v"])))
+    ship = with_gear(fits[chosen].vessel)
+    shafts = [name for name in dynamics(ship).commands if is_shaft(name)]
+    limits = Limits(n_rpm=60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf"))
+    settings, judged = fits[chosen].solution.settings, fits[chosen].statistics
+    deviations = {
+        name: settings.weights[name] * residual_level(judged, name) for name in "uvr" if name in settings.weights
+    }
+    try:
+        choice = candidates(ship, (speed / 2, speed), limits)
+        interval = settings.step
+        step = interval / steps_between(ship, interval)
+        logs = {name: _logs(with_gear(fits[name].vessel), choice, step, interval) for name in good}
+    except ShipidError:  # no shaft speed gives these speeds, or the ship has no length
+        return pd.DataFrame(columns=columns)
+    if not deviations:
+        return pd.DataFrame(columns=columns)
+    pairs = [(a, b) for i, a in enumerate(good) for b in good[i + 1 :]]
+    result = []
+    for number, one in enumerate(choice):
+        if not all(logs[name][number] for name in good):
+            continue
+        squares = [
+            np.mean([((logs[a][number][s] - logs[b][number][s]) / sd) ** 2 for s, sd in deviations.items()])
+            for a, b in pairs
+        ]
+        result.append((one.title, one.hours, float(np.sqrt(np.max(squares)))))
+    found = pd.DataFrame(result, columns=columns).sort_values("apart", ascending=False, ignore_index=True)
+    return found.head(FIRST)
+
+
+def _logs(vessel: Vessel, choice: Sequence[Candidate], step: float, interval: float) -> list[dict[str, Array]]:
+    """Motion of each candidate: u, v, r -> (N,); nothing for one that the vessel cannot perform."""
+    try:
+        log = performed(vessel, choice, step=step, interval=interval)
+    except ShipidError:
+        if len(choice) == 1:
+            return [{}]
+        return [_logs(vessel, [one], step, interval)[0] for one in choice]
+    return [{name: rows[name].to_numpy() for name in "uvr"} for _, rows in log.groupby("run", sort=False)]
+
+
+def structures_content(found: Compared, dataset: str | Path, command: str = "") -> StructuresContent:
+    """Assemble the page; `command` is the command line that reproduces it."""
+    return StructuresContent(
+        title=f"{found.vessel.name}: structures of the hull",
+        name=found.vessel.key,
+        sentences=found.sentences,
+        table=found.table,
+        errors=found.errors,
+        manoeuvres=found.manoeuvres,
+        spread=found.spread,
+        groups=found.groups,
+        programme=found.programme,
+        chosen=found.chosen,
+        cautions={name: fit.caution for name, fit in found.fits.items()},
+        ahead=found.ahead,
+        level=found.level,
+        provenance={
+            "Vessel": f"{found.vessel.name}, digest {found.vessel.digest}",
+            "Dataset": f"{dataset}, digest {found.digest}",
+            "Runs": ", ".join(found.runs),
+            "Held out of all": ", ".join(found.test) or "none",
+            "shipid": __version__,
+        },
+        command=command,
+        study_document=found.document(),
+    )

@@ -1,0 +1,127 @@
+"""`--json`: one object on standard output and nothing else, with what the tables show."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from shipid.cli import app
+from shipid.cli.answer import Answer, answering
+from shipid.cli.terminal import table
+from shipid.document import bundled
+from shipid.study.store import DATASET, read_rows
+
+CLI = Path(__file__).parents[2] / "shipid" / "cli"
+
+
+def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
+    """What a command says as JSON; standard output must hold nothing else."""
+    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == code, result.output
+    found: dict[str, Any] = json.loads(result.stdout, parse_constant=pytest.fail)  # NaN is no JSON
+    return found
+
+
+def test_lists_and_one_vessel() -> None:
+    assert [row["name"] for row in answered("vessel", "list")["vessels"]] == list(bundled("models"))
+    assert [row["name"] for row in answered("study", "list")["studies"]] == list(bundled("studies"))
+    ship = answered("vessel", "show", "gunnerus-28.9-6dof")
+    assert ship["particulars"]["L_pp"] == 28.9
+    assert {"path": "particulars.L_pp", "value": 28.9, "unit": "m"} not in ship["terms"]
+    assert all(isinstance(row["value"], float) for row in ship["parameters"])
+
+
+def test_a_draft_and_a_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sizes = ["--length", 60, "--beam", 12, "--draught", 4, "--block", 0.6]
+    draft = answered("vessel", "new", *sizes, "--out", "mine.toml")
+    assert draft["file"] == "mine.toml"
+    assert Path("mine.toml").read_text().startswith("#:schema ./.shipid/vessel.schema.json\n")
+    assert {row["verdict"] for row in draft["criteria"]} <= {"meets", "fails", "no limit", "met", "not met", ""}
+    done = answered("manoeuvre", "mariner", "zigzag", 10, 10, "--csv", "z.csv")
+    assert {"measures", "criteria", "page", "csv"} <= set(done)
+    assert len(pd.read_csv("z.csv")) == len(done["measures"])
+
+
+def test_studies(study: Path, tiny_run: Path) -> None:
+    rows = answered("study", "variants", study)["foundations"]
+    known = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")["A"]
+    assert {row["foundation"]: row["A"] for row in rows if row["A"] is not None} == pytest.approx(
+        known.dropna().to_dict()
+    )
+    screened = answered("study", "screen", study, "--members", 3)
+    assert {"accuracy", "drivers", "file"} == set(screened)
+    assert answered("study", "check", tiny_run)["faults"] == []
+    made = answered("simulate", study)
+    assert made["runs"] == 12
+    assert {row["set"] for row in made["envelope"]} >= {"test"}
+
+
+def test_data(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    frame = pd.read_parquet(tiny_run / DATASET)
+    checks = answered(
+        "data",
+        "check",
+        tiny_run / DATASET,
+        code=CliRunner().invoke(app, ["data", "check", str(tiny_run / DATASET)]).exit_code,
+    )
+    assert len(checks["checks"]) >= frame["run"].nunique()
+    assert "left" in answered("data", "measures", tiny_run / DATASET)
+    errors = answered("replay", "gunnerus-28.9", tiny_run / DATASET, "--run", "M00*")
+    assert len(errors["errors"]) == 9 + 1, "and all together"
+    one = frame[frame["run"] == frame["run"].iloc[0]]
+    one[["t", "north", "east", "psi", "u", "v", "r"]].to_csv("log.csv", index=False)
+    guess = answered("data", "import", "--guess", "log.csv")
+    assert {row["column"] for row in guess["columns"]} >= {"u", "v", "r"}
+    assert Path("log.toml").read_text().startswith("#:schema ./.shipid/mapping.schema.json\n")
+
+
+def test_an_exit_status_comes_with_the_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    def ends() -> None:
+        with answering(True) as answer:
+            answer.say("two faults", faults=np.int64(2), worst=np.nan, file=Path("a"), many=np.arange(2))
+            answer.say("a heading")
+            raise typer.Exit(1)
+
+    with pytest.raises(typer.Exit):
+        ends()
+    assert json.loads(capsys.readouterr().out) == {"faults": 2, "worst": None, "file": "a", "many": [0, 1]}
+    with pytest.raises(ValueError, match="broken"), answering(True):
+        raise ValueError("broken")
+    assert capsys.readouterr().out == "", "half an answer is none"
+
+
+def test_people_see_tables_and_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = Answer(False)
+    answer.say("a heading", number=1)
+    answer.say()
+    answer.rows("rows", [{"a": 1}], table(["a"], [["1"]]))
+    answer.rows("none", [], None)
+    assert [line.strip() for line in capsys.readouterr().out.splitlines() if line.strip("─ ")] == [
+        "a heading",
+        "a",
+        "1",
+    ]
+
+
+def test_every_command_with_a_table_has_the_option() -> None:
+    """No command prints a table but by an answer, and each that has an answer takes --json."""
+    for file in CLI.glob("*.py"):
+        if file.stem in ("terminal", "answer"):
+            continue
+        text = file.read_text(encoding="utf-8")
+        assert not re.search(r"\bshow\(", text), file
+        for body in re.split(r"^@app\.command|^def (?!_)", text, flags=re.MULTILINE):
+            if "answering(" in body.partition("\ndef _")[0] and "import" not in body[:20]:
+                assert "as_json" in body, (file, body[:60])

@@ -1,0 +1,37 @@
+"""How far data and manoeuvres reach, and what is said where a manoeuvre goes beyond."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.identification.reach import Reach, beyond, of_log, reach_of
+from shipid.simulation.manoeuvre import TurningCircle
+from shipid.simulation.perform import perform
+from shipid.units import DEGREE
+from shipid.vessel.load import load_vessel
+from tests.identification.trials import trials
+
+SHIP = load_vessel("kvlcc2-l7")
+
+
+def test_it_is_the_greatest_of_the_motion() -> None:
+    u, v, r = np.array([2.0, 2.0, 1.0]), np.array([0.0, -2.0, 0.0]), np.array([0.0, 0.1, -0.3])
+    helm = np.array([0.0, -30.0, 10.0]) * DEGREE
+    found = Reach.of(SHIP, {"u": u, "v": v, "r": r, "rudder.delta": helm, "propeller.n": u})
+    assert found.drift == pytest.approx(45)
+    assert found.rate == pytest.approx(0.3 * 7)
+    assert found.helm == pytest.approx(30)
+    assert found.speed == 1.0
+
+
+def test_a_hard_turn_goes_beyond_gentle_trials_and_not_beyond_itself() -> None:
+    hard = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=35, duration=60)], step=0.1)
+    gentle = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=3, duration=20)], step=0.1)
+    said = beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, gentle))
+    assert said.startswith("turning 35 reaches ")
+    for word in ("deg of drift", "r L / U of", "35 deg of helm", "a speed of", "; the data reach"):
+        assert word in said
+    assert beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, hard)) == ""
+    data = trials(SHIP, runs=2, steps=40)
+    assert reach_of(SHIP, data, ["M01"]).helm <= 0.6 / DEGREE

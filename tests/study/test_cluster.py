@@ -1,0 +1,127 @@
+"""Dask: what dies on a cluster costs nothing that is finished, and is one line; what joins midway helps."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.study import cluster
+from shipid.study.cluster import on_dask
+from tests.faults.clusters import a_cluster, a_worker
+
+Done = list[tuple[int, Any]]
+
+
+@contextmanager
+def workers(address: str, place: Path, *more: str) -> Iterator[None]:
+    """Workers with a parent that starts them anew, as on most clusters."""
+    with a_worker(address, place, *more) as process:
+        yield
+        process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(20)
+
+
+def napping(seconds: float) -> Callable[[int, int], int]:
+    """Work that takes some time; made here, so that it travels to the workers by value."""
+
+    def work(shared: int, task: int) -> int:
+        time.sleep(seconds)
+        return shared + task
+
+    return work
+
+
+def test_no_scheduler_is_one_line() -> None:
+    with pytest.raises(ShipidError, match="no Dask scheduler answers there") as caught:
+        list(on_dask("nonsense://x", napping(0.0), 1, {"a": 1}, "x"))
+    assert "\n" not in str(caught.value)
+
+
+def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
+    from dask.distributed import LocalCluster
+
+    options = {"processes": False, "protocol": "tcp://", "dashboard_address": ":0", "silence_logs": 50}
+    with LocalCluster(n_workers=1, threads_per_worker=1, **options) as local:
+        address = local.scheduler_address
+        tasks = {f"t{i}": i for i in range(4)}
+        assert sorted(on_dask(address, napping(0.0), 10, tasks, "x")) == [(i, 10 + i) for i in range(4)]
+
+        def failing(_: int, task: int) -> float:
+            return 1 / task
+
+        with pytest.raises(ZeroDivisionError):
+            list(on_dask(address, failing, 10, {"t": 0}, "y"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_scheduler_that_dies_or_falls_silent_is_one_line(
+    sent: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "SILENT", 3.0)
+    with a_cluster(tmp_path) as (address, (scheduler, _)):
+        results = on_dask(address, napping(0.3), 1, {f"t{i}": i for i in range(2000)}, "x")
+        next(results)
+        scheduler.send_signal(sent)
+        killed = time.monotonic()
+        with pytest.raises(ShipidError, match="scheduler is gone; what is finished is kept") as caught:
+            list(results)
+        assert time.monotonic() - killed < 60  # on a loaded machine: docs/cluster.md has what was measured
+        scheduler.send_signal(signal.SIGCONT)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> None:
+    """Between the two there is no worker, and what both need must be sent anew."""
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster, "LOOK", 0.2)
+    tasks = {f"t{i}": i for i in range(6)}
+    found: Done = []
+    with a_cluster(tmp_path) as (address, (_, first)):
+        results = on_dask(address, napping(0.3), 10, tasks, "x")
+        found.append(next(results))
+        first.kill()
+        second = subprocess.Popen(
+            [sys.executable, "-c", f"import time, os; time.sleep(4); os.execv({sys.executable!r}, {_late(address)!r})"],
+            cwd=tmp_path,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            found += list(results)
+        finally:
+            second.kill()
+            second.wait()
+    assert sorted(found) == [(i, 10 + i) for i in range(6)]
+    assert "has no workers: waiting for one" in caplog.text
+
+
+def _late(address: str) -> list[str]:
+    return [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny"]
+
+
+@pytest.mark.slow
+def test_a_task_that_kills_its_workers_is_named_when_the_others_are_done(tmp_path: Path) -> None:
+    def hungry(_: int, task: int) -> int:
+        if task == 1:
+            os._exit(9)  # as the system ends a process that takes too much memory
+        return task
+
+    with a_cluster(tmp_path, workers=0) as (address, _), workers(address, tmp_path):
+        found: Done = []
+        with pytest.raises(ShipidError, match=r"perhaps for want of memory, at .*t1.* and larger workers") as caught:
+            found.extend(on_dask(address, hungry, 0, {"t0": 0, "t1": 1}, "x"))
+    assert "\n" not in str(caught.value)
+    assert all(task != 1 for task, _ in found)

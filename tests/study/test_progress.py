@@ -1,0 +1,110 @@
+"""What is said of searches that go on, from journals that others write."""
+
+from __future__ import annotations
+
+import json
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipid.hybrid import search as searches
+from shipid.hybrid.journal import Journal
+from shipid.hybrid.settings import Span
+from shipid.study.progress import Searching, Watch
+from shipid.study.store import JOURNALS, TRIALS
+from tests.study.tiny import tiny_plan
+
+SPACE = {"units": Span(1, 100)}
+
+
+def row(number: int, value: float) -> dict[str, Any]:
+    known = {"number": number, "params": {"units": 2.0}, "value": value, "seconds": 1.0, "epochs": 0}
+    return known | {"state": "complete" if value == value else "diverged"}
+
+
+def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"method.0.trials": 5})
+    watch, file = Watch(plan, tmp_path), tmp_path / JOURNALS / "unit.log"
+    file.parent.mkdir()
+    assert watch.look() == []
+    one, other = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
+    journal = Journal(file)
+    journal.add({one: [row(0, 0.25)]}, SPACE)
+    assert watch.look() == [Searching(one, 1, 5, 0.25)]
+    journal.add({one: [row(1, float("nan"))], other: [row(0, float("nan"))]}, SPACE)
+    found = {search.cell: search for search in watch.look()}
+    assert found == {one: Searching(one, 2, 5, 0.25), other: Searching(other, 1, 5, inf)}
+    assert found[one].words == f"{one}: trial 2/5, best so far 0.5 m rms"
+    assert found[other].words == f"{other}: trial 1/5"
+    journal.add({other: [row(1, 0.04)]}, SPACE)
+    assert watch.look()[0] == Searching(other, 2, 5, 0.04), "the one that moved last comes first"
+    journal.add({other: [row(number, 0.09) for number in (2, 3, 4)]}, SPACE)
+    assert [search.cell for search in watch.look()] == [one], "all its trials have ended"
+    assert watch.look([one]) == []
+
+
+def test_a_budget_says_its_number_when_it_knows_it(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"method.0.budget": 10.0})
+    (tmp_path / JOURNALS).mkdir()
+    watch, journal, cell = Watch(plan, tmp_path), Journal(tmp_path / JOURNALS / "unit.log"), "right+drawn-N0004-s0"
+    journal.decide([cell], 12)
+    journal.add({cell: [row(0, 0.01)]}, SPACE)
+    assert watch.look() == [Searching(cell, 1, 12, 0.01)]
+
+
+def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path, {"method.0.trials": 5})
+    (tmp_path / JOURNALS).mkdir()
+    watch, file, cell = Watch(plan, tmp_path), tmp_path / JOURNALS / "unit.log", "right+drawn-N0004-s0"
+    Journal(file).add({cell: [row(0, 0.01)]}, SPACE)
+    whole = file.read_bytes()
+    for cut in (len(whole) - 5, len(whole)):
+        file.write_bytes(whole[:cut])
+        found = watch.look()
+    assert found == [Searching(cell, 1, 5, 0.01)]
+    with file.open("a") as stream:
+        stream.write('no json\n[1]\n{"op_code": 4}\n{"op_code": 2, "study_id": 9, "user_attr": {"trials": 3}}\n')
+    assert watch.look() == found
+
+
+def test_journals_of_a_folder_that_has_several(tmp_path: Path) -> None:
+    """One for each unit of work, in a folder; two runs may be numbered alike inside."""
+    plan = tiny_plan(tmp_path, {"method.0.trials": 5})
+    for name in ("one", "two"):
+        (tmp_path / JOURNALS).mkdir(exist_ok=True)
+        Journal(tmp_path / JOURNALS / f"{name}.log").add({f"{name}+drawn-N0004-s0": [row(0, 1.0)]}, SPACE)
+    watch = Watch(plan, tmp_path)
+    assert {search.cell for search in watch.look()} == {"one+drawn-N0004-s0", "two+drawn-N0004-s0"}
+
+
+def test_a_finished_run_searches_no_more(tiny_run: Path, tmp_path: Path) -> None:
+    assert Watch(tiny_plan(tmp_path), tiny_run).look() == []
+    entries = [json.loads(line) for line in (tiny_run / TRIALS).read_text().splitlines()]
+    assert sum(entry["op_code"] == 4 for entry in entries) == 8, "the law above would be empty without trials"
+
+
+def test_quick_trials_are_written_while_the_search_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trials that are kept to be written together are not kept for long."""
+    from shipid.hybrid.method import Task
+    from shipid.hybrid.path_drawn import PathDrawn
+
+    written: list[int] = []
+
+    class Here:
+        def rows(self, cell: str) -> list[Any]:  # noqa: ARG002
+            return []
+
+        def add(self, rows: Any, space: Any) -> None:  # noqa: ARG002
+            written.append(len(rows["a"]))
+
+    clock = [0.0]
+    monkeypatch.setattr(searches.time, "monotonic", lambda: clock[0])
+    task = Task({}, None, (), (), journal=Here())  # type: ignore[arg-type]
+    search = searches.Search(task, ["a"], PathDrawn(trials=5), again=True)
+    for number in range(5):
+        clock[0] += 0.6 * searches.TOGETHER
+        search.keep({"a": row(number, 1.0)})
+    search.write()
+    assert written == [2, 2, 1]

@@ -1,0 +1,116 @@
+"""Structures compared: the one that made the data is chosen by runs held out, and nothing by the fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError, ShipidError
+from shipid.identification.settings import Identify
+from shipid.identification.structures import exchange
+from shipid.report.structures import write_structures
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
+from shipid.study.structures import Compared, compare_structures, structures_content, with_gear, write_chosen
+from shipid.vessel.load import Vessel, load_vessel
+
+SHIP = load_vessel("kvlcc2-l7").with_values({"thruster.rudder.actuator.delta.off": True})
+NOISE = {"u": 0.001, "v": 0.001, "r": np.radians(0.01)}
+SETTINGS = Identify(parameters=["hull.*"], horizon=20, step=0.5, weights=NOISE, start="base")
+TRIALS = (
+    (10, 5, 627, "port"), (20, 10, 627, "starboard"), (30, 10, 627, "port"),
+    (15, 10, 450, "starboard"), (25, 10, 450, "port"), (35, 15, 627, "starboard"),
+)  # fmt: skip
+
+
+def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
+    """Six noisy zigzags at two speeds."""
+    runs = [
+        Zigzag(
+            name=f"{a}_{b}_{n}",
+            n_rpm=n,
+            angle_deg=a,
+            execute_heading_deg=b,
+            side=side,
+            duration=50,
+            approach="helmsman",
+        )
+        for a, b, n, side in TRIALS
+    ]  # type: ignore[arg-type]
+    frame = perform(vessel, runs, step=0.1, interval=0.5)
+    rng = np.random.default_rng(seed)
+    for name, deviation in NOISE.items():
+        frame[name] += rng.normal(0, deviation, len(frame))
+    return Dataset(
+        frame[[name for name in frame if not str(name).startswith("actual.")]], {"clock": "run", "flags": []}
+    )
+
+
+def data_of(structure: str) -> Dataset:
+    """Trials of a ship whose hull has this structure, near to SHIP."""
+    plain = zigzags(SHIP)
+    return zigzags(exchange(SHIP, structure, plain, plain.runs, SETTINGS).vessel)
+
+
+@pytest.fixture(scope="module")
+def found() -> Compared:
+    return compare_structures(
+        SHIP,
+        data_of("abkowitz"),
+        SETTINGS,
+        ["modulus", "abkowitz"],
+        held_out=["35_15_627"],
+        ahead=20.0,
+        folds=2,
+        level=None,
+    )
+
+
+@pytest.mark.slow
+def test_the_structure_that_made_the_data_is_chosen(found: Compared) -> None:
+    assert found.chosen == "abkowitz"
+    assert list(found.table["structure"]) == ["abkowitz", "modulus"]
+    assert found.table["position"].is_monotonic_increasing
+    assert found.test == ("35_15_627",)
+    held = found.errors[(found.errors["set"] == "folds") & (found.errors["run"] != "all")]
+    assert sorted(held["run"].unique()) == sorted(found.runs)  # each run once, and no test run
+    assert found.sentences[0].startswith("abkowitz has the least error")
+    assert set(found.manoeuvres["measure"]) == {"overshoot 1", "overshoot 2", "advance", "tactical diameter"}
+    assert (found.spread["spread"] >= 0).all()
+    assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in found.beyond)
+
+
+@pytest.mark.slow
+def test_the_vessel_chosen_and_the_page_are_written(found: Compared, tmp_path: Path) -> None:
+    again = load_vessel(str(write_chosen(found, tmp_path / "chosen.toml")))
+    assert again.parameters == pytest.approx(found.fits[found.chosen].vessel.parameters)
+    page = write_structures(structures_content(found, "log.parquet", "shipid identify"), tmp_path / "page.html")
+    text = page.read_text()
+    for word in ("modulus", "abkowitz", "tactical diameter", "Which structure"):
+        assert word in text
+
+
+def test_gear_that_is_off_for_the_log_is_on_in_manoeuvres() -> None:
+    assert not SHIP.units.keys() & {"thruster.rudder.actuator.delta.T"}
+    assert "thruster.rudder.actuator.delta.T" in with_gear(SHIP).units
+
+
+def test_what_cannot_be_compared_is_refused() -> None:
+    data = zigzags(SHIP)
+    with pytest.raises(DataError, match="only one run"):
+        compare_structures(SHIP, data, SETTINGS, ["mmg"], runs=["10_5_627"])
+    with pytest.raises(ShipidError, match="two folds or more"):
+        compare_structures(SHIP, data, SETTINGS, ["mmg"], folds=1)
+    with pytest.raises(ShipidError, match="'kubic' is no structure"):
+        compare_structures(SHIP, data, SETTINGS, ["kubic"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("truth", ["mmg", "cubic"])
+def test_the_truth_is_never_shown_to_be_worse(truth: str) -> None:
+    names = ["mmg", "modulus", "cubic"]
+    found = compare_structures(SHIP, data_of(truth), SETTINGS, names, ahead=20.0, folds=2, level=None)
+    assert bool(found.table.set_index("structure")["equal"][truth])

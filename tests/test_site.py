@@ -1,0 +1,120 @@
+"""The site builds without a warning, its links lead somewhere, it fetches nothing; notebooks run as they are stored."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from urllib.parse import unquote, urldefrag, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+FIGURES = ("image/svg+xml", "application/vnd.plotly.v1+json")
+
+
+class Page(HTMLParser):
+    """Names that a page defines, pages that it links to, and files that a browser loads with it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.equations = 0
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        self.names.add(given.get("id", ""))
+        self.equations += tag == "math"
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        if tag in ("script", "img", "iframe", "source"):
+            self.loaded.append(given.get("src", ""))
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preload"):
+            self.loaded.append(given["href"])
+
+
+def load(file: Path) -> ModuleType:
+    spec = spec_from_file_location(file.stem, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def figures(notebook: dict) -> list[str]:
+    """Kind of every figure that a notebook holds."""
+    outputs = [output for cell in notebook["cells"] for output in cell.get("outputs", ())]
+    return [kind for output in outputs for kind in output.get("data", {}) if kind in FIGURES]
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_its_links_lead_somewhere(tmp_path: Path) -> None:
+    pytest.importorskip("myst_nb", reason="`make docs` installs what builds the site")
+    site = tmp_path / "site"
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", str(tmp_path / "trees"), "docs"]
+    environment = {**os.environ, "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}  # no network
+    built = subprocess.run([*command, str(site)], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    pages = {file: Page(file.read_text(encoding="utf-8")) for file in site.rglob("*.html")}
+    assert {file.stem for file in DOCS.glob("*.md")} <= {file.stem for file in pages}
+    assert pages[site / "theory.html"].equations > 50
+    broken = []
+    for file, page in pages.items():
+        for link in page.links:
+            if urlsplit(link).scheme or not link:
+                continue
+            path, name = urldefrag(link)
+            target = (file.parent / unquote(path)).resolve() if path else file
+            if not target.is_file() or (name and target in pages and unquote(name) not in pages[target].names):
+                broken.append(f"{file.relative_to(site)}: {link}")
+        loaded = [link.partition("?")[0] for link in page.loaded if link and not link.startswith("data:")]
+        broken += [f"{file.relative_to(site)} loads {link}" for link in loaded if not (file.parent / link).is_file()]
+    assert not broken, "\n".join(broken)
+    styles = [file for file in site.rglob("*.css") if "url(http" in file.read_text(encoding="utf-8")]
+    assert not styles
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_runs(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("nbclient", reason="`make docs` installs what runs notebooks")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    done = load(DOCS / "notebooks" / "execute.py").executed(file, tmp_path)
+    assert len(figures(done)) == len(figures(json.loads(file.read_text(encoding="utf-8"))))
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_stored_with_its_figures_and_light(file: Path) -> None:
+    notebook = json.loads(file.read_text(encoding="utf-8"))
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in code] == list(range(1, len(code) + 1))
+    assert "image/svg+xml" in figures(notebook)
+    outputs = [output for cell in code for output in cell["outputs"]]
+    assert not [one for one in outputs if one["output_type"] == "error" or one.get("name") == "stderr"]
+    assert file.stat().st_size < 300_000
+
+
+def test_the_font_of_the_equations_is_the_one_that_is_declared() -> None:
+    font = hashlib.sha256((DOCS / "_static" / "math.woff2").read_bytes()).hexdigest()
+    assert font in (DOCS / "_static" / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_readme_is_short_and_its_files_are_there() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.split()) <= 700
+    names = [part.partition(")")[0] for part in text.split("](")[1:]]
+    inside = [name for name in names if not urlsplit(name).scheme]
+    assert sum(name.endswith(".svg") for name in inside) == 2
+    assert all((ROOT / urldefrag(name)[0]).exists() for name in inside)
