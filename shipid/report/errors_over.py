@@ -44,11 +44,12 @@ def horizon(content: ReportContent) -> Figure | None:
     statistics = {word: given for word, given in STATISTICS.items() if given[0] in frame}
     columns = [column for column, _ in statistics.values()]
     means, counts = over_seeds(frame, [*BY, "ahead"], columns), sizes(frame.N_D)
-    seeds = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])[columns].agg(["min", "max", "size"])
+    groups = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])
+    seeds = {column: groups[column].agg(["min", "max", "size"]).reset_index() for column in columns}
     views = {}
     for (i, (column, title)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
         traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
-        traces = [*_seed_bands(traces, seeds[column].xs(size, level="N_D")), *traces]
+        traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
         y = axis(f"{title} [m]", rangemode="tozero")
         names = _names_at_the_end(traces, float(means[column].max()))
         reach = float(means.ahead.max())
@@ -61,7 +62,7 @@ def horizon(content: ReportContent) -> Figure | None:
         takeaway=_takeaway_horizon(content, means, counts[-1]),
         how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
         "mean over seeds."
-        + (" Pale bands reach from the least seed to the greatest." if (seeds[columns[0]]["size"] > 1).any() else "")
+        + (" Pale bands reach from the least seed to the greatest." if (seeds["mean"]["size"] > 1).any() else "")
         + (BY_AXIS if "along" in columns else "")
         + _drawn(content),
         alternative="Lines of the position error that grow with the time ahead, one per model with and without "
@@ -163,8 +164,8 @@ def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Sc
     """Areas from the least to the greatest seed at each time ahead, in the colours of the lines of their models."""
     colours = {key: trace.line.color for trace in traces for key in trace.meta if "source:cooperative" in trace.meta}
     bands = []
-    for name, mine in seeds[seeds["size"] > 1].groupby(level="model", sort=False):
-        ahead = mine.index.get_level_values("ahead").to_numpy(dtype=float)
+    for name, mine in seeds[seeds["size"] > 1].groupby("model", sort=False):
+        ahead = mine["ahead"].to_numpy(dtype=float)
         x, y = np.concatenate([ahead, ahead[::-1]]), np.concatenate([mine["max"], mine["min"].to_numpy()[::-1]])
         colour = colours.get(f"model:{name}")
         if colour is not None:

@@ -66,10 +66,13 @@
   }
 
   function csv(plot) {
-    const rows = [["line", "x", "y", "shown"]];
+    const rows = [["line", "x", "y", "shown", "text"]];
+    const plain = (text) => String(text ?? "").replace(/<br>/g, "; ").replace(/<[^>]*>/g, "");
     for (const trace of plot.data) {
       const x = values(trace.x), y = values(trace.y);
-      x.forEach((value, i) => rows.push([trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1]));
+      const words = [trace.customdata, trace.text].find(Array.isArray) || [];
+      x.forEach((value, i) => rows.push(
+        [trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1, plain(words[i])]));
     }
     const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replace(/"/g, '""')}"` : value);
     return rows.map((row) => row.map(cell).join(",")).join("\n") + "\n";

@@ -50,7 +50,7 @@ def _plain(text: object) -> str:
 def _share(value: Any, axis: Any) -> float:
     """Place of a value between the ends of its axis, 0 to 1."""
     low, high = axis.range
-    return (float(value) - low) / (high - low)
+    return (float(value) - float(low)) / (float(high) - float(low))
 
 
 def _style(**properties: Any) -> str:
