@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from hypothesis import settings
 
 from shipid.document import bundled
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 torch.set_num_threads(1)  # the machine is shared
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 LAG = {
     "n": {"kind": "first_order", "T": 1.0, "rate": 0.17},

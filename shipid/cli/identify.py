@@ -82,7 +82,7 @@ def identify(
     """
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
-    from shipid.identification.outcome import read_settings, run_identification, write_patch
+    from shipid.identification.outcome import check, read_settings, run_identification, write_patch
     from shipid.vessel.load import load_vessel
 
     file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
@@ -103,13 +103,13 @@ def identify(
         options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    if structures is None:
+        check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
+    elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
+        raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
     with answering(as_json) as answer:
         _look(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            given_up = {"--profile": profile, "--design": design}
-            needless = next((name for name, value in given_up.items() if value), None)
-            if needless is not None:
-                raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
             how = {"runs": runs or (), "held_out": test or (), "ahead": ahead, "folds": folds}
             _compare(ship, log, declared, structures, how, band, file, html, dataset, answer)
             return

@@ -33,12 +33,11 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     for run, rows in pieces(dataset):
         by_run.setdefault(run, []).append(rows)
     shared = dataset.metadata.get("clock", "shared") != "run"
-    whole = {run: pd.concat(stretches) for run, stretches in by_run.items()}
+    whole = {run: _motion(pd.concat(stretches)) for run, stretches in by_run.items()}
     table = []
     for run, stretches in by_run.items():
-        others = {name: rows for name, rows in whole.items() if name != run}
         results = [*_clock(stretches), *_ranges(stretches), *_heading(stretches), *_path(stretches)]
-        table += [{"run": run, **row} for row in [*results, *_repetition(stretches, others, shared)]]
+        table += [{"run": run, **row} for row in [*results, *_repetition(run, stretches, whole, shared)]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -262,38 +261,46 @@ def check_series(dataset: Dataset) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
+@dataclass(frozen=True)
+class _Motion:
+    """A run to compare with others: t [s] and a key of the motion, each (N,); whether it moves in most rows."""
+
+    t: Array
+    keys: np.ndarray[Any, np.dtype[np.integer[Any]]]
+    lively: bool
+
+
+def _motion(rows: pd.DataFrame) -> _Motion:
+    values = rows[["psi", "u", "v", "r"]].round(9)
+    lively = (values.diff() != 0).all(axis=1).to_numpy()  # a ship at rest, or held steady, is the same everywhere
+    keys = pd.util.hash_pandas_object(values, index=False).to_numpy()
+    return _Motion(rows["t"].to_numpy(), keys, bool(lively.sum() >= 0.5 * len(rows)))
+
+
 def _repetition(
-    stretches: list[pd.DataFrame], others: dict[str, pd.DataFrame], shared: bool
+    run: str, stretches: list[pd.DataFrame], whole: dict[str, _Motion], shared: bool
 ) -> Iterator[dict[str, Any]]:
     states = ["north", "east", "psi", "u", "v", "r"]
     same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
     frozen = float(same.mean()) if len(same) else 0.0
     yield _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.2g} % of the rows repeat the row before")
-    mine = pd.concat(stretches)
-    double, other = max(((_within(mine, rows, shared), name) for name, rows in others.items()), default=(0.0, ""))
+    others = ((_within(whole[run], rows, shared), name) for name, rows in whole.items() if name != run)
+    double, other = max(others, default=(0.0, ""))
     where = f", most in {other!r}" if double > 0 else ""
     yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.2g} % of the rows belong to another run, too{where}")
 
 
-def _within(mine: pd.DataFrame, other: pd.DataFrame, shared: bool) -> float:
+def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
     """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
-    t = mine["t"].to_numpy()
     if shared:
-        instants = other["t"].to_numpy()
+        t, instants = mine.t, other.t
         at = np.clip(np.searchsorted(instants, t), 1, len(instants) - 1) if len(instants) > 1 else np.zeros(len(t), int)
         near = np.minimum(np.abs(instants[at] - t), np.abs(instants[at - 1] - t))
         slack = 0.25 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         share = float(np.mean(near <= slack))
         if share > 0:
             return share
-    moving = ["psi", "u", "v", "r"]
-    values = mine[moving].round(9)
-    lively = (values.diff() != 0).all(axis=1).to_numpy()  # a ship at rest, or held steady, is the same everywhere
-    if lively.sum() < 0.5 * len(mine):
-        return 0.0
-    keys = pd.util.hash_pandas_object(values, index=False).to_numpy()
-    known = pd.util.hash_pandas_object(other[moving].round(9), index=False).to_numpy()
-    return float(np.mean(np.isin(keys, known)))
+    return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
 
 
 def _rms(values: Array) -> float:

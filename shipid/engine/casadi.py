@@ -14,7 +14,7 @@ from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
-BLOCK = 256  # steps of one call of the function of `memory_along`: made once, whatever the lengths of the runs
+BLOCK = 256  # steps of one call in `memory_along`, samples of one in `orders_of`: made once, whatever is asked for
 
 
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
@@ -137,3 +137,22 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     after = np.concatenate(parts, axis=1)[:, :count]
     states = np.concatenate([first[:, None], after], axis=1)
     return dict(zip(model.memory, states, strict=True))
+
+
+@lru_cache(maxsize=32)
+def _orders_map(model: Dynamics) -> ca.Function:
+    """The orders of `BLOCK` samples with the same parameters."""
+    return model.orders.map("orders", "serial", BLOCK, [model.orders.n_in() - 1], [])
+
+
+def orders_of(
+    model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
+) -> Array:
+    """Orders (n_ordered, n) of the helmsman in n samples, each input (channels, n); parameters (P,)."""
+    count, mapped, parts = states.shape[1], _orders_map(model), []
+    for samples in np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(
+        -1, BLOCK
+    ):  # the last is padded
+        given = (part[:, samples] for part in (states, memory, commands, environment))
+        parts.append(np.array(mapped(*given, parameters)))
+    return np.concatenate(parts, axis=1)[:, :count]

@@ -40,6 +40,12 @@ class FreeRuns:
     errors: pd.DataFrame
 
 
+def check_length(settings: Identify, length: float) -> None:
+    """Raise DataError for a length [s] of free runs that is shorter than two steps, or endless; 0 is valid."""
+    if length and not LEAST_STEPS * settings.step <= length < np.inf:
+        raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
+
+
 def free_runs(
     vessels: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str], settings: Identify, length: float = 0.0
 ) -> FreeRuns:
@@ -48,8 +54,7 @@ def free_runs(
     The settings give step, method and overrides `runs.<run>.<path>`. Nuisances are at their fault-free values, as for
     a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
     """
-    if length and not LEAST_STEPS * settings.step <= length < np.inf:
-        raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
+    check_length(settings, length)
     overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
     asked = {"horizon": length, "nuisance": [], "runs": overrides}

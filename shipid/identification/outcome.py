@@ -21,7 +21,7 @@ from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
 from shipid.identification.collinearity import listed, short
 from shipid.identification.fit import Progress
-from shipid.identification.free_run import ALL, FreeRuns, free_runs
+from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.reach import beyond, of_log, reach_of
@@ -220,7 +220,7 @@ def run_identification(
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
             return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
 
-        _check(vessel, dataset, settings, (*fitted, *tested), profiles)
+        check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
         free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
         _go_on(held)
         fit_settings = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
@@ -288,9 +288,20 @@ def _go_on(held: Sequence[int]) -> None:
         raise KeyboardInterrupt
 
 
-def _check(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str], profiles: Sequence[str]) -> None:
-    """Raise for overrides of unknown names and for profiles of parameters that are not free."""
-    overrides(settings, runs, vessel, dynamics(vessel).environment, known=dataset.runs)
+def check(
+    vessel: Vessel,
+    dataset: Dataset,
+    settings: Identify,
+    runs: Sequence[str] = (),
+    held_out: Sequence[str] = (),
+    *,
+    ahead: float = 0.0,
+    profiles: Sequence[str] = (),
+) -> None:
+    """Raise what `run_identification` would raise before it simulates: for arguments that do not fit together."""
+    fitted, tested = pick_runs(dataset, runs, held_out)
+    check_length(settings, ahead)
+    overrides(settings, (*fitted, *tested), vessel, dynamics(vessel).environment, known=dataset.runs)
     known = unknowns(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:

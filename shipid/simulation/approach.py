@@ -6,8 +6,8 @@ All results come from numerical evaluation of the vessel's equations, so they ho
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,6 +146,27 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
     ------
     ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships (`NotStraight`).
     """
+    asked = _Asked(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls), controls)
+    known = _steady(asked, tuple(map(float, n)), step, method, engine, held)
+    copies = (
+        {name: values.copy() for name, values in part.items()} for part in (known.state, known.memory, known.helm)
+    )
+    return Approach(*copies)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Controls that are equal where the equations, their numbers and the length [m] are."""
+
+    model: Dynamics
+    values: tuple[float, ...]
+    length: float
+    controls: Controls = field(compare=False)
+
+
+@lru_cache(maxsize=64)  # manoeuvres of one vessel have one approach
+def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Method, engine: str, held: bool) -> Approach:
+    controls, n = asked.controls, np.array(speeds)
     vessel, count = controls.vessel, len(n)
     helmsman = course_keeping(controls.commands) if held else None
     model = dynamics(vessel, helmsman)
@@ -202,12 +223,16 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
 
 def _course(controls: Controls, n: Array) -> dict[str, Array]:
     """Inputs (S,) of the helmsman: course 0, natural frequency 2 U / L, and the effect of the helm at the speed U."""
-    length = float(controls.vessel.document.get("particulars", {}).get("L_pp", LENGTH))
     speeds = np.array([_speed(controls, shaft) for shaft in n])
     effects = [KEEPING * helm_effect(controls, shaft, speed) for shaft, speed in zip(n, speeds, strict=True)]
     if min(effects) <= 0:
         raise ShipidError(f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} rpm")
-    return {"course": np.zeros(len(n)), "omega": 2 * speeds / length, "effect": np.array(effects)}
+    return {"course": np.zeros(len(n)), "omega": 2 * speeds / _length(controls), "effect": np.array(effects)}
+
+
+def _length(controls: Controls) -> float:
+    """Length between perpendiculars [m], of a ship without one a usual length."""
+    return float(controls.vessel.document.get("particulars", {}).get("L_pp", LENGTH))
 
 
 def _speed(controls: Controls, n: float) -> float:

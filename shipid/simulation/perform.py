@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.engine.casadi import orders_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
@@ -22,7 +23,6 @@ from shipid.vessel.dynamics import HELM, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-ROWS = 256  # orders of a helmsman that are evaluated at once
 
 
 def perform(
@@ -239,14 +239,8 @@ def _orders(
     memory = [path.names.index(f"actual.{name}") for name in model.memory]
     states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
     values = np.array(list(vessel.parameters.values()))
-    count = records * samples
-    each = min(count, ROWS)  # by pieces: a map of all is slow to build
-    rows = model.orders.map("rows", "serial", each, [model.orders.n_in() - 1], [])
-    padded = np.minimum(np.arange(-(-count // each) * each), count - 1)
-    parts = [part.reshape(count, -1)[padded].T for part in (states, path.states[:, 0][..., memory], given, felt)]
-    pieces = [
-        np.array(rows(*(part[:, first : first + each] for part in parts), values))
-        for first in range(0, len(padded), each)
-    ]
-    ordered = np.concatenate(pieces, axis=1)[:, :count].reshape(len(model.ordered), records, samples)
-    return {name: ordered[channel] + 0.0 for channel, name in enumerate(model.ordered)}
+    parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
+    state, hidden, inputs, environment = (part.reshape(records * samples, part.shape[-1]).T for part in parts)
+    found = orders_of(model, state, hidden, inputs, environment, values)
+    ordered = found.reshape(-1, records, samples).swapaxes(0, 1)
+    return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.metrics import position_error
-from shipid.observer import MEASURED, Observer, at_windows, bank, observe, observed_paths
+from shipid.observer import MEASURED, Estimates, Observer, at_windows, bank, observe, observed_paths
 from shipid.simulation.excitation import aprbs
 from shipid.simulation.log import logged
 from shipid.simulation.sea import Sea, draw_components, wave_loads
@@ -110,10 +110,17 @@ def smoothed(data: Dataset) -> Dataset:
     return Dataset(frame, data.metadata)
 
 
-def errors(vessel: Vessel, made: World, settings: Observer | None = None, known: bool = True) -> dict[str, float]:
+def errors(
+    vessel: Vessel,
+    made: World,
+    settings: Observer | None = None,
+    known: bool = True,
+    estimates: Estimates | None = None,
+) -> dict[str, float]:
     """Mean error [m] over 30 s of windows after the first 60 s: physics alone, with the observer, and the floor.
 
-    The floor is the same physics from the low-passed start with the true current.
+    The floor is the same physics from the low-passed start with the true current. estimates : of the observer, if they
+    are there already.
     """
     whole = cut_windows(made.data, horizon=HORIZON, interval=5.0)
     late = whole.t >= SETTLED
@@ -127,7 +134,7 @@ def errors(vessel: Vessel, made: World, settings: Observer | None = None, known:
     unseen = {f"observer.{name}": zero for name in (*"XYN", "current_north", "current_east")}
     plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED}}
     alone = mean(observed_paths(filters, plain, HORIZON, ROW, planned=planned)[0])
-    columns = at_windows(made.data, observe(vessel, made.data, settings), windows)
+    columns = at_windows(made.data, estimates or observe(vessel, made.data, settings), windows)
     seen = mean(observed_paths(filters, columns, HORIZON, ROW, planned=planned)[0])
     low = cut_windows(smoothed(made.data), horizon=HORIZON, interval=5.0).select(late).columns
     current = np.array([made.current[str(run)] for run in windows.run]).T

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -78,37 +78,54 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_one_line(
-    mistake: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def mistaken(
+    arguments: Sequence[object], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> tuple[object, str, str]:
+    """Exit status, output and error of a command in this process, as its entry point runs it."""
     from shipid.cli import main
 
-    arguments, remedy = MISTAKES[mistake]
     monkeypatch.setattr(sys, "argv", ["shipid", *map(str, arguments)])
     with pytest.raises(SystemExit) as end:
         main()
     out, err = capfd.readouterr()
-    assert (end.value.code, out) == (1, "")
+    return end.value.code, out, err
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line(
+    mistake: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments, remedy = MISTAKES[mistake]
+    status, out, err = mistaken(arguments, capfd, monkeypatch)
+    assert (status, out) == (1, "")
     assert re.fullmatch(r"error: [^\n]*\n", err)
     assert remedy in err
 
 
-def test_mistakes_in_a_process_of_their_own(tmp_path: Path, tiny_run: Path) -> None:
-    """No traceback, no warning, exit 1: another study's folder, a damaged one, a file where a folder should be."""
+def test_mistakes_with_folders(
+    tiny_run: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No traceback, no warning, exit 1: another study's folder, a file where a folder should be."""
+    for arguments, remedy in (
+        (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
+        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
+    ):
+        status, _, err = mistaken(arguments, capfd, monkeypatch)
+        assert status == 1
+        assert re.fullmatch(r"error: [^\n]*\n", err), err
+        assert remedy in err
+
+
+def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, tiny_run: Path) -> None:
+    """No traceback, no warning, exit 1: a damaged folder."""
     damaged = tmp_path / "damaged"
     damaged.mkdir()
     (damaged / "study.toml").write_text("[[")
     (damaged / "provenance.json").write_text((tiny_run / "provenance.json").read_text())
-    for arguments, remedy in (
-        (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
-        (["study", "resume", damaged], "damaged"),
-        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
-    ):
-        result = shell(*arguments)
-        assert result.returncode == 1
-        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
-        assert remedy in result.stderr
+    result = shell("study", "resume", damaged)
+    assert result.returncode == 1
+    assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
+    assert "damaged" in result.stderr
 
 
 def test_wrong_usage_is_not_a_traceback() -> None:
@@ -123,8 +140,8 @@ def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Pat
     import shutil
 
     folder = shutil.copytree(tiny_run, tmp_path / "run")
-    quiet, loud = shell("study", "report", folder), shell("-v", "study", "report", folder)
-    assert (quiet.returncode, quiet.stderr) == (0, "")
+    quiet, loud = CliRunner().invoke(app, ["study", "report", str(folder)]), shell("-v", "study", "report", folder)
+    assert (quiet.exit_code, quiet.stderr) == (0, "")
     assert loud.returncode == 0
     assert f"shipid.study.contents: report written: {folder / 'report.html'}" in loud.stderr
     assert quiet.stdout == loud.stdout

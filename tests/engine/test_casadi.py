@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.engine.casadi import BLOCK, memory_along
+from shipid.engine.casadi import BLOCK, memory_along, orders_of
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
@@ -41,3 +41,17 @@ def test_one_row_has_the_state_of_its_order() -> None:
     states = memory_along(LAGGED, {name: np.full(1, 0.2) for name in dynamics(LAGGED).commands}, np.zeros(1))
     assert states is not None
     assert all(state.tolist() == [0.2] for state in states.values())
+
+
+def test_orders_of_many_samples_are_those_of_each() -> None:
+    """One sample, a block, one more than a block, and some blocks."""
+    model, rng = dynamics(LAGGED), np.random.default_rng(0)
+    values = np.array(list(LAGGED.parameters.values()))
+    names = ((*model.state, *model.hidden), model.memory, model.commands, model.environment)
+    inputs = [rng.uniform(0.1, 1.0, (len(each), 3 * BLOCK + 1)) for each in names]
+    for count in (1, BLOCK, BLOCK + 1, 3 * BLOCK + 1):
+        found = orders_of(model, *(part[:, :count] for part in inputs), values)
+        assert found.shape == (len(model.ordered), count)
+        for k in {0, count // 2, count - 1}:
+            alone = np.array(model.orders(*(part[:, k] for part in inputs), values)).ravel()
+            np.testing.assert_array_equal(found[:, k], alone)

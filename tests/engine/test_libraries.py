@@ -6,7 +6,9 @@ import logging
 import os
 import stat
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -52,14 +54,23 @@ def numbers(draw_inputs: Callable[..., Any]) -> Callable[..., np.ndarray]:
     return run
 
 
-def made(folder: Path, source: str = SOURCE) -> Path:
+def made(folder: Path) -> Path:
     """A library in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     library = folder / "model.so"
+    library.write_bytes(compiled())
+    return library
+
+
+@cache
+def compiled() -> bytes:
+    """The library of `SOURCE`, as `build` leaves it."""
     command = compiler()
     assert command is not None
-    assert build(native._command(command, Target(1, (), "")), source, library) is None
-    return library
+    with TemporaryDirectory() as folder:
+        library = Path(folder) / "model.so"
+        assert build(native._command(command, Target(1, (), "")), SOURCE, library) is None
+        return library.read_bytes()
 
 
 @pytest.mark.parametrize("kept", [0, 1, 100, 4096, 0.5, 0.9, -1, -33])

@@ -28,13 +28,25 @@ pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on thi
 SHIP = load_vessel("gunnerus-28.9")
 
 
+@pytest.fixture(scope="module")
+def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("libraries")
+
+
 @pytest.fixture(autouse=True)
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def no_other_cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A cache for these tests alone, so that a library is compiled once; `own_cache` is empty at first."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared_cache))
     monkeypatch.setattr(native, "_refused", [])
     native._library.cache_clear()
-    yield tmp_path / "cache" / "shipid"
+    yield
     native._library.cache_clear()
+
+
+@pytest.fixture
+def own_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:  # noqa: ARG001
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "shipid"
 
 
 @pytest.mark.parametrize("wanted", ["here", "one lane at a time"])
@@ -92,12 +104,14 @@ def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]
     assert len(list(own_cache.iterdir())) == 3
 
 
+@pytest.mark.usefixtures("own_cache")
 def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "compiler", lambda: None)
     with pytest.raises(ShipidError, match="install gcc, or use 'torch'"):
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
 
 
+@pytest.mark.usefixtures("own_cache")
 def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "target", lambda: replace(target(), flags=("-mno-such-processor",)))
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:

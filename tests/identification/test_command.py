@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from shipid.cli import identify as command
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
+from shipid.identification import outcome
 from shipid.vessel.load import load_vessel
 from tests.cli.running import said, shell
 from tests.identification.trials import trials
@@ -52,7 +54,9 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path) -> No
     assert found.name == f"{SHIP.name}, identified"
 
 
-def test_settings_of_a_file_give_way_to_options(file: Path) -> None:
+def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(command, "_look", lambda *_: None)
     Path("settings.toml").write_text(f'[identify]\nparameters = ["{ONE}"]\nhorizon = 30\nmethod = "euler"\n')
     said("identify", "gunnerus-28.9", file, "--settings", "settings.toml", "--horizon", 20, "--out", "a.toml")
     text = Path("a.toml").read_text()
@@ -127,7 +131,8 @@ def test_the_shell_sees_one_line_and_exit_status_1(tmp_path: Path) -> None:
 
 def test_ctrl_c_is_one_line_and_writes_nothing(file: Path) -> None:
     code = (
-        "import os, signal\nimport shipid.identification.outcome as outcome\nfrom shipid.cli import main\n"
+        "import os, signal\nimport shipid.identification.outcome as outcome\nfrom shipid.cli import identify, main\n"
+        "identify._look = lambda *_: None\n"
         "real = outcome.identify\n"
         "def pressed(*given, **more):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(*given, **more)\n"
         "outcome.identify = pressed\nmain()"

@@ -51,6 +51,12 @@ def settings(**more: object) -> Identify:
     return Identify(**{"parameters": FEW, "start": "base", "horizon": 0, "weights": NOISE, **more})
 
 
+@pytest.fixture
+def one_manoeuvre(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Vessels perform one manoeuvre, where the manoeuvres are not the point."""
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+
+
 @pytest.fixture(scope="module")
 def log() -> Dataset:
     return noisy(trials(SHIP, runs=5, steps=60))
@@ -181,6 +187,7 @@ def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
     assert np.isfinite(rows["u"][BEFORE])
 
 
+@pytest.mark.usefixtures("one_manoeuvre")
 def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> None:
     rng, drift = np.random.default_rng(1), np.zeros(len(log.frame))
     for i in range(1, len(drift)):
@@ -193,6 +200,7 @@ def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> N
     assert "no run was held out" in told
 
 
+@pytest.mark.usefixtures("one_manoeuvre")
 def test_what_was_dropped_has_no_interval_and_says_so(log: Dataset) -> None:
     extra = "hull.derivatives.X_uvv"  # true as it is
     own = run_identification(off(), log, settings(parameters=[*FEW, extra], drop=3.0))
@@ -236,6 +244,7 @@ def test_a_fit_that_fails_is_its_sentence(log: Dataset, monkeypatch: pytest.Monk
         run_identification(off(), log, settings())
 
 
+@pytest.mark.usefixtures("one_manoeuvre")
 def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     """Libraries turn an interrupt into complaints of their own; here it comes while they are at work."""
     real = outcome._measured

@@ -69,6 +69,23 @@ def test_no_approach_depends_on_its_company() -> None:
         assert {name: values[place] for name, values in together.items()} == {name: v[0] for name, v in alone.items()}
 
 
+def test_an_approach_is_that_of_the_vessel_whoever_asked_before() -> None:
+    """The same numbers give the same approach, other numbers another; nobody changes what the next one gets."""
+    how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
+    n, other = np.array([2.0]), SHIP.with_values({"hull.derivatives.X_u|u|": -4e3})
+    first = steady(Controls.of(SHIP), n, **how)  # type: ignore[arg-type]
+    kept = {name: values.copy() for name, values in first.state.items()}
+    for values in (*first.state.values(), *first.memory.values()):
+        values += 1.0
+    again = steady(Controls.of(load_vessel(SHIP.key)), n, **how).state  # type: ignore[arg-type]
+    for name, values in kept.items():
+        np.testing.assert_array_equal(again[name], values)
+    changed = steady(Controls.of(other), n, **how).state  # type: ignore[arg-type]
+    assert abs(changed["u"][0] - kept["u"][0]) > 0.01
+    held = steady(Controls.of(SHIP), n, held=True, **how)  # type: ignore[arg-type]
+    assert held.helm, "an approach of a helmsman is another one"
+
+
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60

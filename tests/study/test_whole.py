@@ -96,6 +96,14 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     return Finished(plan, folder / "run", store.read_rows(folder / "run"))
 
 
+@pytest.fixture(scope="module")
+def along(whole: Finished, tmp_path_factory: pytest.TempPathFactory) -> dict[str, pd.DataFrame]:
+    """What each cell predicts along the log of the study."""
+    out = tmp_path_factory.mktemp("along") / "paths.parquet"
+    log = whole.folder / store.DATASET
+    return {cell: predict_log(whole.folder, cell, log, None, out)[0] for cell in whole.rows["cell"]}
+
+
 def later_changed(dataset: Dataset, spared: tuple[str, ...] = ()) -> Dataset:
     """The dataset with every measured value and order after `NOW` replaced, in every run."""
     frame, rng = dataset.frame.copy(), np.random.default_rng(5)
@@ -183,13 +191,12 @@ def test_the_report_shows_every_cell(whole: Finished) -> None:
         assert name in page
 
 
-def test_along_a_log_predictions_are_those_of_the_study(whole: Finished, tmp_path: Path) -> None:
+def test_along_a_log_predictions_are_those_of_the_study(whole: Finished, along: dict[str, pd.DataFrame]) -> None:
     """Memory, observers and identified numbers: what `predict_log` writes is what the study judged."""
     results = read_results(whole.folder)
     test = results.test
     north, east, psi = (test.columns[name] for name in ("north", "east", "psi"))
-    for cell in whole.rows["cell"]:
-        frame, _ = predict_log(whole.folder, cell, whole.folder / store.DATASET, None, tmp_path / "paths.parquet")
+    for cell, frame in along.items():
         path = results.paths[cell]
         there_north, there_east = from_frame(path[..., 0], path[..., 1], north, east, psi)
         for step in range(test.horizon):
@@ -201,15 +208,12 @@ def test_along_a_log_predictions_are_those_of_the_study(whole: Finished, tmp_pat
 # Nothing looks ahead.
 
 
-def test_no_prediction_sees_a_later_row(whole: Finished, tmp_path: Path) -> None:
+def test_no_prediction_sees_a_later_row(whole: Finished, along: dict[str, pd.DataFrame], tmp_path: Path) -> None:
     """Every row after an instant replaced: no prediction up to that instant moves, and later ones do."""
     dataset = read_dataset(whole.folder / store.DATASET)
     file = write_dataset(later_changed(dataset), tmp_path / "changed.parquet")
-    for cell in whole.rows["cell"]:
-        one, other = (
-            predict_log(whole.folder, cell, log, None, tmp_path / "paths.parquet")[0]
-            for log in (whole.folder / store.DATASET, file)
-        )
+    for cell, one in along.items():
+        other = predict_log(whole.folder, cell, file, None, tmp_path / "paths.parquet")[0]
         known = one["t"] <= NOW
         assert known.sum() >= 4 * 5 * 10
         pd.testing.assert_frame_equal(one[known], other[known], rtol=0.0, atol=1e-12, obj=cell)

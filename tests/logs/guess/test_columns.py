@@ -229,7 +229,9 @@ RUNS = [
 ]
 
 
-@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize(
+    "run", [*RUNS[::3], *(pytest.param(run, marks=pytest.mark.slow) for run in RUNS if run not in RUNS[::3])]
+)
 def test_hsva(run: str, data_folder: Path) -> None:
     """The names of the publication are seen through, and the same columns found where there are no names at all."""
     log = data_folder / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat"
