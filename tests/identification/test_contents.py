@@ -1,4 +1,8 @@
+"""The page of an identification holds what was identified."""
+
 from pathlib import Path
+
+import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification.contents import identification_content
@@ -8,6 +12,7 @@ from shipid.simulation.measured import measure_standard
 from shipid.vessel.load import load_vessel
 
 
+@pytest.mark.slow
 def test_the_page_holds_what_was_identified():
     ship = load_vessel("gunnerus-28.9")
     frame = measure_standard(ship, "zigzag", (20.0, 10.0)).frame
