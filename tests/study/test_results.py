@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import read_dataset
 from shipid import figures
+from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames

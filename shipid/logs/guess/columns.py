@@ -111,7 +111,7 @@ def _others(state: State) -> None:
         speed, angle = min(pairs, key=_wind_order)
         kinds = {wind_kind(speed), wind_kind(angle)} - {""}
         kind = kinds.pop() if len(kinds) == 1 else ""
-        said = f"{kind} by the names" if kind else "the log does not show whether it is true or apparent"
+        said = f"the names say {kind}" if kind else "the log does not show whether it is true or apparent"
         state.suggest("V_w", speed, unit_said(speed, "m/s") or "m/s", 0.5, f"by its name; {said}")
         way = "from" if "towards" not in angle.lower() else "towards"
         custom = "" if "from" in parts_of(angle) or way == "towards" else ", as is usual at sea"
