@@ -82,6 +82,12 @@ def over_horizon(error: Array) -> dict[str, Array]:
     return {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1)}
 
 
+def over_horizon_by_axis(predicted: Array, true: Array) -> dict[str, Array]:
+    """Return the mean absolute error (T,) [m] at each step along x and across, along y, of paths (T, S, 2) [m] (11)."""
+    along, across = np.abs(predicted - true).mean(axis=1).T
+    return {"along": along, "across": across}
+
+
 def over_time(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     mean: Array = error.mean(axis=0)

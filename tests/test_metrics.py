@@ -54,6 +54,8 @@ def test_horizon_and_time_are_the_two_margins(paths):
     assert metrics.over_time(error).shape == (40,)
     assert horizon["mean"].mean() == pytest.approx(metrics.summary(error)["mean"])
     assert metrics.over_time(error).mean() == pytest.approx(metrics.summary(error)["mean"])
+    by_axis = metrics.over_horizon_by_axis(*paths)
+    assert (by_axis["along"].mean(), by_axis["across"].mean()) == pytest.approx(metrics.error_by_axis(*paths))
     assert horizon["p90"][4] == pytest.approx(np.sort(error[4])[35] * 0.9 + np.sort(error[4])[36] * 0.1)
 
 

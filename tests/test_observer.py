@@ -117,6 +117,7 @@ def estimated(name: str, made: Callable[[], World]) -> Estimates:
 WRONG = ["nominal", "moderate-3", "moderate-10", "high-4"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("known", [True, False])
 def test_in_waves_and_current_half_of_the_avoidable_error_goes(name: str, known: bool) -> None:
@@ -125,6 +126,7 @@ def test_in_waves_and_current_half_of_the_avoidable_error_goes(name: str, known:
     assert found["observer"] < found["alone"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("known", [True, False])
 def test_in_calm_water_it_costs_two_per_cent_at_most(name: str, known: bool) -> None:
@@ -132,6 +134,7 @@ def test_in_calm_water_it_costs_two_per_cent_at_most(name: str, known: bool) -> 
     assert found["observer"] <= 1.02 * found["alone"]
 
 
+@pytest.mark.slow
 def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     vessel = load_vessel("gunnerus-28.9")
     filters = bank(vessel)

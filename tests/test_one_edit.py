@@ -211,6 +211,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(readers.READERS, "toy", readers.Reader(readers.Format, read_toy, is_toy))
 
 
+@pytest.mark.slow
 def toy_mapping(folder: Path) -> Path:
     mapping = folder / "mapping.toml"
     mapping.write_text(PLAIN.read_text().replace("[clock]", '[format]\nkind = "toy"\n[clock]'))

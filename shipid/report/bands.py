@@ -208,10 +208,8 @@ def _lowest(frame: pd.DataFrame) -> str:
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
-    return (
-        f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}. The band for this "
-        "kind (`--kind`) holds its share."
-    )
+    said = f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}."
+    return f"{said} The band for this kind (--kind of shipid predict) holds its share." if worst.by == "kind" else said
 
 
 def worst(content: ReportContent) -> Table | None:
@@ -232,7 +230,8 @@ def worst(content: ReportContent) -> Table | None:
     ]
     mean = frame.groupby("run").coverage.mean()
     half = int((mean < 0.5).sum())
-    said = f"Mean over models, {counted(half, 'run')} of {len(mean)} has less than half of its paths in the bands."
+    have = "has less than half of its" if half == 1 else "have less than half of their"
+    said = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
     columns = ["test run", "manoeuvre", "model", "paths in the band", "greatest error over the band [1]"]
     return Table("coverage-runs", "Who pays", said, columns, [False, False, False, True, True], rows)
 

@@ -94,7 +94,8 @@ class ReportContent:
     trials : one row per trial of the search: cell, model, N_D, seed, number, state ("complete", "diverged",
         "stopped"), value [m^2] (NaN where diverged), epochs (0 in closed form), seconds, chosen (its network is in the
         compensator), and one float column per searched hyperparameter; yes or no is 1 or 0.
-    horizon : model, N_D, seed, source, ahead [s], mean, p90 [m].
+    horizon : model, N_D, seed, source, ahead [s], mean, p90 [m]; where known along, across [m], the mean absolute
+        error along x and y of the frame (11).
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
     commands : run, t [s], one column per command in the units used on board, in brackets: "port shaft [rpm]".
     snapshots : windows of the test runs.

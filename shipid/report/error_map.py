@@ -12,15 +12,16 @@ import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
 from shipid.report.contours import contour, length, nice_levels, smoothed
-from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Scale, apart, axis, label, layout, line
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import data_driven, families, trained
+from shipid.report.selection import data_driven, families, spread, trained
 from shipid.report.wording import counted, metres, number
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
 MARGIN = {"l": 52, "r": 12, "t": 12, "b": 44}
+NAMED, LINE = 84, 13  # margin that holds the names of rows, and the height of one [px]
 MOST_LINES = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
@@ -218,16 +219,30 @@ def _flat(
         hovertemplate="%{customdata}<extra></extra>",
     )
     lines, names = _isolines(pieces)
+    names += _row_names(rows, top)
     ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
     x = axis("manoeuvres, N_D [1]", tickvals=list(counts), range=ends, showgrid=False)
     up = axis("error of the physics alone, A [m]", range=[0, top], automargin=True, **_ticks(rows))
-    plot = layout(x, up, hovermode="closest", barmode="overlay", annotations=names, margin=MARGIN)
+    plot = layout(x, up, hovermode="closest", barmode="overlay", annotations=names, margin={**MARGIN, "r": NAMED})
     strips = rows[rows.A.isna()]
     if len(strips):
         edge = float(np.mean([rows.y[rows.A.notna()].max(), strips.y.min()]))
         rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
         plot["shapes"] = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}]
     return go.Figure([cells, hatched, failed, *lines], plot)
+
+
+def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
+    """Names of the models with an A, right of their cells; of more than have room, some at even distances."""
+    high = HEIGHT - MARGIN["t"] - MARGIN["b"]
+    known = rows[rows.A.notna()].reset_index(drop=True)
+    shown = [int(i) for i in spread([str(i) for i in known.index], int(known.y.max() / top * high / LINE))]
+    heights = apart(known.y[shown].tolist(), LINE / high * top, float(known.y.max()))
+    place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
+    return [
+        {**place, "y": height, "text": label(_shortened(name)), "font": {"size": 11, "color": INK}}
+        for height, name in zip(heights, known.model[shown], strict=True)
+    ]
 
 
 def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
@@ -262,8 +277,8 @@ def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[go.Scatter], lis
     for height, piece in pieces:
         if height not in longest or length(piece) > length(longest[height]):
             longest[height] = piece
-    for height, piece in longest.items():
-        x, y = piece[len(piece) // 2]
+    for place, (height, piece) in enumerate(longest.items(), start=1):  # names at different heights do not collide
+        x, y = piece[len(piece) * place // (len(longest) + 1)]
         names.append(
             {"x": float(x), "y": float(y), "text": f"{height:g} m", "showarrow": False}
             | {"font": {"size": 11, "color": INK}, "bgcolor": "var(--page)", "borderpad": 1}

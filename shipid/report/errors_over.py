@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import Floats, Indices, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, apart, axis, layout, line
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
@@ -23,6 +23,16 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
+STATISTICS = {  # option -> column of the frame, title of the axis
+    "mean": ("mean", "position error, mean"),
+    "90th percentile": ("p90", "position error, 90th percentile"),
+    "along (surge)": ("along", "error along, mean absolute"),
+    "across (sway)": ("across", "error across, mean absolute"),
+}
+BY_AXIS = (
+    " Along and across are the axes of the ship at the instant of prediction (11), the directions of surge and sway. "
+    "Predictors give positions, so no error of the heading is shown."
+)
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
 
@@ -31,12 +41,16 @@ def horizon(content: ReportContent) -> Figure | None:
     if content.horizon.empty:
         return None
     frame = _settled(content.horizon, content)
-    means = over_seeds(frame, [*BY, "ahead"], ["mean", "p90"])
-    counts, statistics = sizes(means.N_D), (("mean", "mean"), ("90th percentile", "p90"))
+    statistics = {word: given for word, given in STATISTICS.items() if given[0] in frame}
+    columns = [column for column, _ in statistics.values()]
+    means, counts = over_seeds(frame, [*BY, "ahead"], columns), sizes(frame.N_D)
+    groups = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])
+    seeds = {column: groups[column].agg(["min", "max", "size"]).reset_index() for column in columns}
     views = {}
-    for (i, (word, column)), (j, size) in itertools.product(enumerate(statistics), enumerate(counts)):
+    for (i, (column, title)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
         traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
-        y = axis(f"position error, {word} [m]", rangemode="tozero")
+        traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
+        y = axis(f"{title} [m]", rangemode="tozero")
         names = _names_at_the_end(traces, float(means[column].max()))
         reach = float(means.ahead.max())
         x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
@@ -47,12 +61,15 @@ def horizon(content: ReportContent) -> Figure | None:
         title="Error over the horizon",
         takeaway=_takeaway_horizon(content, means, counts[-1]),
         how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
-        "mean over seeds." + _drawn(content),
+        "mean over seeds."
+        + (" Pale bands reach from the least seed to the greatest." if (seeds["mean"]["size"] > 1).any() else "")
+        + (BY_AXIS if "along" in columns else "")
+        + _drawn(content),
         alternative="Lines of the position error that grow with the time ahead, one per model with and without "
         "compensation.",
         height=420,
         views=views,
-        controls=[Control("Position error", [word for word, _ in statistics]), _size_control(counts)],
+        controls=[Control("Position error", list(statistics)), _size_control(counts)],
         chips=model_chips(content, set(means.source)),
     )
 
@@ -143,16 +160,31 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
     return traces
 
 
+def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Scatter]:
+    """Areas from the least to the greatest seed at each time ahead, in the colours of the lines of their models."""
+    colours = {key: trace.line.color for trace in traces for key in trace.meta if "source:cooperative" in trace.meta}
+    bands = []
+    for name, mine in seeds[seeds["size"] > 1].groupby("model", sort=False):
+        ahead = mine["ahead"].to_numpy(dtype=float)
+        x, y = np.concatenate([ahead, ahead[::-1]]), np.concatenate([mine["max"], mine["min"].to_numpy()[::-1]])
+        colour = colours.get(f"model:{name}")
+        if colour is not None:
+            keys = ["source:cooperative", f"model:{name}"]
+            bands.append(line(f"{name}, seeds", x, y, keys, line={"width": 0}, fill="toself", fillcolor=colour))
+            bands[-1].update(opacity=0.18, hoverinfo="skip", hovertemplate=None)
+    return bands
+
+
 def _names_at_the_end(traces: Sequence[go.Scatter], most: float) -> list[dict[str, Any]]:
     """Names beside the ends of the compensated lines, moved apart where they would collide."""
     ends = sorted((float(t.y[-1]), float(t.x[-1]), t) for t in traces if t.mode == "lines+markers" and len(t.y))
-    notes, lowest = [], -math.inf
-    for height, place, trace in ends:
-        lowest = max(height, lowest + 0.055 * most)
+    heights = apart([height for height, _, _ in ends], 0.055 * most, math.inf)
+    notes = []
+    for height, (_, place, trace) in zip(heights, ends, strict=True):
         short = trace.name.removesuffix(", compensated")
         short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
         font = {"size": 11, "color": trace.line.color}
-        notes.append({"x": place, "y": lowest, "text": short, "xanchor": "left", "xshift": 8, "font": font})
+        notes.append({"x": place, "y": height, "text": short, "xanchor": "left", "xshift": 8, "font": font})
     return [{**note, "showarrow": False, "align": "left"} for note in notes]
 
 

@@ -42,7 +42,7 @@ def factors(content: ReportContent) -> Figure | None:
         height=ROW * len(names) + 70,
         views={"": [Panel(_strips(content, frame, names, groups))]},
         chips=[
-            Chip(f"group:{name}", name, category(i), "none", symbol=SYMBOLS[i % len(SYMBOLS)])
+            Chip(f"group:{name}", name.replace("_", " "), category(i), "none", symbol=SYMBOLS[i % len(SYMBOLS)])
             for i, name in enumerate(groups)
         ],
     )

@@ -122,6 +122,16 @@ def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str
     return layout(right, up, hovermode="closest", margin={"l": 60, "r": 12, "t": 12, "b": 44})
 
 
+def apart(places: Sequence[float], gap: float, most: float) -> list[float]:
+    """Move rising places at least `gap` apart and none beyond `most`, each as little as those before it allow."""
+    moved: list[float] = []
+    for place in places:
+        moved.append(max(place, moved[-1] + gap) if moved else place)
+    for i in reversed(range(len(moved))):
+        moved[i] = min(moved[i], most if i == len(moved) - 1 else moved[i + 1] - gap)
+    return moved
+
+
 def layout(x: dict[str, Any], y: dict[str, Any], **options: Any) -> dict[str, Any]:
     """Layout without background, legend or template: the page gives colours and the legend is text."""
     base = {

@@ -156,7 +156,9 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
         )
         trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
         traces.append(trace)
-    x = logarithmic("position error, H [m]", (1, 2, 3, 5))
+    errors = mine.H[mine.H > 0]
+    span = float(errors.max() / errors.min()) if len(errors) else 1.0
+    x = logarithmic("position error, H [m]", (1, 2, 3, 5) if span < 6 else (1, 2, 5) if span < 30 else (1,))
     return go.Figure(traces, layout(x, _methods_axis(order), hovermode="closest"))
 
 

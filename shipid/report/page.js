@@ -2,8 +2,33 @@
 (() => {
   const CONFIG = { responsive: true, displayModeBar: false, showTips: false, scrollZoom: false };
   const root = document.documentElement;
-  const redraws = [];
-  const json = (element) => JSON.parse(element.textContent || "null");
+  if (typeof DecompressionStream === "undefined") {
+    document.getElementById("too-old").hidden = false;
+    return;
+  }
+
+  // Plotly and the data of figures lie in the page compressed.
+  function bytesOf(base64) {
+    const text = atob(base64), bytes = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+    return bytes;
+  }
+
+  async function unpacked(element) {
+    return new Response(new Response(bytesOf(element.textContent)).body.pipeThrough(new DecompressionStream("deflate"))).text();
+  }
+
+  function once(make) {
+    let made = null;
+    return () => (made ??= make());
+  }
+
+  const json = async (element) => JSON.parse(await unpacked(element));
+  const plotly = once(async () => {
+    const script = document.createElement("script");
+    script.textContent = await unpacked(document.getElementById("plotly"));
+    document.head.append(script);
+  });
 
   // Figures name CSS variables instead of colours: one figure serves the light, the dark and the printed page.
   function painted(value, style) {
@@ -25,15 +50,29 @@
     const coarse = matchMedia("(pointer: coarse)").matches;
     layout.dragmode = coarse ? false : "zoom";
     layout.uirevision = view;
+    if (!plot.data) plot.replaceChildren(); // the sketch
     Plotly.react(plot, data, layout, CONFIG);
   }
 
   // Every figure can be taken away: as an image, or as the numbers of its lines.
+  const TYPES = { f4: Float32Array, f8: Float64Array, i1: Int8Array, i2: Int16Array, i4: Int32Array,
+                  u1: Uint8Array, u2: Uint16Array, u4: Uint32Array };
+
+  // What a trace holds: a list, or numbers written as bytes (single precision has seven digits).
+  function values(given) {
+    if (!given?.bdata) return [...(given || [])];
+    const list = [...new TYPES[given.dtype](bytesOf(given.bdata).buffer)];
+    return given.dtype === "f4" ? list.map((value) => (Number.isFinite(value) ? Number(value.toPrecision(7)) : "")) : list;
+  }
+
   function csv(plot) {
-    const rows = [["line", "x", "y", "shown"]];
+    const rows = [["line", "x", "y", "shown", "text"]];
+    const plain = (text) => String(text ?? "").replace(/<br>/g, "; ").replace(/<[^>]*>/g, "");
     for (const trace of plot.data) {
-      const x = [...(trace.x || [])], y = [...(trace.y || [])];
-      x.forEach((value, i) => rows.push([trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1]));
+      const x = values(trace.x), y = values(trace.y);
+      const words = [trace.customdata, trace.text].find(Array.isArray) || [];
+      x.forEach((value, i) => rows.push(
+        [trace.name || "", value ?? "", y[i] ?? "", trace.visible === false ? 0 : 1, plain(words[i])]));
     }
     const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replace(/"/g, '""')}"` : value);
     return rows.map((row) => row.map(cell).join(",")).join("\n") + "\n";
@@ -54,10 +93,22 @@
     });
   }
 
-  // Every figure: its hidden lines, its controls, and `redraw` which reads both.
-  function setUp(figure, redraw) {
+  // Every figure: its hidden lines, its controls, `load` which unpacks its data, and `redraw` which reads all of them.
+  const jobs = [];
+  function setUp(figure, load, redraw) {
     const hidden = new Set();
-    const update = () => redraw(hidden);
+    const job = { figure, drawn: false, data: null };
+    job.load = once(async () => {
+      const data = await load();
+      await plotly();
+      job.data = data;
+    });
+    job.draw = () => {
+      job.drawn = true;
+      watcher.unobserve(figure);
+      redraw(job.data, hidden);
+    };
+    const update = () => { if (job.drawn) job.draw(); };
     for (const chip of figure.querySelectorAll(".chips button")) {
       chip.addEventListener("click", () => {
         const shown = chip.getAttribute("aria-pressed") === "true";
@@ -69,29 +120,40 @@
     }
     for (const control of figure.querySelectorAll(".control")) control.addEventListener("input", update);
     for (const button of figure.querySelectorAll(".save button")) {
-      button.addEventListener("click", () => save(figure, button.dataset.kind));
+      button.addEventListener("click", () => { if (job.drawn) save(figure, button.dataset.kind); });
     }
-    whenSeen(figure, update);
+    jobs.push(job);
+    watcher.observe(figure);
   }
 
   // A figure is drawn when it comes near the window, so that the first is there at once.
-  const waiting = new Map();
+  const near = new Set();
   const watcher = new IntersectionObserver((entries) => {
-    for (const entry of entries) if (entry.isIntersecting) drawNow(entry.target);
+    for (const { target, isIntersecting } of entries) {
+      if (isIntersecting) near.add(target);
+      else near.delete(target);
+    }
+    drawNear();
   }, { rootMargin: "600px" });
 
-  function drawNow(figure) {
-    const update = waiting.get(figure);
-    if (!update) return;
-    waiting.delete(figure);
-    watcher.unobserve(figure);
-    redraws.push(update);
-    update();
-  }
+  const pause = () => new Promise((resolve) => setTimeout(resolve));
+  const idle = () => new Promise((resolve) => (window.requestIdleCallback || setTimeout)(resolve));
 
-  function whenSeen(figure, update) {
-    waiting.set(figure, update);
-    watcher.observe(figure);
+  // One figure at a time, those in the window first: a long page answers to the reader in between.
+  let drawing = false;
+  async function drawNear() {
+    if (drawing) return;
+    drawing = true;
+    const inside = ({ figure }) => figure.getBoundingClientRect().top < innerHeight;
+    for (;;) {
+      const waiting = jobs.filter((job) => !job.drawn && near.has(job.figure));
+      const job = waiting.find(inside) || waiting[0];
+      if (!job) break;
+      await job.load();
+      if (!job.drawn) job.draw();
+      await pause();
+    }
+    drawing = false;
   }
 
   const chosen = (figure) =>
@@ -101,16 +163,16 @@
   // --- figures whose views were made beforehand
   for (const script of document.querySelectorAll("script.views")) {
     const figure = script.closest("figure");
-    const views = json(script);
     const plots = figure.querySelectorAll(".plot");
-    setUp(figure, (hidden) => {
+    setUp(figure, () => json(script), (views, hidden) => {
       const key = chosen(figure).join("-");
       views[key].forEach((spec, i) => draw(plots[i], spec, hidden, key));
     });
   }
 
   // --- windows: true path, ship outline at start and end, predicted paths
-  const windows = json(document.getElementById("windows"));
+  let windows = null;
+  const loadWindows = once(async () => { windows = await json(document.getElementById("windows")); });
 
   function outlineAt(x, y, psi) {
     const [ahead, aside] = windows.outline;
@@ -162,9 +224,12 @@
 
   for (const script of document.querySelectorAll("script.fixed")) {
     const figure = script.closest("figure");
-    const fixed = json(script);
     const panels = figure.querySelectorAll(".panel");
-    setUp(figure, (hidden) => fixed.forEach((panel, i) => {
+    const load = async () => {
+      await loadWindows();
+      return json(script);
+    };
+    setUp(figure, load, (fixed, hidden) => fixed.forEach((panel, i) => {
       const shot = windows.runs[panel.run][panel.instant];
       drawWindow(panels[i].querySelector(".plot"), shot, panel.size, hidden, "fixed", panel);
       showWind(panels[i].querySelector(".wind"), shot.wind);
@@ -176,7 +241,7 @@
     const slider = browser.querySelector("input[type=range]");
     const list = browser.querySelector(".errors");
     let last = -1;
-    setUp(browser, (hidden) => {
+    setUp(browser, loadWindows, (_, hidden) => {
       const [run, size] = chosen(browser);
       const shots = windows.runs[run];
       slider.max = shots.length - 1;
@@ -221,13 +286,22 @@
     }));
   }
 
-  const repaint = () => redraws.forEach((redraw) => redraw());
+  const repaint = () => jobs.forEach((job) => { if (job.drawn) job.draw(); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   addEventListener("beforeprint", () => {
     root.dataset.theme = "light";
-    for (const figure of [...waiting.keys()]) drawNow(figure);
+    for (const job of jobs) job.drawn ||= job.data !== null;
     for (const details of document.querySelectorAll("details")) details.open = true;
     repaint();
   });
   addEventListener("afterprint", () => { delete root.dataset.theme; repaint(); });
+
+  // Printing cannot wait: what the reader has not come to yet is unpacked in idle time.
+  async function loadAll() {
+    for (const job of jobs) {
+      await idle();
+      await job.load();
+    }
+  }
+  addEventListener("load", loadAll);
 })();

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +22,7 @@ from shipid.report.figure import Figure
 from shipid.report.glossary import glossed
 from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
 from shipid.report.sections import SECTIONS
+from shipid.report.sketch import sketch
 from shipid.report.wording import bound, number
 
 
@@ -91,17 +95,18 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
         sections=parts,
         anchors=anchors,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
-        views={item.id: _embedded(_views(item)) for item in _figures(parts)},
+        views={item.id: packed(_json(_views(item))) for item in _figures(parts)},
         fixed={
-            item.id: _embedded(paths.fixed_data(item.windows, windows))
+            item.id: packed(_json(paths.fixed_data(item.windows, windows)))
             for item in _figures(parts)
             if item.windows and windows
         },
-        windows=_embedded(windows) if windows else "",
+        sketches=_first_sketch(_figures(parts)),
+        windows=packed(_json(windows)) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=Markup(_resource("vendor/plotly-cartesian.min.js")),
+        plotly=_plotly(),
     )
 
 
@@ -139,10 +144,30 @@ def _views(figure: Figure) -> dict[str, Any]:
     }
 
 
-def _embedded(data: Any) -> Markup:
-    """JSON inside a script element: no character in it can end the element or start a tag."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:
+    """Sketch of the first figure, by its id; nothing where it has several panels or cannot be sketched."""
+    for figure in figures[:1]:
+        panels = figure.views.get("-".join(str(control.start) for control in figure.controls), ())
+        if len(panels) == 1:
+            return {figure.id: sketch(panels[0].figure, figure.height)}
+    return {}
+
+
+def packed(text: str) -> Markup:
+    """Compress a text (zlib, base64) for a script element: no character in it can end the element or start a tag."""
+    return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
+
+
+def _json(data: Any) -> str:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+@cache
+def _plotly() -> dict[str, Markup]:
+    """Plotly, packed, and the notice of its authors and licence, which a reader of the file is to see."""
+    script = _resource("vendor/plotly-cartesian.min.js")
+    notice = script[script.index("/**") + 3 : script.index("*/")]
+    return {"script": packed(script), "notice": Markup(notice.replace("--", "-").strip())}
 
 
 def _resource(name: str) -> str:

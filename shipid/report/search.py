@@ -15,7 +15,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import sizes
 from shipid.report.tables import Cell, Table, duration, figure, text
-from shipid.report.wording import counted, number
+from shipid.report.wording import counted, number, short
 
 MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
@@ -204,7 +204,7 @@ def _tried(frame: pd.DataFrame, names: list[str]) -> str:
     said = []
     for name in names:
         low, high = float(frame[name].min()), float(frame[name].max())
-        said.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{low:.2g} to {high:.2g}'}")
+        said.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{short(low)} to {short(high)}'}")
     return f"Tried: {', '.join(said)}." if said else ""
 
 
@@ -238,7 +238,7 @@ def _choice(chosen: pd.Series[float], share: bool) -> Cell:
     if share:
         return figure(values.mean(), 2)
     low, middle, high = (float(value) for value in values.quantile([0.0, 0.5, 1.0]))
-    return Cell(" / ".join(f"{value:.2g}" for value in (low, middle, high)), middle)
+    return Cell(" / ".join(short(value) for value in (low, middle, high)), middle)
 
 
 SECTION = Section(

@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Sequence
 
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 def number(value: float) -> str:
     """Three digits, two decimals at most: 0.83, 12.4, 131; NaN is a dash."""
@@ -13,6 +15,27 @@ def number(value: float) -> str:
         return "–"
     decimals = 2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0
     return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def short(value: float) -> str:
+    """Two digits, never with an exponent between 1e-6 and 1e6: 13, 0.51, 0.00001."""
+    if not math.isfinite(value) or value == 0:
+        return "0" if value == 0 else "–"
+    size = math.floor(math.log10(abs(value)))
+    if not -6 <= size < 6:
+        return f"{value:.1e}".replace("-", "−")
+    rounded = round(value, 1 - size)
+    return (f"{rounded:.{max(0, 1 - size)}f}".rstrip("0").rstrip(".") if size < 1 else f"{rounded:.0f}").replace(
+        "-", "−"
+    )
+
+
+def scientific(value: float, digits: int = 4) -> str:
+    """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵."""
+    text = f"{value:.{digits}g}".replace("-", "−")
+    front, _, power = text.partition("e")
+    raised = str(int(power.replace("−", "-"))) if power else ""
+    return f"{front} × 10{raised.translate(RAISED)}" if raised else text
 
 
 def metres(value: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -99,6 +100,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     kind = np.array([kinds.get(str(run), "other") for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
+    decimals = max(0, 1 - math.floor(math.log10(max(float(edges[-1]), 1e-3))))  # two digits of the greatest speed
     part = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, SPEEDS - 1)
     for row, region, errors in regions(results, level):
         if row["N_D"] != largest or row["seed"] != seed:
@@ -118,7 +120,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
         for place in range(SPEEDS):
             chosen = part == place
             if chosen.any():
-                label = f"{edges[place]:.2g} to {edges[place + 1]:.2g} m/s"
+                label = f"{edges[place]:.{decimals}f} to {edges[place + 1]:.{decimals}f} m/s"
                 add("speed", label, chosen, held[chosen], float(radius[chosen].mean()))
         reach, every = region.reach(errors) <= 1, np.ones(len(test), dtype=bool)
         for step in np.unique(np.linspace(0, test.horizon - 1, 5).round().astype(int)):

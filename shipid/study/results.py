@@ -18,7 +18,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json
 from shipid.hybrid.bands import Bands, Region
-from shipid.metrics import error_by_axis, over_horizon, over_time, position_error, summary
+from shipid.metrics import error_by_axis, over_horizon, over_horizon_by_axis, over_time, position_error, summary
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor
@@ -195,15 +195,17 @@ def _shown_cells(results: Results) -> list[dict[str, Any]]:
 
 
 def horizon_frame(results: Results) -> pd.DataFrame:
-    """Mean and 90th percentile error [m] per step ahead [s], of physics, cooperative models and the naive floor."""
-    ahead = results.test.step * np.arange(1, results.test.horizon + 1)
-    parts = [_horizon(results.naive, ahead, "naive", 0, 0, "naive")]
+    """Mean and 90th percentile error, mean error along x and across [m], per step ahead [s].
+
+    Of physics, cooperative models and the naive floor; x and y are those of the frame (11).
+    """
+    parts = [_horizon(results, constant_motion(results.test), "naive", 0, 0, "naive")]
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
-            parts.append(_horizon(position_error(path, results.test.future), ahead, model, 0, 0, "physics"))
+            parts.append(_horizon(results, path, model, 0, 0, "physics"))
     for row in _shown_cells(results):
-        error = position_error(results.paths[row["cell"]], results.test.future)
-        parts.append(_horizon(error, ahead, row["model"], row["N_D"], row["seed"], "cooperative"))
+        path = results.paths[row["cell"]]
+        parts.append(_horizon(results, path, row["model"], row["N_D"], row["seed"], "cooperative"))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -236,9 +238,12 @@ def kinds_frame(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
-def _horizon(error: np.ndarray, ahead: np.ndarray, model: str, N_D: int, seed: int, source: str) -> pd.DataFrame:
-    keys = {"model": model, "N_D": N_D, "seed": seed, "source": source, "ahead": ahead}
-    return pd.DataFrame({**keys, **over_horizon(error)})
+def _horizon(results: Results, path: np.ndarray, model: str, N_D: int, seed: int, source: str) -> pd.DataFrame:
+    true, test = results.test.future, results.test
+    keys = {"model": model, "N_D": N_D, "seed": seed, "source": source}
+    ahead = test.step * np.arange(1, test.horizon + 1)
+    errors = {**over_horizon(position_error(path, true)), **over_horizon_by_axis(path, true)}
+    return pd.DataFrame({**keys, "ahead": ahead, **errors})
 
 
 def shown_runs(results: Results) -> list[str]:

@@ -32,6 +32,7 @@ def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_lists_and_one_vessel() -> None:
     assert [row["name"] for row in answered("vessel", "list")["vessels"]] == list(bundled("models"))
     assert [row["name"] for row in answered("study", "list")["studies"]] == list(bundled("studies"))
@@ -53,6 +54,7 @@ def test_a_draft_and_a_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(pd.read_csv("z.csv")) == len(done["measures"])
 
 
+@pytest.mark.slow
 def test_studies(study: Path, tiny_run: Path) -> None:
     rows = answered("study", "variants", study)["foundations"]
     known = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")["A"]

@@ -128,6 +128,7 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, tiny_run: Path) -> No
     assert "damaged" in result.stderr
 
 
+@pytest.mark.slow
 def test_wrong_usage_is_not_a_traceback() -> None:
     for arguments in (["study", "run"], ["nonsense"], ["study", "run", "quick", "--workers", "0"]):
         result = CliRunner().invoke(app, arguments)

@@ -71,6 +71,7 @@ def test_stretches_between_breaks_are_judged_alone() -> None:
     assert failed(turned) == set()
 
 
+@pytest.mark.slow
 def noisy(seed: int) -> pd.DataFrame:
     """A run in good order with the noise of drawn sensors: a ship that weaves or turns."""
     random = np.random.default_rng(seed)

@@ -43,6 +43,7 @@ def random_motion(random: np.random.Generator, t: np.ndarray, given: Noise) -> n
     return states
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("logged", [("north", "east", "psi"), ("north", "east", "psi", "r"), STATES])
 def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
     """NEES of (u, v, r) is chi-square (Bar-Shalom et al. 2001, 5.4.2): its mean over 120 motions lies in the band."""

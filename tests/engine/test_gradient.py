@@ -48,6 +48,7 @@ def inputs(vessel: Vessel, draw_inputs: Draw, method: Method) -> tuple[Any, dict
     return given, {"step": 0.5, "num_steps": STEPS, "method": method, "tau_extra": PUSH[..., :num_dof]}
 
 
+@pytest.mark.slow
 def close(found: Array, exact: Array, tolerance: float) -> None:
     np.testing.assert_allclose(found, exact, rtol=tolerance, atol=tolerance * max(np.abs(exact).max(), 1e-300))
 

@@ -121,6 +121,7 @@ def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.
         load(library)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "open to others", "folder"])
 def test_a_rollout_mends_the_cache(
     damage: str, own_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture

@@ -68,6 +68,7 @@ def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> Non
     assert to_starboard * found["psi"][-1, 0, 0] > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bundled_vessel", OF_LAWS, indirect=True)
 def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
     """From anywhere in the envelope with u >= 0, shafts stopped, no wind: no start gains, all fade within 10 minutes.

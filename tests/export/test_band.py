@@ -41,6 +41,7 @@ def expected(predictor, instants, path, level, pointwise, kind):
         return None
 
 
+@pytest.mark.slow
 def agrees(predictor, instants, folder):
     """Half axes and directions of C are those of Python for every level; how many bands there were."""
     exported, count = model(predictor), 0

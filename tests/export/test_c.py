@@ -230,6 +230,7 @@ def test_every_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
     run_example(vessel_files(variety()[name], "ship", "rk4", Precision()), tmp_path / "example", *SANITIZERS)
 
 
+@pytest.mark.slow
 def _steps(vessel, folder, draw_inputs):
     """Sixty seconds in steps of a tenth, with loads, from drawn states."""
     equations, slow = Equations(vessel), pace(vessel)

@@ -3,11 +3,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from shipid.hybrid.calibrator import Calibrator, TrajectoryInputs
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
 
+@pytest.mark.slow
 def of_the_way(world_, windows):
     """An error of the path that depends on where the physics says the ship will be, and how fast she will turn."""
     states = world_.physics.states(windows.instants(known=world_.known))

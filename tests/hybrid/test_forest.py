@@ -10,6 +10,7 @@ from shipid.hybrid.forest import Forest, Trees
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
 
+@pytest.mark.slow
 def stairs(columns):
     """An error of the path that jumps with the order and with the speed: what a smooth network cannot follow."""
     t = np.arange(1, HORIZON + 1)[:, None] / HORIZON

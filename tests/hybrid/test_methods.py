@@ -96,6 +96,7 @@ def test_arrays_that_are_missing_are_refused(kind, here):
             type(corrector).from_arrays(corrector.header(), {k: v for k, v in arrays.items() if k != gone})
 
 
+@pytest.mark.slow
 @EVERY
 def test_a_foundation_does_not_notice_its_company(kind, here):
     together = quick(kind).fit(here.task(others(here, kind)))

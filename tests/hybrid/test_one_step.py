@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from shipid.hybrid.one_step import OneStep
 from tests.hybrid.worlds import fitted, ship, world
 
 
+@pytest.mark.slow
 def missing(nus, told):
     """A force of state and commands that no coefficient of the physics can stand for."""
     u, v, r = nus[-1].T

@@ -54,6 +54,7 @@ def task(dataset: Dataset, foundations: dict[str, Physics], future: Array | None
     return Task(cases, windows, folds, tuple(dataset.commands), seed=seed, estimates=estimates)
 
 
+@pytest.mark.slow
 @pytest.fixture(scope="module")
 def dataset() -> Dataset:
     """Runs in wind that the physics of no foundation explains."""

@@ -84,6 +84,7 @@ def test_a_factor_that_is_pushed_ends_at_its_bound() -> None:
     assert np.abs(slope[1:]).max() < 1e-3 * slope[0]
 
 
+@pytest.mark.slow
 def test_it_ends_where_whoever_looks_on_asks() -> None:
     own, begin = problem(), np.array([1.5, 0.5, 1.5])
     found = search(own, begin, origin(own), progress=lambda iteration, _: iteration == 4, before=3)

@@ -75,6 +75,7 @@ def test_a_derivative_that_the_base_lacks_needs_a_scale() -> None:
     assert found.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "actuators", "six"])
 def test_every_structure_is_found(name: str) -> None:
     """Its greatest forces: the first three hull parameters that data see best."""

@@ -29,6 +29,8 @@ from tests.identification.kvlcc2 import (
     windows,
 )
 
+pytestmark = pytest.mark.slow
+
 RATE = 15.8 * DEGREE  # rad/s, of the tank's steering gear (SIMMAN 2008)
 
 

@@ -17,6 +17,7 @@ DATA = trials(SHIP, runs=4)
 SETTINGS = Identify(parameters=["hull.derivatives.*"], horizon=0, weights={"u": 1e-2, "v": 1e-2, "r": 1e-3})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 5])
 def test_growing_horizons_end_near_the_truth(seed: int) -> None:
     problem = build(SHIP, DATA, DATA.runs, SETTINGS)

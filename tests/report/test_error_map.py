@@ -86,9 +86,18 @@ def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
     assert "high-2 at N_D = 10 (diverged)" in error_map(failing).how
 
 
+def test_every_row_with_an_A_has_its_name_and_no_name_covers_another(simulation):
+    figure, rows = flat(simulation), simulation.models[simulation.models.A.notna()]
+    names = [note for note in figure.layout.annotations if note.xref == "paper"]
+    assert {note.text for note in names} == set(rows.model)
+    top, high = figure.layout.yaxis.range[1], 580 - figure.layout.margin.t - figure.layout.margin.b
+    heights = sorted(note.y * high / top for note in names)  # px
+    assert min(b - a for a, b in itertools.pairwise(heights)) >= 12.99
+
+
 def test_lines_carry_their_level_in_metres(simulation):
     figure = flat(simulation)
-    texts = [note.text for note in figure.layout.annotations]
+    texts = [note.text for note in figure.layout.annotations if note.xref != "paper"]
     assert texts
     assert all(re.fullmatch(r"[\d.]+ m", text) for text in texts)
     assert len(set(texts)) == len(texts)

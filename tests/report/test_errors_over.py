@@ -48,6 +48,24 @@ def test_seeds_become_their_mean(full_scale):
     assert after[name].y[-1] == pytest.approx(2 * before[name].y[-1])
 
 
+def test_errors_by_axis_where_they_are_known_and_seeds_as_bands(full_scale):
+    one = full_scale.horizon
+    assert len(horizon(full_scale).controls[0].options) == 2
+    known = one.assign(along=0.8 * one["mean"], across=0.5 * one["mean"])
+    both = pd.concat([known, known.assign(seed=1, mean=3 * known["mean"], across=2 * known["across"])])
+    figure = horizon(replace(full_scale, horizon=both))
+    assert figure.controls[0].options[2:] == ["along (surge)", "across (sway)"]
+    assert "no error of the heading" in figure.how
+    name = "inaccurate, compensated"
+    mean, across = (lines(figure, f"{i}-0")[name].y[-1] for i in (0, 3))
+    assert across == pytest.approx(mean * 0.5 * 1.5 / 2)
+    drawn = lines(figure, "0-0")
+    bands = {key for key in drawn if key.endswith(", seeds")}
+    assert len(bands) == sum(key.endswith(", compensated") or key == "no model" for key in drawn)
+    assert max(drawn["inaccurate, seeds"].y) == pytest.approx(1.5 * mean)
+    assert not [key for key in lines(horizon(replace(full_scale, horizon=known)), "0-0") if key.endswith(", seeds")]
+
+
 def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     figure = horizon(simulation)
     assert (

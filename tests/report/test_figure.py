@@ -1,6 +1,11 @@
-import numpy as np
+import itertools
 
-from shipid.report.figure import axis, label, layout, line, logarithmic, plane
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipid.report.figure import apart, axis, label, layout, line, logarithmic, plane
 
 
 def test_names_of_the_user_are_text_for_plotly():
@@ -33,3 +38,12 @@ def test_options_override_the_layout():
     assert made["hovermode"] == "closest"
     assert made["margin"] == {"t": 1}
     assert made["xaxis"]["title"]["text"] == "a [1]"
+
+
+@given(st.lists(st.floats(0, 100), max_size=20).map(sorted), st.floats(0.1, 5))
+def test_names_moved_apart_keep_their_order_and_their_distance(places, gap):
+    moved = apart(places, gap, 100.0)
+    assert all(b - a >= gap - 1e-9 for a, b in itertools.pairwise(moved))
+    assert all(place <= 100.0 + 1e-9 for place in moved)
+    if all(b - a >= gap for a, b in itertools.pairwise(places)):
+        assert moved == pytest.approx(places)

@@ -1,7 +1,9 @@
+import base64
 import hashlib
 import itertools
 import json
 import re
+import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -49,6 +51,10 @@ class Page(HTMLParser):
         return [(attributes, "".join(text)) for tag, attributes, text in self.elements if tag in tags]
 
 
+def unpacked(data: str) -> str:
+    return zlib.decompress(base64.b64decode(data, validate=True)).decode()
+
+
 @pytest.fixture(scope="module")
 def pages(simulation, full_scale):
     return {
@@ -70,8 +76,11 @@ def page(request, pages):
 
 def test_one_plotly_and_a_file_that_fits_a_mail(page):
     _, text, parsed = page
-    assert text.count("* plotly.js (cartesian - minified) v") == 1
-    assert len(text.encode()) < 4_000_000
+    assert text.count("* plotly.js (cartesian - minified) v") == 1, "its notice is there to read"
+    assert "Licensed under the MIT license" in text
+    (script,) = (data for a, data in parsed.all("script") if a.get("id") == "plotly")
+    assert unpacked(script) == files("shipid.report").joinpath("vendor/plotly-cartesian.min.js").read_text("utf-8")
+    assert len(text.encode()) < 2_000_000
     assert not parsed.open, "every element is closed"
 
 
@@ -107,10 +116,11 @@ def test_names_of_the_user_stay_text(page, simulation, simulation_drawn, full_sc
     # A name that became an element would be one script more.
     with_views = [s for s in sections for i in s.items if isinstance(i, Figure) and (i.views or i.windows)]
     assert len(parsed.all("script")) == len(with_views) + 3
-    for attributes, data in parsed.all("script"):
-        if attributes.get("type") == "application/json":
-            json.loads(data)
-            assert "<" not in data
+    packed = [(a, data) for a, data in parsed.all("script") if a.get("type") == "text/plain"]
+    assert len(packed) == len(with_views) + 2, "all but the script of the page"
+    for attributes, data in packed:
+        if attributes.get("id") != "plotly":
+            json.loads(unpacked(data))
 
 
 def test_every_model_run_and_finding_is_named(page):
@@ -183,6 +193,21 @@ def test_every_figure_speaks(sections):
             if isinstance(item, Figure):
                 assert re.search(r"\d.*\.$", item.takeaway), item.id
                 assert re.fullmatch(r"(\S+ )+\S+\.", item.how), item.id
+
+
+@pytest.mark.slow
+def test_numbers_are_written_for_people(page):
+    """No exponent, no not-a-number, no more digits than mean something, no name of a column, no mark of markdown."""
+    content, _, parsed = page
+    prose = [text for _, text in parsed.all("p", "figcaption", "th", "button", "h3", "option", "legend")]
+    prose += [text for a, text in parsed.all("td") if a.get("class") == "numeric"]
+    prose += [str(a[key]) for _, a, _ in parsed.elements for key in ("aria-label", "title") if a.get(key)]
+    assert len(prose) > 100
+    strange = re.compile(
+        r"\d[eE][+-]?\d|\b(nan|inf|None)\b|\+-|\d\.\d{6,}|`|\b\d+\.\d+ \d+(\.\d+)?\b|\b[a-z]{2,}_[a-z]{2,}"
+    )
+    given = {content.command, *content.cells.hyperparameters, *content.cells.sentence}
+    assert [text for text in prose if strange.search(text) and not any(one and one in text for one in given)] == []
 
 
 def test_axes_have_units(sections):
@@ -258,8 +283,8 @@ def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
     assert any("The tide rises by 1.25\u00a0m." in text for _, text in page.all("p"))
     hrefs = [a["href"] for a, _ in page.all("a")]
     assert {"#tides", "#tide"} <= set(hrefs)
-    views = next(json.loads(text) for a, text in page.all("script") if '"tide"' in text and a.get("class") == "views")
-    assert list(views) == [""]
+    views = [unpacked(text) for a, text in page.all("script") if a.get("class") == "views"]
+    assert [list(json.loads(text)) for text in views if '"tide"' in text] == [[""]]
 
     without = Page(render(linked))  # nothing of what it needs
     assert not {"tides", "tide"} & {attributes.get("id") for _, attributes, _ in without.elements}

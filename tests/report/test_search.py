@@ -7,6 +7,7 @@ import pytest
 
 from shipid.report.search import CEILING, FAILED, importance, searched, table
 from shipid.report.search import search as drawn_anew
+from shipid.report.wording import short
 
 search = lru_cache(maxsize=2)(drawn_anew)  # the same content is drawn once
 
@@ -82,7 +83,7 @@ def test_the_table_sums_up_by_size(simulation):
     assert rows[30]["diverged [1]"].key == mine.state.eq("diverged").sum()
     assert rows[30]["time per cell [s]"].key == pytest.approx(mine.seconds.sum() / 14)
     chosen = mine.units[mine.chosen]
-    assert rows[30]["chosen units [1]"].text == f"{chosen.min():.2g} / {chosen.median():.2g} / {chosen.max():.2g}"
+    assert rows[30]["chosen units [1]"].text == " / ".join(map(short, (chosen.min(), chosen.median(), chosen.max())))
 
 
 def test_a_search_in_closed_form_says_what_there_was(simulation):

@@ -1,6 +1,6 @@
 import math
 
-from shipid.report.wording import bound, counted, distance, listed, metres, number
+from shipid.report.wording import bound, counted, distance, listed, metres, number, scientific, short
 
 
 def test_three_digits():
@@ -17,6 +17,21 @@ def test_three_digits():
     assert metres(0.5) == "0.50 m"
     assert distance(963.2) == "963 m"
     assert distance(1240) == "1.2 km"
+
+
+def test_two_digits_without_an_exponent():
+    assert [short(x) for x in (1e-5, 0.514, 3.82, 13.2, 131.0, 0.0, -0.0042, 9.96)] == [
+        "0.00001",
+        "0.51",
+        "3.8",
+        "13",
+        "130",
+        "0",
+        "−0.0042",
+        "10",
+    ]
+    assert short(math.inf) == "–"
+    assert [scientific(x) for x in (803.0, -187500.0, 1.5e-7)] == ["803", "−1.875 × 10⁵", "1.5 × 10⁻⁷"]
 
 
 def test_lists():

@@ -147,6 +147,7 @@ def test_performing_twice_is_the_same() -> None:
     pd.testing.assert_frame_equal(perform(SHIP, chosen, step=0.1), perform(SHIP, chosen, step=0.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
 def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
     """CasADi sample by sample, PyTorch as a batch: the same numbers."""

@@ -245,6 +245,7 @@ def test_equations_at_rest_are_the_linear_ship_of_the_document(name: str) -> Non
         np.testing.assert_allclose(np.stack([found[key] for key in names], axis=-1), expected, rtol=1e-7, atol=1e-12)
 
 
+@pytest.mark.slow
 @BOTH
 def test_standard_deviations_in_irregular_waves(name: str) -> None:
     """Heave, roll, pitch, surge, sway, yaw held, U = 0: within 5 % of the spectral integral on five headings."""

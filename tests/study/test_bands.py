@@ -137,6 +137,7 @@ def test_predict_writes_the_band(folder: Path, tmp_path: Path, results: Results)
         CliRunner().invoke(app, [*asked[:-1], "0.99"], catch_exceptions=False)
 
 
+@pytest.mark.slow
 def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     """A miss at instant 0 whose path ends at 5 s widens the band from 5 s on, not before."""
     now, table = np.arange(12.0), -np.log1p(-LEVELS)

@@ -37,6 +37,7 @@ def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
     return frame[frame.method.eq(method) & frame.family.eq(family)].iloc[0]
 
 
+@pytest.mark.slow
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
     found = compared(made, "drawn")

@@ -297,6 +297,7 @@ def test_the_command_writes_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert Path("log-study.toml").read_text() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mapping", "log", "vessel", "path", "tests"),
     [

@@ -16,6 +16,8 @@ from shipid.study.plan import Plan, read_plan
 from shipid.study.results import read_cells, read_results
 from tests.study.tiny import events_here, run_here, tiny_plan
 
+pytestmark = pytest.mark.slow
+
 METHODS = [
     {"name": "drawn", "kind": "path-drawn", "trials": 2, "terms": 4, "units": 8, "averaged": 1},
     {"name": "step", "kind": "one-step", "trials": 1, "units": 4, "averaged": 1, "families": ["right", "none"]},

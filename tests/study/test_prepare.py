@@ -385,6 +385,7 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
             assert (row["min"], row["mean"], row["max"]) == pytest.approx((values.min(), values.mean(), values.max()))
 
 
+@pytest.mark.slow
 def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
     found = limits_of(prepared.pool, prepared.commands)

@@ -34,6 +34,11 @@ def test_errors_over_the_horizon_average_to_A_and_H(read: Results) -> None:
             assert mean[row.model, "physics", 0] == pytest.approx(row.A)
     assert mean["naive", "naive", 0] == pytest.approx(frames.naive_summary(read)["mean"])
     assert ("none", "physics", 0) not in mean
+    assert (frame["mean"] <= frame["along"] + frame["across"] + 1e-9).all(), "a hypotenuse is no longer than both legs"
+    assert (frame["mean"] >= np.maximum(frame["along"], frame["across"]) - 1e-9).all()
+    for row in read.models[read.models.A_along.notna()].itertuples():
+        mine = frame[frame["model"].eq(row.model) & frame["source"].eq("physics")]
+        assert (mine["along"].mean(), mine["across"].mean()) == pytest.approx((row.A_along, row.A_across))
 
 
 def test_errors_over_time_average_to_A(read: Results) -> None:

@@ -173,6 +173,7 @@ def test_a_family_with_an_observer_is_refused_by_name(whole: Finished) -> None:
     assert plan.methods[0].foundations == ("wrong", "fitted", "none")
 
 
+@pytest.mark.slow
 def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> None:
     results = read_results(whole.folder)
     for cell in whole.rows["cell"]:

@@ -229,6 +229,7 @@ RUNS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "run", [*RUNS[::3], *(pytest.param(run, marks=pytest.mark.slow) for run in RUNS if run not in RUNS[::3])]
 )
