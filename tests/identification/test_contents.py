@@ -1,6 +1,7 @@
+"""The page of an identification holds what was identified."""
+
 from pathlib import Path
 
-@pytest.mark.slow
 import pytest
 
 from shipid.data.dataset import Dataset
@@ -9,6 +10,9 @@ from shipid.identification.outcome import run_identification
 from shipid.identification.settings import Identify
 from shipid.simulation.measured import measure_standard
 from shipid.vessel.load import load_vessel
+
+
+@pytest.mark.slow
 def test_the_page_holds_what_was_identified():
     ship = load_vessel("gunnerus-28.9")
     frame = measure_standard(ship, "zigzag", (20.0, 10.0)).frame
