@@ -205,6 +205,8 @@ class Predictor:
         try:
             arrays = read_arrays(file)
             header = json.loads(str(arrays.pop("header")))
+        except IsADirectoryError:
+            raise ResultError("a folder: name one of its cells, FOLDER/cells/NAME.npz", file=file) from None
         except OSError as error:
             raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
         except (ValueError, KeyError, RecursionError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 
 import shipid
 from shipid.document import bundled_folder
+from shipid.errors import ShipidError
 from tests.study.tiny import TINY
 
 ROOT = Path(__file__).parents[1]
@@ -111,12 +113,45 @@ def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest
     assert Path("gain.html").is_file()
 
 
-def test_cells_of_the_documentation_are_read(tiny_run: Path) -> None:
+def test_cells_of_the_documentation_are_read(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {}
     text = blocks("python.md")[2]
     assert '"results/quick-69699190"' in text
     exec(text.replace('"results/quick-69699190"', repr(str(tiny_run))), space)
     assert len(space["cells"]) == 8
+
+
+def script(*words: object, folder: Path) -> str:
+    """What `python my.py ...` prints to either stream."""
+    command = [sys.executable, "my.py", *map(str, words)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)])}
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, env=environment)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_a_method_in_a_users_script_is_known_to_every_command(tmp_path: Path) -> None:
+    """The class of the notebook and the script of the how-to, with two workers: processes, which must know it too."""
+    notebook = json.loads((ROOT / "docs" / "notebooks" / "own-method.ipynb").read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    (tmp_path / "my_method.py").write_text(cells[0])
+    (tmp_path / "my.py").write_text(blocks("howto.md")[0])
+    mine = 'method=[{name = "mine", kind = "mean-error"}, {name = "alone", kind = "alone"}]'
+    for name in ("one", "two"):
+        script("study", "run", TINY, "--set", mine, "--workers", 2, "--out", name, folder=tmp_path)
+    assert "mine" in script("study", "compare", "one", "two", folder=tmp_path)
+    with pytest.raises(ShipidError, match="one of your own needs the script"):
+        shipid.read_cells(tmp_path / "one")
+
+
+def test_results_of_the_how_to_become_a_table_and_a_figure(
+    tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(blocks("howto.md")[1].replace('"results/quick-69699190"', repr(str(tiny_run))), {})
+    assert Path("gain.html").is_file()
 
 
 def test_frames_of_the_documentation_are_drawn() -> None:

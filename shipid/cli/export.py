@@ -27,7 +27,7 @@ def export(
     from shipid.predictor import Predictor
     from shipid.vessel.load import load_vessel
 
-    if what.endswith(".npz"):
+    if what.endswith(".npz") or Path(what).is_dir():
         written = export_predictor(Predictor.load(what), to, out, single=single, name=name)
     else:
         if integrator not in ("euler", "rk4"):

@@ -28,9 +28,13 @@ def identify(
     dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
     parameters: Annotated[
         list[str] | None,
-        typer.Option(help='numbers to identify: dotted paths, "hull.derivatives.*", "...\\[order >= 3]"'),
+        typer.Option(
+            help='numbers to identify: dotted paths with commas between, "hull.derivatives.*", "...\\[order >= 3]"'
+        ),
     ] = None,
-    fixed: Annotated[list[str] | None, typer.Option(help="paths to leave out of --parameters")] = None,
+    fixed: Annotated[
+        list[str] | None, typer.Option(help="paths to leave out of --parameters, with commas between")
+    ] = None,
     together: Annotated[list[str] | None, typer.Option(help="paths that share one factor, with commas between")] = None,
     prior: Annotated[
         list[str] | None, typer.Option(help="paths=0.3: standard deviation of a factor around the base")
@@ -90,8 +94,8 @@ def identify(
     if html is not None and html.suffix != ".html":
         raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
     given: dict[str, Any] = {
-        "parameters": parameters,
-        "fixed": fixed,
+        "parameters": parameters and _paths(parameters),
+        "fixed": fixed and _paths(fixed),
         "together": together and [group.split(",") for group in together],
         "prior": prior and pairs(prior, "--prior", "paths=0.3"),
         "bounds": bounds and pairs(bounds, "--bounds", "paths=[0.5,2]"),
@@ -132,6 +136,10 @@ def identify(
 
             content = identification_content(outcome, dataset, command_line())
             answer.say(f"page -> {write_identification(content, html)}", page=html)
+
+
+def _paths(given: Sequence[str]) -> list[str]:
+    return [path.strip() for words in given for path in words.split(",")]
 
 
 def _compare(

@@ -36,7 +36,10 @@ METHODS: dict[str, type[Method]] = {
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
-        raise DocumentError(f"no such kind of method: {choices(kind, METHODS)}", path=f"{path}.kind")
+        hint = choices(kind, METHODS)
+        if "did you mean" not in hint:
+            hint += "; one of your own needs the script that puts it into METHODS"
+        raise DocumentError(f"no such kind of method: {hint}", path=f"{path}.kind")
     found: Method = parse(METHODS[kind], dict(settings), None, path)
     return found
 

@@ -139,6 +139,13 @@ def step_of(horizon: float, log_step: float) -> float:
     return min(max(_round_down(most), log_step), horizon / 2)
 
 
+def _ahead(horizon: float, steps: int, step: float, why: str) -> Choice:
+    """The horizon [s] as whole steps, and why; where that is another number, the reason says so."""
+    value = float(f"{steps * step:.9g}")
+    near = "" if np.isclose(value, horizon) else f"{steps} steps of {step:g} s, as near as they come to "
+    return Choice("prediction.ahead", value, near + why)
+
+
 def ladder(total: int, least: int = LEAST_RUNS) -> list[int]:
     """Amounts of data from the least to all runs, by equal factors of at least two."""
     factor = max(2.0, (total / least) ** (1 / (MOST_AMOUNTS - 1)))
@@ -161,13 +168,13 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     how: dict[str, Any] = {"ahead": steps * step, "step": step, "path": true_path.value}
     looks = {named: first_look(vessel, dataset, others, **how) for named, vessel in vessels.items()}
     fixed = [
-        *_question(vessels, dataset, seen, horizon),
+        *_question(vessels, dataset, seen, steps * step),
         Choice("data.dataset", _relative(str(data), out), _measured(vessels, dataset)),
         true_path,
         Choice("split.test", tests, _why_test(runs, tests)),
     ]
     ahead = [
-        Choice("prediction.ahead", float(f"{steps * step:.9g}"), why + _left_out(seen.runs, usable)),
+        _ahead(horizon, steps, step, why + _left_out(seen.runs, usable)),
         Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
     ]
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
@@ -431,7 +438,9 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     past = max(method.value[0].get("memory", {}).get("turned", [0.0]))
     fixed = [
         Choice(
-            "question", f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {horizon:g} s?"
+            "question",
+            f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict "
+            f"{round(horizon / step) * step:g} s?",
         ),
         Choice("description", f"simulated: {vessel.name} as it is makes the truth, and degraded models predict it"),
         *_truth(named, vessel, service, rpm, horizon, step, past),
@@ -439,7 +448,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
     ]
     ahead = [
-        Choice("prediction.ahead", float(f"{round(horizon / step) * step:.9g}"), why),
+        _ahead(horizon, round(horizon / step), step, why),
         Choice("prediction.step", step, "s; the truth is stepped more finely, that is a part of what models get wrong"),
     ]
     tail = [

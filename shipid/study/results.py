@@ -88,22 +88,28 @@ class Results:
 def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read one row per finished cell of a run, without its predictors: the quick way from a folder to a table.
 
-    Columns: cell, foundation, family, member, method, N_D, runs, minutes [min], seed, status, sentence, A, A_90, A_rms,
-    H, H_90, rms, width [m], coverage [1], seconds [s], trials (a list of dicts), and, of a study of several parts,
-    condition and part. Raises ResultError for a folder without a finished cell.
+    Columns: cell, foundation, family, member, method, model (foundation, with the method where several learn), N_D,
+    runs, minutes [min], seed, status, sentence, A, A_90, A_rms, H, H_90, rms, width [m], coverage [1], seconds [s],
+    trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError for a folder
+    without a finished cell.
     """
     folder = Path(folder)
     plan = store.stored_plan(folder)
     if not plan.parts:
-        return store.read_rows(folder)
+        return _labelled(store.read_rows(folder), plan)
     frames = [
-        store.read_rows(place).assign(condition=part.condition, part=name)
+        _labelled(store.read_rows(place), part.plan).assign(condition=part.condition, part=name)
         for name, part in plan.parts.items()
         if (place := store.part_folder(folder, name)).is_dir() and store.finished(place, part.plan.units)
     ]
     if not frames:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     return pd.concat(frames, ignore_index=True)
+
+
+def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
+    """The cells with the name that figures give their models."""
+    return cells.assign(model=[plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)])
 
 
 def read_results(folder: str | os.PathLike[str]) -> Results:
@@ -114,8 +120,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check(folder)
-    cells = store.read_rows(folder, plan)
-    cells["model"] = [plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
+    cells = _labelled(store.read_rows(folder, plan), plan)
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
     paths = {}

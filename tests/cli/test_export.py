@@ -18,3 +18,9 @@ def test_a_cell_that_is_not_there_is_one_line(tmp_path):
     result = CliRunner().invoke(app, ["export", str(tmp_path / "no.npz"), "--to", "c", "--out", str(tmp_path)])
     assert result.exit_code == 1
     assert "cannot be read" in str(result.exception)
+
+
+def test_a_folder_is_no_cell_but_has_some(tmp_path):
+    result = CliRunner().invoke(app, ["export", str(tmp_path), "--to", "c", "--out", str(tmp_path / "ship")])
+    assert result.exit_code == 1
+    assert "name one of its cells, FOLDER/cells/NAME.npz" in str(result.exception)

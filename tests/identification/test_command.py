@@ -33,7 +33,7 @@ def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path) -> None:
     text = said(
-        *("identify", "gunnerus-28.9", file, "--parameters", ONE, "--parameters", "hull.derivatives.N_uv"),
+        *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
         *("--prior", "hull.*[order >= 2]=0.5", "--bounds", f"{ONE}=[0.5, 2]", "--horizon", 0, "--test", "*3"),
         *("--set", "weights.u=0.05", "--set", "weights.r=0.003", "--nuisance", "current=0.1", "--ahead", 30),
         *("--profile", ONE, "--design", "--html", "page.html"),

@@ -20,7 +20,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.study import new
 from shipid.study.first_look import GROUPS, Change, Look
-from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, draft_study, horizon_of, ladder, step_of
+from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, _ahead, draft_study, horizon_of, ladder, step_of
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
@@ -89,6 +89,13 @@ def test_horizon_is_a_few_ship_lengths(length: float, speed: float, expected: fl
     horizon, why = horizon_of(length, speed, [600.0])
     assert horizon == expected
     assert "L/U" in why
+
+
+@pytest.mark.parametrize(("horizon", "step", "said"), [(45.0, 2.0, "22 steps of 2 s"), (20.0, 1.0, "20 s")])
+def test_horizon_and_its_reason_agree(horizon: float, step: float, said: str) -> None:
+    choice = _ahead(horizon, round(horizon / step), step, f"{horizon:g} s, in which")
+    assert choice.value == round(horizon / step) * step
+    assert choice.why.startswith(said)
 
 
 def test_horizon_leaves_most_of_a_short_run() -> None:

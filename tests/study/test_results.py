@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid import figures
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
@@ -208,7 +209,8 @@ def test_cells_in_one_call_are_those_of_the_whole_results(read: Results, tiny_ru
     cells = read_cells(tiny_run)
     columns = list(cells.columns)
     pd.testing.assert_frame_equal(cells, read.cells[columns])
-    assert {"foundation", "method", "N_D", "seed", "A", "H", "status"} <= set(columns)
+    assert {"foundation", "method", "model", "N_D", "seed", "A", "H", "status"} <= set(columns)
+    assert figures.gain(cells).data  # a figure takes the table as it is
 
 
 def test_results_over_their_keys(read: Results) -> None:

@@ -7,7 +7,9 @@ log cannot decide is asked. A guess is a draft for a person to read. It corrects
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
 from shipid.logs.guess.pose import choose_pose
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
+from shipid.logs.guess.words import parts_of, wind_kind
 
 LIKELY = 0.6
 
@@ -103,11 +106,21 @@ def _others(state: State) -> None:
         why = "the sentence says that it is relative to the bow"
         state.suggest("V_w", "apparent_speed", "m/s", 0.9, why)
         state.suggest("beta_w", "apparent_angle", "deg", 0.9, why, direction="from", relative=True, wrap=True)
-    speeds, angles = state.called("V_w"), state.called("beta_w")
-    if speeds and angles:
-        unit = unit_said(speeds[0], "m/s") or "m/s"
-        state.suggest("V_w", speeds[0], unit, 0.5, "by its name; the log does not show whether it is true or apparent")
-        said = "from" if "towards" not in angles[0].lower() else "towards"
-        why = f"by its name; taken as {said!r}, as is usual at sea"
-        turn = likely_unit(state, angles[0], "beta_w")
-        state.suggest("beta_w", angles[0], turn, 0.5, why, direction=said, wrap=True)
+    pairs = list(product(state.called("V_w"), state.called("beta_w")))
+    if pairs:
+        speed, angle = min(pairs, key=_wind_order)
+        kinds = {wind_kind(speed), wind_kind(angle)} - {""}
+        kind = kinds.pop() if len(kinds) == 1 else ""
+        said = f"the names say {kind}" if kind else "the log does not show whether it is true or apparent"
+        state.suggest("V_w", speed, unit_said(speed, "m/s") or "m/s", 0.5, f"by its name; {said}")
+        way = "from" if "towards" not in angle.lower() else "towards"
+        custom = "" if "from" in parts_of(angle) or way == "towards" else ", as is usual at sea"
+        relative: dict[str, Any] = {"relative": True} if kind == "apparent" else {}
+        why, turn = f"by its name; taken as {way!r}{custom}", likely_unit(state, angle, "beta_w")
+        state.suggest("beta_w", angle, turn, 0.5, why, direction=way, wrap=True, **relative)
+
+
+def _wind_order(pair: tuple[str, str]) -> tuple[bool, bool]:
+    """Speed and direction of one wind first, then those of the true wind; else the order of the names."""
+    kinds = [wind_kind(name) for name in pair]
+    return len({*kinds} - {""}) > 1, "true" not in kinds

@@ -128,6 +128,8 @@ ORDERS = frozenset(
     ).split()
 )
 """Parts that say what is ordered, not what is."""
+WIND_WORDS = {"true": "true tws twd", "apparent": "aws awa app apparent rel relative"}
+"""Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
         "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga "
@@ -165,6 +167,13 @@ def parts_of(name: str) -> tuple[str, ...]:
     text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", text)
     words = [word for word in re.split(r"[^A-Za-z0-9]+", text.lower()) if word]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
+
+
+def wind_kind(name: str) -> str:
+    """Whether the name of a column of wind says `true` or `apparent`; empty where it says neither, or both."""
+    parts = set(parts_of(name))
+    kinds = [kind for kind, words in WIND_WORDS.items() if parts & set(words.split())]
+    return kinds[0] if len(kinds) == 1 else ""
 
 
 @cache

@@ -341,3 +341,28 @@ def test_a_turn_while_the_logger_was_off_is_no_interpolation_across_360(tmp_path
 )
 def test_a_name_says_its_unit(name: str, unit: str | None) -> None:
     assert unit_said(name, "m/s") == unit
+
+
+@pytest.mark.parametrize(
+    ("names", "taken", "relative"),
+    [
+        (("AWS", "AWA"), ("AWS", "AWA"), True),
+        (("Apparent wind speed kn", "Apparent wind angle"), ("Apparent wind speed kn", "Apparent wind angle"), True),
+        (("rel_wind_speed", "rel_wind_dir"), ("rel_wind_speed", "rel_wind_dir"), True),
+        (("AWS", "AWA", "TWS", "TWD"), ("TWS", "TWD"), None),
+        (("TWS", "AWA", "AWS"), ("AWS", "AWA"), True),
+        (("Wind speed", "Wind true from [deg]"), ("Wind speed", "Wind true from [deg]"), None),
+        (("Wind", "Wind dir"), ("Wind", "Wind dir"), None),
+        (("TWS", "TWA"), ("TWS", "TWA"), None),
+    ],
+)
+def test_names_say_which_wind(
+    names: tuple[str, ...], taken: tuple[str, str], relative: bool | None, tmp_path: Path
+) -> None:
+    log = as_bridge(si_log())
+    wind = {name: np.random.default_rng(i).uniform(3.0, 8.0, len(log)) for i, name in enumerate(names)}
+    found = {column.name: column for column in guessed(log.assign(**wind), tmp_path).columns}
+    assert (found["V_w"].source, found["beta_w"].source) == taken
+    assert found["beta_w"].extra.get("relative") is relative
+    silent = not any(word in " ".join(taken) for word in ("AW", "Apparent", "rel", "true", "TWS"))
+    assert ("does not show" in found["V_w"].evidence) is silent

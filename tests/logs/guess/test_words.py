@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.logs.guess.words import OTHERS, PHRASES, fits, is_order, parts_of, side_of
+from shipid.logs.guess.words import OTHERS, PHRASES, fits, is_order, parts_of, side_of, wind_kind
 from shipid.physics.signals import SIGNALS
 
 
@@ -77,3 +77,14 @@ def test_every_phrase_fits_its_meaning() -> None:
 def test_a_name_that_says_nothing_fits_nothing() -> None:
     assert fits("Kanal 17") == {}
     assert fits("") == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("AWA", "apparent"), ("Rel. wind dir", "apparent"), ("ApparentWindSpeed", "apparent"),
+        ("TWD", "true"), ("true_wind_speed", "true"), ("TWA", ""), ("Wind", ""), ("true or relative wind", ""),
+    ],
+)  # fmt: skip
+def test_the_name_of_a_wind_says_which(name: str, kind: str) -> None:
+    assert wind_kind(name) == kind
