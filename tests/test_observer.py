@@ -134,7 +134,6 @@ def test_in_calm_water_it_costs_two_per_cent_at_most(name: str, known: bool) -> 
     assert found["observer"] <= 1.02 * found["alone"]
 
 
-@pytest.mark.slow
 def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     vessel = load_vessel("gunnerus-28.9")
     filters = bank(vessel)
@@ -150,6 +149,7 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     np.testing.assert_allclose(gained[3:, 0], now, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_tuning_never_chooses_worse_than_what_it_began_with() -> None:
     vessel = load_vessel("gunnerus-28.9")
     chosen, tried = tune_observer(vessel, calm().data, Observer(), horizon=15, interval=15.0)

@@ -211,13 +211,13 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(readers.READERS, "toy", readers.Reader(readers.Format, read_toy, is_toy))
 
 
-@pytest.mark.slow
 def toy_mapping(folder: Path) -> Path:
     mapping = folder / "mapping.toml"
     mapping.write_text(PLAIN.read_text().replace("[clock]", '[format]\nkind = "toy"\n[clock]'))
     return mapping
 
 
+@pytest.mark.slow
 def test_without_the_reader_a_mapping_names_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"unknown kind 'toy'.*text, parquet, mat, nmea|unknown kind 'toy'"):
         read_mapping(toy_mapping(tmp_path))

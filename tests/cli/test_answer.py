@@ -32,7 +32,6 @@ def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.slow
 def test_lists_and_one_vessel() -> None:
     assert [row["name"] for row in answered("vessel", "list")["vessels"]] == list(bundled("models"))
     assert [row["name"] for row in answered("study", "list")["studies"]] == list(bundled("studies"))
@@ -42,6 +41,7 @@ def test_lists_and_one_vessel() -> None:
     assert all(isinstance(row["value"], float) for row in ship["parameters"])
 
 
+@pytest.mark.slow
 def test_a_draft_and_a_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     sizes = ["--length", 60, "--beam", 12, "--draught", 4, "--block", 0.6]
@@ -54,7 +54,6 @@ def test_a_draft_and_a_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(pd.read_csv("z.csv")) == len(done["measures"])
 
 
-@pytest.mark.slow
 def test_studies(study: Path, tiny_run: Path) -> None:
     rows = answered("study", "variants", study)["foundations"]
     known = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")["A"]
@@ -69,6 +68,7 @@ def test_studies(study: Path, tiny_run: Path) -> None:
     assert {row["set"] for row in made["envelope"]} >= {"test"}
 
 
+@pytest.mark.slow
 def test_data(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     frame = pd.read_parquet(tiny_run / DATASET)

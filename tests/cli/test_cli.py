@@ -128,7 +128,6 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, tiny_run: Path) -> No
     assert "damaged" in result.stderr
 
 
-@pytest.mark.slow
 def test_wrong_usage_is_not_a_traceback() -> None:
     for arguments in (["study", "run"], ["nonsense"], ["study", "run", "quick", "--workers", "0"]):
         result = CliRunner().invoke(app, arguments)
@@ -136,6 +135,7 @@ def test_wrong_usage_is_not_a_traceback() -> None:
         assert isinstance(result.exception, SystemExit)
 
 
+@pytest.mark.slow
 def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Path) -> None:
     """`-v` shows on standard error what the library logs; without it, the library says nothing."""
     import shutil

@@ -71,7 +71,6 @@ def test_stretches_between_breaks_are_judged_alone() -> None:
     assert failed(turned) == set()
 
 
-@pytest.mark.slow
 def noisy(seed: int) -> pd.DataFrame:
     """A run in good order with the noise of drawn sensors: a ship that weaves or turns."""
     random = np.random.default_rng(seed)
@@ -88,6 +87,7 @@ def noisy(seed: int) -> pd.DataFrame:
     return frame.assign(**{name: frame[name] + random.normal(0, scale * std, len(t)) for name, std in noise.items()})
 
 
+@pytest.mark.slow
 def test_noise_alone_is_no_finding() -> None:
     """Of a hundred clean runs with noise fewer than 2 % have a finding."""
     assert sum(bool(failed(noisy(seed))) for seed in range(100)) < 2

@@ -48,11 +48,11 @@ def inputs(vessel: Vessel, draw_inputs: Draw, method: Method) -> tuple[Any, dict
     return given, {"step": 0.5, "num_steps": STEPS, "method": method, "tau_extra": PUSH[..., :num_dof]}
 
 
-@pytest.mark.slow
 def close(found: Array, exact: Array, tolerance: float) -> None:
     np.testing.assert_allclose(found, exact, rtol=tolerance, atol=tolerance * max(np.abs(exact).max(), 1e-300))
 
 
+@pytest.mark.slow
 def test_engines_agree_on_every_structure(vessel: Vessel, draw_inputs: Draw) -> None:
     """By RK4, whose sweep is the longer one; slopes are compared for one and the same relative change of numbers."""
     ship = calm(vessel)

@@ -41,7 +41,6 @@ def expected(predictor, instants, path, level, pointwise, kind):
         return None
 
 
-@pytest.mark.slow
 def agrees(predictor, instants, folder):
     """Half axes and directions of C are those of Python for every level; how many bands there were."""
     exported, count = model(predictor), 0
@@ -65,6 +64,7 @@ def agrees(predictor, instants, folder):
     return count
 
 
+@pytest.mark.slow
 def test_a_drawn_predictor_has_the_band_of_python(tmp_path):
     strange = drawn("path-drawn", 5, vessel="mariner")
     assert agrees(strange.predictor, strange.instants, tmp_path)

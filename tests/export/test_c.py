@@ -230,7 +230,6 @@ def test_every_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
     run_example(vessel_files(variety()[name], "ship", "rk4", Precision()), tmp_path / "example", *SANITIZERS)
 
 
-@pytest.mark.slow
 def _steps(vessel, folder, draw_inputs):
     """Sixty seconds in steps of a tenth, with loads, from drawn states."""
     equations, slow = Equations(vessel), pace(vessel)
@@ -264,6 +263,7 @@ def _steps(vessel, folder, draw_inputs):
             np.testing.assert_allclose(carry[: len(names)], last, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_single_precision_is_near(tmp_path):
     strange = drawn("path-drawn", 5, vessel="mariner")
     exported = model(strange.predictor)

@@ -10,7 +10,6 @@ from shipid.hybrid.forest import Forest, Trees
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
 
-@pytest.mark.slow
 def stairs(columns):
     """An error of the path that jumps with the order and with the speed: what a smooth network cannot follow."""
     t = np.arange(1, HORIZON + 1)[:, None] / HORIZON
@@ -19,6 +18,7 @@ def stairs(columns):
     return np.stack([3 * t * high + t * (columns["u"] > 4), 4 * t**2 * side], axis=-1)
 
 
+@pytest.mark.slow
 def test_home_an_error_that_jumps():
     pytest.importorskip("sklearn")
     here = missed(world(ship(), ship()), lambda _, windows: stairs(windows.columns))

@@ -7,7 +7,6 @@ from shipid.hybrid.one_step import OneStep
 from tests.hybrid.worlds import fitted, ship, world
 
 
-@pytest.mark.slow
 def missing(nus, told):
     """A force of state and commands that no coefficient of the physics can stand for."""
     u, v, r = nus[-1].T
@@ -17,6 +16,7 @@ def missing(nus, told):
     )
 
 
+@pytest.mark.slow
 def test_home_a_missing_acceleration_that_depends_on_state_and_orders():
     here = world(ship(), ship(), force=missing, known=True)
     assert here.removed(fitted(OneStep(), here)) > 0.8

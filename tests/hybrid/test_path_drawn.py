@@ -54,13 +54,13 @@ def task(dataset: Dataset, foundations: dict[str, Physics], future: Array | None
     return Task(cases, windows, folds, tuple(dataset.commands), seed=seed, estimates=estimates)
 
 
-@pytest.mark.slow
 @pytest.fixture(scope="module")
 def dataset() -> Dataset:
     """Runs in wind that the physics of no foundation explains."""
     return windy()
 
 
+@pytest.mark.slow
 def test_a_foundation_with_a_memory_does_not_notice_its_company(dataset: Dataset) -> None:
     """Inputs that come from the physics are of each foundation, those that do not are shared; results are the same."""
     foundations = {

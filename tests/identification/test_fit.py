@@ -84,7 +84,6 @@ def test_a_factor_that_is_pushed_ends_at_its_bound() -> None:
     assert np.abs(slope[1:]).max() < 1e-3 * slope[0]
 
 
-@pytest.mark.slow
 def test_it_ends_where_whoever_looks_on_asks() -> None:
     own, begin = problem(), np.array([1.5, 0.5, 1.5])
     found = search(own, begin, origin(own), progress=lambda iteration, _: iteration == 4, before=3)
@@ -93,6 +92,7 @@ def test_it_ends_where_whoever_looks_on_asks() -> None:
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
 
 
+@pytest.mark.slow
 def test_a_search_does_not_end_where_a_gauss_newton_step_still_goes_down() -> None:
     """Zigzags stepped ten times as finely, fitted from wild factors: kinks of |v| and |r| stop short steps."""
     runs = [Zigzag(name=side, n_rpm=145, side=side, angle_deg=20, duration=60) for side in ("starboard", "port")]

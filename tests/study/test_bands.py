@@ -137,7 +137,6 @@ def test_predict_writes_the_band(folder: Path, tmp_path: Path, results: Results)
         CliRunner().invoke(app, [*asked[:-1], "0.99"], catch_exceptions=False)
 
 
-@pytest.mark.slow
 def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     """A miss at instant 0 whose path ends at 5 s widens the band from 5 s on, not before."""
     now, table = np.arange(12.0), -np.log1p(-LEVELS)
@@ -150,6 +149,7 @@ def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     np.testing.assert_array_equal(later, factors)
 
 
+@pytest.mark.slow
 def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
     """An identified family and a method trained step by step: without a band by default, with one from refits."""
     changes = {

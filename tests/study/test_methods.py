@@ -37,7 +37,6 @@ def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
     return frame[frame.method.eq(method) & frame.family.eq(family)].iloc[0]
 
 
-@pytest.mark.slow
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
     found = compared(made, "drawn")
@@ -55,6 +54,7 @@ def test_the_difference_is_that_of_the_means() -> None:
     assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """40 tables without and with an effect: 95 % intervals over test runs, give or take what chance allows."""
     rng = np.random.default_rng(1)

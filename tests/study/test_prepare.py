@@ -385,7 +385,6 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
             assert (row["min"], row["mean"], row["max"]) == pytest.approx((values.min(), values.mean(), values.max()))
 
 
-@pytest.mark.slow
 def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
     found = limits_of(prepared.pool, prepared.commands)
@@ -395,6 +394,7 @@ def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
         assert (low, high) == pytest.approx((rows[name].min(), rows[name].max()))
 
 
+@pytest.mark.slow
 def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Method, section 5: the 20/20 zigzag at 4150-4350 s; no other window, nor the other part of its fold, sees it."""
     monkeypatch.setenv("SHIPID_DATA", str(shared_data))

@@ -173,7 +173,6 @@ def test_a_family_with_an_observer_is_refused_by_name(whole: Finished) -> None:
     assert plan.methods[0].foundations == ("wrong", "fitted", "none")
 
 
-@pytest.mark.slow
 def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> None:
     results = read_results(whole.folder)
     for cell in whole.rows["cell"]:
@@ -186,6 +185,7 @@ def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> Non
         np.testing.assert_allclose(again.predict(instants), results.paths[cell], atol=1e-9, err_msg=cell)
 
 
+@pytest.mark.slow
 def test_the_report_shows_every_cell(whole: Finished) -> None:
     page = write_pages(whole.folder).read_text()
     for name in ("seen", "fitted", "both", *KINDS):
