@@ -22,6 +22,20 @@ from tests.faults.clusters import a_cluster, a_worker
 Done = list[tuple[int, Any]]
 
 
+@pytest.fixture(autouse=True)
+def limit() -> Iterator[None]:
+    """A cluster without workers waits for one: a test of it fails after four minutes instead."""
+
+    def late(*_: Any) -> None:
+        raise TimeoutError("four minutes are over")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(240)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
 @contextmanager
 def workers(address: str, place: Path, *more: str) -> Iterator[None]:
     """Workers with a parent that starts them anew, as on most clusters."""
@@ -116,6 +130,7 @@ def _late(address: str) -> list[str]:
 def test_a_task_that_kills_its_workers_is_named_when_the_others_are_done(tmp_path: Path) -> None:
     def hungry(_: int, task: int) -> int:
         if task == 1:
+            time.sleep(2.0)  # a nanny whose first worker dies before the nanny is up gives up
             os._exit(9)  # as the system ends a process that takes too much memory
         return task
 
