@@ -213,7 +213,11 @@ def test_files_of_other_kinds_are_one_line(tmp_path: Path, tiny_run: Path) -> No
         with pytest.raises(ResultError, match="not a predictor"):
             Predictor.load(file)
     np.save(tmp_path / "array.npy", np.zeros(3))
-    for file, said in ((tmp_path / "array.npy", "not a predictor"), (tmp_path, "read"), (tmp_path / "x", "No such")):
+    for file, said in (
+        (tmp_path / "array.npy", "not a predictor"),
+        (tmp_path, "a folder: name one"),
+        (tmp_path / "x", "No such"),
+    ):
         with pytest.raises(ResultError, match=said):
             Predictor.load(file)
 

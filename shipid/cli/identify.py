@@ -161,7 +161,9 @@ def _compare(
     names = [PRESENT, *STRUCTURES] if structures == "all" else [name.strip() for name in structures.split(",")]
     try:
         with steps() as say:
-            found = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
+            found = compare_structures(
+                ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how
+            )
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
         sys.exit(130)
