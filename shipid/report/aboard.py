@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Finding, Floats, Sentence
+from shipid.report.content import Floats, PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line, plane
 from shipid.report.page import page, write
 from shipid.report.palette import INK, category
@@ -23,8 +23,8 @@ DASHES = {PHYSICS: "dash", BAND: "dot"}
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
 
-@dataclass(frozen=True, eq=False)
-class AboardContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AboardContent(PageContent):
     """Everything the page shows.
 
     Parameters
@@ -37,16 +37,10 @@ class AboardContent:
     track : run, t [s], north, east [m], as measured.
     """
 
-    title: str
-    name: str
     said: Sequence[str]
     instants: pd.DataFrame
     points: pd.DataFrame
     track: pd.DataFrame
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
-    study_document: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report import logs, tables
-from shipid.report.content import Finding, Sentence
+from shipid.report.content import PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
 from shipid.report.page import page, write
 from shipid.report.palette import category
@@ -23,8 +22,8 @@ POINTS = 600  # of one line: more than pixels are wide
 HEADING, RATE = 0, 1  # colours
 
 
-@dataclass(frozen=True, eq=False)
-class CheckContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CheckContent(PageContent):
     """Everything the page of a checked log shows.
 
     Parameters
@@ -37,16 +36,11 @@ class CheckContent:
     provenance : label -> value.
     """
 
-    name: str
     checks: pd.DataFrame
     series: pd.DataFrame
     tracks: pd.DataFrame
     repairs: pd.DataFrame
-    provenance: Mapping[str, str]
     title: str = "Is this log in order?"
-    study_document: str = ""
-    command: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

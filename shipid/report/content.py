@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -71,6 +71,27 @@ class Snapshot:
 
 def _empty(*columns: str) -> pd.DataFrame:
     return pd.DataFrame(columns=list(columns))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PageContent:
+    """What a page shows beside its sections; a page that is no study's adds frames and a property `answer`.
+
+    Parameters
+    ----------
+    title, name : in words, and the short name beside the kicker.
+    provenance : label -> value.
+    command : what reproduces the page; empty for none.
+    study_document : document as text; empty for none.
+    findings : claims with verdicts; empty for none.
+    """
+
+    title: str
+    name: str
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
+    study_document: str = ""
+    findings: Sequence[Finding] = ()
 
 
 @dataclass(frozen=True, eq=False)

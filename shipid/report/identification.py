@@ -12,7 +12,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report import tables
-from shipid.report.content import Finding, Floats, Sentence
+from shipid.report.content import Floats, PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
 from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
@@ -30,8 +30,8 @@ INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
 DASHES = {LOG: "solid", BEFORE: "dot", AFTER: "solid"}
 
 
-@dataclass(frozen=True, eq=False)
-class IdentificationContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentificationContent(PageContent):
     """Everything the page shows.
 
     Parameters
@@ -53,8 +53,6 @@ class IdentificationContent:
     programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`; may be empty.
     """
 
-    title: str
-    name: str
     estimates: pd.DataFrame
     correlations: Floats
     unseen: Sequence[str]
@@ -69,10 +67,6 @@ class IdentificationContent:
     programme: pd.DataFrame = field(default_factory=pd.DataFrame)
     groups: pd.DataFrame = field(default_factory=pd.DataFrame)
     beyond: Sequence[str] = ()
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
-    study_document: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

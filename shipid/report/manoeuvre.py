@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Finding, Floats, Sentence
+from shipid.report.content import Floats, PageContent, Sentence
 from shipid.report.figure import Chip, Figure, Panel, axis, layout, line, plane
 from shipid.report.page import page, write
 from shipid.report.palette import GRID, MUTED, category
@@ -33,8 +33,8 @@ FIRST = {
 Values = Sequence[float] | Floats
 
 
-@dataclass(frozen=True, eq=False)
-class ManoeuvreContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
     Parameters
@@ -47,18 +47,12 @@ class ManoeuvreContent:
     outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
     """
 
-    title: str
-    name: str
     kind: str
     log: pd.DataFrame
     measures: pd.DataFrame
     criteria: pd.DataFrame
     outline: Floats
     levels: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=["helm", "rate"]))
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
-    study_document: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, Finding, ReportContent, Sentence
+from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
@@ -22,24 +22,17 @@ EVERY = "with physics"
 ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 
 
-@dataclass(frozen=True, eq=False)
-class MethodsContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MethodsContent(PageContent):
     """A page of its own for a study of several parts.
 
     Parameters
     ----------
     title, name : the question, and the short name of the study.
     frames : `methods`, as in the page of a study.
-    provenance, study_document, command : as in `ReportContent`.
     """
 
-    title: str
-    name: str
     frames: Mapping[str, pd.DataFrame]
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    study_document: str = ""
-    command: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from shipid.report.content import Finding, Sentence
+from shipid.report.content import PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure
 from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
@@ -21,8 +20,8 @@ REPLAYED = "replayed"
 LINES = {LOG: {"color": INK, "dash": "solid"}, REPLAYED: {"color": category(0), "dash": "solid"}}
 
 
-@dataclass(frozen=True, eq=False)
-class ReplayContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReplayContent(PageContent):
     """Everything the page shows.
 
     Parameters
@@ -34,15 +33,9 @@ class ReplayContent:
     ahead : length of each simulation [s]; 0 for whole runs.
     """
 
-    title: str
-    name: str
     series: pd.DataFrame
     errors: pd.DataFrame
     ahead: float
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
-    study_document: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from shipid.report.content import Finding, Sentence
+from shipid.report.content import PageContent, Sentence
 from shipid.report.page import page, write
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
@@ -23,12 +23,10 @@ def _records(frame: pd.DataFrame) -> list[Row]:
     return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
 
 
-@dataclass(frozen=True, eq=False)
-class StructuresContent:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructuresContent(PageContent):
     """Everything the page shows; the frames are those of `shipid.study.structures.Compared`."""
 
-    title: str
-    name: str
     sentences: Sequence[str]
     table: pd.DataFrame
     errors: pd.DataFrame
@@ -40,10 +38,6 @@ class StructuresContent:
     cautions: Mapping[str, str]
     ahead: float
     level: float | None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
-    study_document: str = ""
-    findings: Sequence[Finding] = ()
 
     @property
     def answer(self) -> list[Sentence]:
