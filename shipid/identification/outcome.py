@@ -213,14 +213,13 @@ def run_identification(
     ShipidError : the fit did not converge; the message says why.
     """
     check_level(band)
-    fitted, tested = pick_runs(dataset, runs, held_out)
+    fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
     with uninterrupted() as held:  # an interrupted library call raises an unrelated error
 
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
             return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
 
-        check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
         free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
         _go_on(held)
         fit_settings = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
@@ -297,8 +296,11 @@ def check(
     *,
     ahead: float = 0.0,
     profiles: Sequence[str] = (),
-) -> None:
-    """Raise what `run_identification` would raise before it simulates: for arguments that do not fit together."""
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the runs to fit and those held out, as `pick_runs` does, when all arguments of `run_identification` fit.
+
+    Raises what `run_identification` would raise before it simulates.
+    """
     fitted, tested = pick_runs(dataset, runs, held_out)
     check_length(settings, ahead)
     overrides(settings, (*fitted, *tested), vessel, dynamics(vessel).environment, known=dataset.runs)
@@ -306,6 +308,7 @@ def check(
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:
         raise DataError(f"{wrong!r} is not free in the fit: {choices(wrong, known)}", path="profile")
+    return fitted, tested
 
 
 def _of_runs(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:

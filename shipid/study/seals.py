@@ -18,6 +18,7 @@ from shipid.errors import ResultError, ShipidError
 from shipid.files import read_arrays, write_text
 
 FOLDER = "seals"
+TRIES = 10  # looks at files that other processes may write at the same time
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a batch -> the first file in it."""
 
@@ -52,14 +53,17 @@ def sealed(folder: Path) -> set[str]:
 def write_seal(folder: Path, name: str, files: Iterable[Path]) -> None:
     """Note the digests of files in the folder, which are on the disk already, under a name.
 
-    They are compared once more: a process that was held up may have written the same files meanwhile.
+    They are compared once more: a process that was held up may have written the same files meanwhile. Raises
+    ResultError where they go on changing, or the first file is not the one that the name asks for.
     """
     files = list(files)
-    while True:
+    for _ in range(TRIES):
         lines = [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
         write_text(seal_file(folder, name), "".join(lines))
         if not any(_faults(folder, seal_file(folder, name))):
             return
+    remove(folder, name)
+    raise ResultError("changes while it is stored: end the program that writes to it, then resume", file=files[0])
 
 
 def remove(folder: Path, name: str) -> None:

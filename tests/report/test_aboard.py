@@ -25,7 +25,9 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
     instants["error"] = np.where(times < 36, 1.0 + times / 10, np.nan)
     track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
     said = ["10 predictions in 1 run, 5 s ahead; 0 rows before there was a past", "alarm: at 4 of 10 instants"]
-    return AboardContent("played", "cell", [*said, "latency: 10 ms"], instants, points, track)
+    return AboardContent(
+        title="played", name="cell", said=[*said, "latency: 10 ms"], instants=instants, points=points, track=track
+    )
 
 
 def test_the_outline_of_a_band_is_its_ellipse() -> None:

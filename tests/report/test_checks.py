@@ -22,7 +22,9 @@ REPAIRS = pd.DataFrame(columns=["kind", "column", "count", "note"])
 
 
 def content(name: str, checks: pd.DataFrame = CHECKS) -> CheckContent:
-    return CheckContent(name, checks, SERIES, TRACKS, REPAIRS, {"log": name})
+    return CheckContent(
+        name=name, checks=checks, series=SERIES, tracks=TRACKS, repairs=REPAIRS, provenance={"log": name}
+    )
 
 
 def test_page_of_checks(tmp_path):

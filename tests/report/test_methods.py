@@ -33,7 +33,9 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
 
 
 def content(rows: pd.DataFrame) -> MethodsContent:
-    return MethodsContent("Which is <best>?", "compared", {"methods": rows}, {"study": "x"})
+    return MethodsContent(
+        title="Which is <best>?", name="compared", frames={"methods": rows}, provenance={"study": "x"}
+    )
 
 
 def test_the_sentences_name_the_least_error_among_methods_that_never_failed() -> None:

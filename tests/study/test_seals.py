@@ -37,6 +37,13 @@ def test_the_usual_tool_reads_seals(folder: Path) -> None:
     assert done.returncode == 0
 
 
+def test_files_that_never_agree_leave_no_seal(folder: Path) -> None:
+    """A seal is compared with its files again; where they cannot agree, it ends instead of trying for ever."""
+    with pytest.raises(ResultError, match="end the program that writes to it"):
+        seals.write_seal(folder, "dataset", [folder / "test.npz"])  # not the file that the name asks for
+    assert not seals.seal_file(folder, "dataset").exists()
+
+
 @pytest.mark.parametrize("kind", ["missing", "empty", "half", "folder"])
 @pytest.mark.parametrize("pattern", ["cells/*.npz", "batches/*.json", "dataset.parquet", "test.npz", "seals/N*"])
 def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: Path) -> None:
