@@ -12,8 +12,8 @@ has this symmetry exactly, and each manoeuvre counts twice.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from shipid.hybrid.path_drawn import PathDrawn
 
 SPARE = 4  # further trials whose errors without each run are kept
+SOUND = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
 
 
 @dataclass(frozen=True)
@@ -160,14 +161,14 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
             seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
             hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
             parts = _parts(seen, hidden, group.outputs, device)
-            errors, by_fold, kept = _left_out(parts, ridges, blocks, terms)
+            errors, by_fold, missed = _left_out(parts, ridges, blocks, terms)
             for k, key in enumerate(group.names):
                 ridge = ridges[errors[:, k].argmin()]
                 params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
                 network = partial(_network, seen, hidden, parts, mine, ridge, basis)
-                without = partial(_chosen_without, by_fold[:, :, k], kept[..., mine], blocks)
+                without = partial(_chosen_without, by_fold[:, :, k], missed, mine)
                 best[key].consider(params, value, network, without)
                 rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
             seconds = (time.process_time() - start) / len(group.names)
@@ -292,19 +293,21 @@ def _draw(seen: _Inputs, point: Mapping[str, float], units: int, seed: int) -> t
 def _parts(seen: _Inputs, hidden: tuple[Array, Array], outputs: Sequence[Tensor], device: str) -> list[_Part]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
     weight, offset = (_tensor(part, device) for part in hidden)
-    features = (seen.values @ weight + offset).tanh() / len(offset) ** 0.5
+    size = len(offset) ** 0.5
+    features = torch.addmm(offset, seen.values, weight).tanh_()
     if seen.reflection is None:
-        eigenvalues, axes = _decompose(features)
-        rotated = features @ axes
-        return [_Part(rotated, eigenvalues, axes, side, rotated.T @ side) for side in outputs]
-    image = (seen.values @ (_tensor(seen.reflection, device) @ weight) + offset).tanh() / len(offset) ** 0.5
-    parts = []
-    for sign, side in zip((1.0, -1.0), outputs, strict=True):
-        paired = (features + sign * image) / 2**0.5
-        eigenvalues, axes = _decompose(paired)
-        rotated = paired @ axes
-        parts.append(_Part(rotated, eigenvalues, axes, side, rotated.T @ side))
-    return parts
+        return _with_axes(features.div_(size), outputs)
+    image = torch.addmm(offset, seen.values, _tensor(seen.reflection, device) @ weight).tanh_()
+    even = (features + image).div_(2**0.5 * size)
+    odd = features.sub_(image).div_(2**0.5 * size)
+    return _with_axes(even, outputs[:1]) + _with_axes(odd, outputs[1:])
+
+
+def _with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Part]:
+    """Coordinates that are made of the same features."""
+    eigenvalues, axes = _decompose(features)
+    rotated = features @ axes
+    return [_Part(rotated, eigenvalues, axes, side, rotated.T @ side) for side in outputs]
 
 
 def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
@@ -313,64 +316,130 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
     return eigenvalues.clamp(min=0.0), axes
 
 
+class _Errors:
+    """Errors of a trial over judged windows, each fold without itself, for every ridge; in single precision."""
+
+    def __init__(self, shape: tuple[int, int], num_ridges: int) -> None:
+        self.shape = shape  # (S, K r)
+        self.found: list[list[tuple[slice, Tensor, tuple[int, ...], Tensor]]] = [[] for _ in range(num_ridges)]
+
+    def keep(self, ridge: int, folds: slice, rows: Tensor, sides: tuple[int, ...], errors: Tensor) -> None:
+        """Keep the errors (folds, j, sides x K r) on some rows (folds, j) of the windows."""
+        self.found[ridge].append((folds, rows, sides, errors.float()))
+
+    def of(self, ridges: Array, columns: slice) -> Tensor:
+        """Errors (2, S, r) on some columns, each fold by the ridge of this number; not numbers where none judges."""
+        width = len(range(self.shape[1])[columns])
+        found = torch.full((2, self.shape[0], width), torch.nan, dtype=torch.float32)
+        for ridge in np.unique(ridges):
+            for folds, rows, sides, errors in self.found[ridge]:
+                mine = torch.as_tensor(ridges[folds] == ridge, device=errors.device)
+                for place, side in enumerate(sides):
+                    found[side, rows[mine].cpu()] = errors.chunk(len(sides), dim=2)[place][..., columns][mine].cpu()
+        return found
+
+
 def _left_out(
     parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[_Block], terms: int
-) -> tuple[Array, Array, Tensor]:
+) -> tuple[Array, Array, _Errors]:
     """Errors over judged windows, each block without itself; `terms` is r.
 
-    Returns sums of squares (ridges, K) [m^2] over all folds, the same of each fold (ridges, F, K), and the errors
-    themselves in single precision, (ridges, 2, S, K r).
+    Returns sums of squares (ridges, K) [m^2] over all folds, the same of each fold (ridges, F, K), and the errors.
     """
     targets = parts[0].targets
-    total = targets.new_zeros(len(ridges), targets.shape[1] // terms)
-    by_fold = targets.new_zeros(len(ridges), sum(len(block.out) for block in blocks), targets.shape[1] // terms)
-    kept = torch.full((len(ridges), 2, *targets.shape), torch.nan, dtype=torch.float32, device=targets.device)
-    for side, part in enumerate(parts):
+    num_folds = sum(len(block.out) for block in blocks)
+    by_fold = targets.new_zeros(len(ridges), num_folds, targets.shape[1] // terms)
+    errors = _Errors((targets.shape[0], targets.shape[1]), len(ridges))
+    for sides, part in _alike(parts):
         first = 0
         for block in blocks:
-            rows, wanted = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
-            without = _few_rows if rows.shape[1] <= rows.shape[2] else _many_rows
-            errors, judged_rows = without(part, rows, wanted), block.rows
-            for i, ridge in enumerate(ridges):
-                error = errors(part.eigenvalues + ridge)
+            folds, rows = slice(first, first + len(block.out)), block.rows
+            without = _few_rows if block.out.shape[1] <= part.rotated.shape[1] else _many_rows
+            solved = without(part, block)
+            for i in sorted(range(len(ridges)), key=ridges.__getitem__, reverse=True):
+                error = solved(part.eigenvalues + ridges[i])
                 if block.judged.shape != block.out.shape:
                     error = error.take_along_dim(block.judged[:, :, None], dim=1)
-                squares = error.square()
-                total[i] += squares.sum(dim=(0, 1)).view(-1, terms).sum(dim=1)
-                by_fold[i, first : first + len(error)] += squares.sum(dim=1).view(len(error), -1, terms).sum(dim=2)
-                kept[i, side, judged_rows] = error.float()
+                squares = error.square().sum(dim=1).unflatten(1, (len(sides), -1, terms))
+                by_fold[i, folds] += squares.sum(dim=(1, 3))
+                errors.keep(i, folds, rows, sides, error)
             first += len(block.out)
-    return total.cpu().numpy(), by_fold.cpu().numpy(), kept
+    found = by_fold.cpu().numpy()
+    return found.sum(axis=1), found, errors
 
 
-def _chosen_without(by_fold: Array, kept: Tensor, blocks: Sequence[_Block]) -> _LeftOut:
-    """A trial without each fold in turn: by_fold (ridges, F) [m^2], kept (ridges, 2, S, r)."""
+def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
+    """Sides with the same features as one part, their targets side by side."""
+    same = [parts] if all(part.rotated is parts[0].rotated for part in parts) else [[part] for part in parts]
+    first = 0
+    for some in same:
+        targets, product = (torch.cat([getattr(part, name) for part in some], dim=1) for name in ("targets", "product"))
+        yield tuple(range(first, first + len(some))), replace(some[0], targets=targets, product=product)
+        first += len(some)
+
+
+def _chosen_without(by_fold: Array, errors: _Errors, columns: slice) -> _LeftOut:
+    """A trial without each fold in turn, on some columns: by_fold (ridges, F) [m^2]."""
     others = by_fold.sum(axis=1, keepdims=True) - by_fold
-    ridge = others.argmin(axis=0)  # (F,)
-    errors, fold = torch.full_like(kept[0], torch.nan), 0
-    for block in blocks:
-        for rows in block.rows:
-            errors[:, rows] = kept[ridge[fold]][:, rows]
-            fold += 1
-    return _LeftOut(others.min(axis=0), errors.cpu())
+    return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), columns))
 
 
-def _few_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
-    """Errors (folds, b, K r) of blocks without themselves, by their part of the hat matrix, (b, b); of a diagonal."""
-    unit = torch.eye(rows.shape[1], dtype=rows.dtype, device=rows.device)
+def _few_rows(part: _Part, block: _Block) -> Callable[[Tensor], Tensor]:
+    """Errors (folds, b, K r) of blocks without themselves, by their part of the hat matrix, (b, b); of a diagonal.
+
+    In single precision as long as that is sound. Call it for the greatest ridge first: the smaller the ridge, the
+    worse is the condition, so what is not sound once is not tried for smaller ones.
+    """
+    single = _Single(part, block)
+    sound = True
+    exact: list[tuple[Tensor, Tensor]] = []
+    unit = torch.eye(block.out.shape[1], dtype=part.rotated.dtype, device=part.rotated.device)
 
     def errors(diagonal: Tensor) -> Tensor:
+        nonlocal sound
+        found = single.errors(diagonal) if sound else None
+        if found is not None:
+            return found
+        sound = False
+        if not exact:
+            exact.append((part.rotated[block.out], part.targets[block.out]))
+        rows, targets = exact[0]
         weighted = rows / diagonal
-        found: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
-        return found
+        solved: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
+        return solved
 
     return errors
 
 
-def _many_rows(part: _Part, rows: Tensor, targets: Tensor) -> Callable[[Tensor], Tensor]:
+class _Single:
+    """`_few_rows` in single precision, twice as fast: products of matrices, and Cholesky's factors of I - H_bb."""
+
+    def __init__(self, part: _Part, block: _Block) -> None:
+        self.part, self.shape = part, block.out.shape
+        flat = block.out.flatten()
+        self.flat = part.rotated[flat].float()
+        self.rows = self.flat.view(*self.shape, -1)
+        self.columns = self.rows.mT.contiguous()
+        self.targets = part.targets[flat].float()
+        self.unit = torch.eye(self.shape[1], device=flat.device)
+
+    def errors(self, diagonal: Tensor) -> Tensor | None:
+        """Errors (folds, b, K r); None where a square of a pivot is below `SOUND`, which limits the digits."""
+        remainder = torch.baddbmm(self.unit, self.rows, self.columns * (1 / diagonal).float()[:, None], alpha=-1)
+        lower, failed = torch.linalg.cholesky_ex(remainder)
+        if failed.any() or lower.diagonal(dim1=1, dim2=2).min() ** 2 < SOUND:
+            return None
+        inverse = torch.linalg.solve_triangular(lower, self.unit.expand_as(lower), upper=False)
+        weights = (self.part.product / diagonal[:, None]).float()
+        missed = torch.addmm(self.targets, self.flat, weights, alpha=-1).view(*self.shape, -1)
+        return torch.bmm(torch.bmm(inverse.mT, inverse), missed)
+
+
+def _many_rows(part: _Part, block: _Block) -> Callable[[Tensor], Tensor]:
     """The same by solving for the output weights without each block, (M, M)."""
-    block, product = rows.mT @ rows, part.product - rows.mT @ targets
-    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - block, product)
+    rows, targets = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
+    gram, product = rows.mT @ rows, part.product - rows.mT @ targets
+    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - gram, product)
 
 
 def _network(
