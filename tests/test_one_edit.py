@@ -52,7 +52,7 @@ FLAP = Signal(
     usual=(-0.3, 0.3),
     component="flap",
 )
-CACHES = (schema.vessel_model, schema.term_model)
+CACHES = (schema.vessel_model, schema.term_model, schema.actuator_model)
 T = np.arange(0.0, 60.0, 0.5)
 
 

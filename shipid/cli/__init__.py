@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from collections.abc import Callable, Collection, Sequence
+from typing import Annotated, Any
 
 import typer
 
@@ -11,28 +12,30 @@ from shipid.cli import data, export, identify, predict, replay, schema, simulati
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError
 
-app = typer.Typer(
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    help="How good must the physics be, and how much data is needed, to predict a ship's trajectory?",
-)
-app.command("simulate")(simulation.simulate)
-app.command("manoeuvre")(simulation.manoeuvre)
-app.command("replay")(replay.replay)
-app.command("identify")(identify.identify)
-app.command("predict")(predict.predict)
-app.command("schema")(schema.schema)
-app.command("export")(export.export)
-app.command("aboard")(export.aboard)
-app.add_typer(vessel.app, name="vessel")
-app.add_typer(data.app, name="data")
-app.add_typer(study.app, name="study")
+OPTIONS: dict[str, Any] = {
+    "no_args_is_help": True,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,  # half of the time of `shipid --help` went into its frames
+    "context_settings": {"max_content_width": 120},
+    "help": "How good must the physics be, and how much data is needed, to predict a ship's trajectory?",
+}
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "simulate": simulation.simulate,
+    "manoeuvre": simulation.manoeuvre,
+    "replay": replay.replay,
+    "identify": identify.identify,
+    "predict": predict.predict,
+    "schema": schema.schema,
+    "export": export.export,
+    "aboard": export.aboard,
+}
+GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 
 
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
-        app()
+        _named(sys.argv[1:])()
     except ShipidError as error:
         sys.stderr.write(f"error: {error}\n")
         sys.exit(1)
@@ -49,7 +52,6 @@ def main() -> None:
         sys.exit(1)
 
 
-@app.callback(invoke_without_command=True)
 def _before(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
@@ -60,3 +62,27 @@ def _before(
 
         typer.echo(__version__)
         raise typer.Exit
+
+
+def _of(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
+    """Build the command line of some commands and groups; hollow groups only say what they are for."""
+    found = typer.Typer(**OPTIONS)
+    found.callback(invoke_without_command=True)(_before)
+    for name, command in COMMANDS.items():
+        if name in names:
+            found.command(name)(command)
+    for name, group in GROUPS.items():
+        if name in names:
+            found.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
+    return found
+
+
+def _named(arguments: Sequence[str]) -> typer.Typer:
+    """Take what the first argument names, alone: every command of an app is made before one runs, which takes time."""
+    first = arguments[0] if arguments else ""
+    if first in COMMANDS or first in GROUPS:
+        return _of([first])
+    return _of([*COMMANDS, *GROUPS], hollow=True) if first == "--help" else app
+
+
+app = _of([*COMMANDS, *GROUPS])

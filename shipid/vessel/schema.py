@@ -203,7 +203,7 @@ def term_model(key: str) -> type[Block]:
         extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
     commands = [signal for signal in signals(term.function) if signal in named("command")]
     if commands:
-        fields: dict[str, Any] = {command: (_actuator_union() | None, None) for command in commands}
+        fields: dict[str, Any] = {command: (actuator_model() | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
     if behind(term):
         extra[BEHIND] = (Annotated[str, Field(description="the propeller in whose slipstream it is")], ...)
@@ -217,7 +217,9 @@ def actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
             yield command, actuator
 
 
-def _actuator_union() -> Any:
+@cache
+def actuator_model() -> Any:
+    """Model of any kind of actuator."""
     return _union(
         [
             block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...), off=(bool, False))
