@@ -883,7 +883,7 @@ int main(void)
 
 def _must(vessel: Vessel | None) -> Vessel:
     if vessel is None:
-        raise ShipidError("there is no vessel")
+        raise ShipidError("the predictor has no vessel")
     return vessel
 
 

@@ -180,7 +180,7 @@ def pick_runs(
     tested = chosen(held_out, "held out")
     fitted = [run for run in (chosen(runs, "runs") if runs else dataset.runs) if run not in tested]
     if not fitted:
-        raise DataError("every run is held out: leave at least one to the fit", path="runs")
+        raise DataError("every run is held out: leave at least one run for the fit", path="runs")
     return tuple(fitted), tuple(tested)
 
 
@@ -227,7 +227,7 @@ def run_identification(
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         if (solution.at_bound | solution.held).all():
-            raise ShipidError("every parameter is at a bound, held or dropped: no parameter is left to estimate")
+            raise ShipidError("every parameter is at a bound, fixed or dropped, so none is left to estimate: free more parameters, or widen bounds")
         _go_on(held)
         judged = statistics(LinearFit.of(solution))
         curves = tuple(_profile(path, dataset, solution, judged) for path in profiles)

@@ -308,7 +308,7 @@ def _common_clock(
     spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
     empty = [name for name, times in spans.items() if not len(times)]
     if empty:
-        raise DataError("holds no number at all", file=file, path=f"columns.{empty[0]}.from")
+        raise DataError("has no number in any row: name another column, or check decimal and separator", file=file, path=f"columns.{empty[0]}.from")
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
@@ -455,7 +455,7 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     for _, stretch in rows.groupby(np.cumsum(broken), sort=False):
         if len(stretch) < 2:
             at = f"t = {stretch['t'].iloc[0]:g} s"
-            raise DataError(f"a single row between two breaks at {at}: nothing to estimate from", file=file)
+            raise DataError(f"a single row between two breaks at {at}: a row without neighbours gives no estimate; remove it, or widen the breaks", file=file)
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
         smoothed = smooth(stretch["t"].to_numpy(), logged, noise)
         squares += smoothed.consistency * len(stretch)

@@ -94,7 +94,7 @@ def require_file(file: Path) -> int:
         if stat.S_ISDIR(state.st_mode):
             raise DataError("cannot be read (it is a folder)", file=file)
         if not stat.S_ISREG(state.st_mode):
-            raise DataError("a device or a pipe, not a file: save what it says to a file first", file=file)
+            raise DataError("a device or a pipe, not a file: save its output to a file first", file=file)
         return state.st_size
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
@@ -189,7 +189,7 @@ def widest(head: bytes, separator: str, file: Path) -> None:
         count = line.count(mark) + 1
         if count > WIDEST:
             raise DataError(
-                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table turned over?", file=file
+                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table transposed?", file=file
             )
 
 
@@ -219,7 +219,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
         raise DataError(message, file=file, path="format.encoding") from None
     except pd.errors.EmptyDataError:
-        message = f"nothing is left after {form.skip_rows} skipped lines"
+        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
         raise DataError(message, file=file, path="format.skip_rows") from None
     except (pd.errors.ParserError, ValueError) as error:
         message = f"not a table with this separator ({error}): check separator and skip_rows"
@@ -229,7 +229,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
     table = table.loc[~blank]
     if not len(table):
-        message = f"nothing is left after {form.skip_rows} skipped lines"
+        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
         raise DataError(message, file=file, path="format.skip_rows")
     names, table = _named_columns(table, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)

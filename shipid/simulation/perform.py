@@ -62,7 +62,7 @@ def perform(
     ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step.
     """
     if not manoeuvres:
-        raise ShipidError("there is no manoeuvre to perform")
+        raise ShipidError("no manoeuvre is given: give at least one")
     between = step if interval is None else interval
     every = round(between / step)
     if every < 1 or abs(every * step - between) > 1e-9 * step * every:

@@ -148,7 +148,7 @@ class Claims(Strict):
     def _pairs(self) -> Claims:
         for one, other in (("accurate", "inaccurate"), ("moderate", "high")):
             if (getattr(self, one) is None) != (getattr(self, other) is None):
-                raise ValueError(f"`{one}` and `{other}` go together")
+                raise ValueError(f"give both `{one}` and `{other}`, or neither")
         return self
 
     @property
@@ -173,9 +173,9 @@ class Published(Strict):
     def _sensible(self) -> Published:
         for key, limits in self.envelope.items():
             if key not in published_keys():
-                raise ValueError(f"envelope.{key} is no input: {choices(key, published_keys())}")
+                raise ValueError(f"envelope.{key} is no input of a study: {choices(key, published_keys())}")
             if len(limits) != 3 or limits != sorted(limits):
-                raise ValueError(f"envelope.{key}: give [min, mean, max], found {limits}")
+                raise ValueError(f"envelope.{key}: give [min, mean, max], not {limits}")
         return self
 
 
@@ -597,7 +597,7 @@ def _changed(document: Document, changes: Mapping[str, Any], where: str, file: P
         try:
             document = documents.replace(document, {path: value})
         except (ValueError, IndexError, TypeError, AttributeError):
-            raise DocumentError("reaches no key of this study", file=file, path=f"{where}.{path}") from None
+            raise DocumentError("is no key of this study", file=file, path=f"{where}.{path}") from None
     return document
 
 
@@ -675,7 +675,7 @@ def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=f"truth.set.{error.path}") from None
     except (ValueError, IndexError, TypeError, AttributeError):
-        message = f"a path runs through a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
+        message = f"a path goes below a number of {truth.vessel}: see its dotted paths with `shipid vessel show {truth.vessel}`"
         raise DocumentError(message, file=file, path="truth.set") from None
 
 
@@ -753,7 +753,7 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
     names = [foundation.name for foundation in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise DocumentError(f"two foundations would be called {twice!r}: rename a family", file=file, path="family")
+        raise DocumentError(f"two models would have the name {twice!r}: rename a family", file=file, path="family")
     return (*found, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
 
 
@@ -863,8 +863,8 @@ def _check_claims(study: Study, models: Sequence[Foundation], file: Path) -> Non
     rivals = (("accurate", "inaccurate"), ("moderate", "high"), ("moderate", "nominal"), ("high", "nominal"))
     for one, other in rivals:
         if one in roles and roles[one] == roles.get(other):
-            raise DocumentError(f"the same family as claims.{one}", file=file, path=f"claims.{other}")
+            raise DocumentError(f"the same family as claims.{one}: name two different families", file=file, path=f"claims.{other}")
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
-        message = f"{nominal.name!r} is perturbed: the nominal row is the base as it is"
+        message = f"{nominal.name!r} is perturbed, but the nominal model is the base as it is: name a family without [[perturb]]"
         raise DocumentError(message, file=file, path="claims.nominal")

@@ -188,9 +188,9 @@ def compare_structures(
         raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
     fitted, tested = pick_runs(dataset, runs, held_out)
     if folds < 2:
-        raise ShipidError(f"{folds} is too few: two folds or more hold runs out", path="folds")
+        raise ShipidError(f"{folds}: give two folds or more", path="folds")
     if len(fitted) < 2:
-        raise DataError("only one run: it cannot be held out of its own fit; give two or more", path="runs")
+        raise DataError("only one run: give two or more, because each run is predicted by a fit to the others", path="runs")
     length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
     check_length(settings, length)
     tell = say or (lambda _: None)

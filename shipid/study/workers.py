@@ -68,7 +68,7 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
                 yield done, found
     except (EOFError, ConnectionError):
         raise ShipidError(
-            "a worker was killed, perhaps for want of memory; what is finished is kept: go on with fewer --workers"
+            "a worker process was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
         ) from None
     finally:
         workers.close()

@@ -636,7 +636,7 @@ def _shaft(vessel: Vessel, speed: float) -> float:
     while acceleration((speed, 0.0, 0.0), high)[0] < 0 and high < 1e3:
         low, high = high, 2 * high
     if high >= 1e3:
-        raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: ask for less")
+        raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if acceleration((speed, 0.0, 0.0), middle)[0] < 0 else (low, middle)

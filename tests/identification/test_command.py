@@ -79,7 +79,7 @@ MISTAKES = {
     "endless free run": (["--parameters", ONE, "--ahead", "inf"], "must hold two steps"),
     "prior without width": (["--parameters", ONE, "--prior", "hull.*"], "--prior: 'hull.*': write paths=0.3"),
     "prior of no number": (["--parameters", ONE, "--prior", "hull.*=wide"], "write paths=0.3"),
-    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "runs backwards"),
+    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "low above high"),
     "unknown nuisance": (["--parameters", ONE, "--nuisance", "currents"], "did you mean 'current'?"),
     "unknown key": (["--parameters", ONE, "--set", "horizn=3"], "unknown key: did you mean 'horizon'?"),
     "profile of what is not free": (["--parameters", ONE, "--profile", "inertia.m"], "is not free in the fit"),

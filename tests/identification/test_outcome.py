@@ -287,7 +287,7 @@ def test_settings_are_read_and_changed(tmp_path: Path) -> None:
         ("[identfy]\n", "identfy: unknown key: did you mean 'identify'"),
         ("identify = 3\n", "identify: must be a table"),
         ("[identify\n", "not valid TOML"),
-        ('[identify]\nparameters = ["a"]\nweights = {w = 1}\n', "weights.w is none"),
+        ('[identify]\nparameters = ["a"]\nweights = {w = 1}\n', "weights.w is no valid name"),
         ('[identify]\nparameters = ["a"]\nhorizon = 1\n', "must hold two steps"),
     ],
 )
