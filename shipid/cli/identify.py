@@ -291,7 +291,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     answer.rows("estimates", outcome.estimates, table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
     answer.say(
-        f"Factors are on the base; standard errors and intervals are theirs, by {words[outcome.statistics.chosen]}."
+        f"Factors are relative to the base. Standard errors and intervals are those of the factors, by {words[outcome.statistics.chosen]}."
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")

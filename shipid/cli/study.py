@@ -76,7 +76,7 @@ def study_new(
                 answer.say(look.sentence)
             elif look.changes:
                 corrected = f"{look.vessel.key}-corrected"
-                answer.say(f"draft of a correction, in the study as {corrected}; as a patch of its own:")
+                answer.say(f"draft of a correction; in the study it is {corrected}; as a patch:")
                 patch = look.patch(named)
                 answer.say(patch, correction=patch)
         names = [model.name for model in draft.plan.foundations]

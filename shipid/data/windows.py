@@ -16,7 +16,7 @@ from shipid.errors import DataError
 Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
-"""Purposes of a draw of runs: one seed gives each an order of its own."""
+"""Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
@@ -302,7 +302,7 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
 def covered(windows: Windows) -> float:
     """Recorded time [s] that windows see, pasts and futures included: the length of the union of their intervals.
 
-    Runs with clocks of their own are added up; on a shared clock a moment that two runs hold counts once.
+    Runs with separate clocks are added up; on a shared clock a moment in two runs counts once.
     """
     length = (windows.num_past + windows.horizon) * windows.step
     runs = [windows.t] if windows.shared_clock else [windows.t[windows.run == run] for run in windows.spans]

@@ -870,7 +870,7 @@ int main(void)
     {name}_init(&ship);
     for (i = 0; i < {rows}; ++i) {{
         {name}_record(&ship, {self.model.physics.step!r} * i, row);
-        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* north, as if she sailed that way */
+        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* a straight run to the north */
     }}
     status = {name}_{predict};
     printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");

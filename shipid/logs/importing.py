@@ -119,7 +119,7 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
 
 
 def run_of(file: Path, folder: Path, pattern: str) -> str:
-    """Return the name of the run in a file: what a single star stands for, else its path in the folder, less ending."""
+    """Return the name of the run in a file: the text that a single star matches, else its path in the folder without ending."""
     if pattern.count("*") == 1 and "/" not in pattern:
         before, _, after = pattern.partition("*")
         return file.name.removeprefix(before).removesuffix(after)

@@ -61,7 +61,7 @@ class Source(Strict):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
     With `runs`, a pattern such as `Z_*.dat` or `**/*.csv`, the log is a folder. Every file of that name is one run with
-    a separate clock. Its name is what the star stands for, or, of a pattern with more stars or with sub-folders, the
+    a separate clock. Its name is the text that the star matches; with more stars or with sub-folders it is the
     path without its ending. `skip` are files, by their path in the folder, that are left out. `manoeuvres` says what
     runs are.
     """

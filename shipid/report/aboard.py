@@ -17,8 +17,8 @@ from shipid.report.palette import INK, category
 from shipid.report.section import Section
 from shipid.report.selection import spread
 
-SAILED, PATH, PHYSICS, BAND, ALARM = "as it went", "predicted path", "physics alone", "band", "alarm"
-COLOURS = {SAILED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
+LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
+COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
 DASHES = {PHYSICS: "dash", BAND: "dot"}
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
@@ -77,7 +77,7 @@ def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
 
 def seen(content: AboardContent) -> Figure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
-    drawn = [SAILED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
+    drawn = [LOGGED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
     drawn += [BAND] if content.banded else []
     return Figure(
         id="seen",
@@ -98,7 +98,7 @@ def _map(content: AboardContent, run: str) -> go.Figure:
     points = content.points[content.points["run"] == run]
     times = points["t"].unique()
     shown = times[np.unique(np.linspace(0, len(times) - 1, MOMENTS).round().astype(int))]
-    traces = [_trace(SAILED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
+    traces = [_trace(LOGGED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
     for t in shown:
         mine = points[points["t"] == t]
         traces.append(_trace(PATH, mine["east"].to_numpy(), mine["north"].to_numpy(), 2.4))

@@ -1,4 +1,4 @@
-"""What the past tells: the observer along a test run, and what memory and observer bought, paired over test runs."""
+"""What the past shows: the observer along a test run, and what memory and observer bought, paired over test runs."""
 
 from __future__ import annotations
 
@@ -466,7 +466,7 @@ def table(content: ReportContent) -> Table | None:
 
 
 SECTION = Section(
-    "What the past tells",
+    "What the past shows",
     draw=lambda content: (observer(content), gain(content), windows(content), difference_map(content), table(content)),
     anchors=("observer", "memory-gain", "memory-windows", "memory-map", "memory-table"),
 )

@@ -24,7 +24,7 @@ ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MethodsContent(PageContent):
-    """A page of its own for a study of several parts.
+    """The page of a study of several parts.
 
     Parameters
     ----------

@@ -203,14 +203,14 @@ def _any(count: int) -> str:
 
 
 def _limit(found: Estimate) -> str:
-    """Up to which error of its own physics pays, in words."""
+    """Up to which error A physics pays, in words."""
     least, most = found.limits
     if found.above:
         low = f" [at least {_length(found.low)}]" if np.isfinite(found.low) and found.low < most else ""
-        return f"physics pays even with an error of {metres(most)} of its own, the worst tried{low}"
+        return f"physics pays even with an error A of {metres(most)}, the worst tried{low}"
     if found.below:
         high = f" [at most {_length(found.high)}]" if np.isfinite(found.high) and found.high > least else ""
-        return f"physics does not pay even with an error of {metres(least)} of its own, the best tried{high}"
+        return f"physics does not pay even with an error A of {metres(least)}, the best tried{high}"
     bounds = ""
     if np.isfinite(found.low):
         low = f"under {_length(least)}" if found.low <= least else _length(found.low)
@@ -411,7 +411,7 @@ def _how_to_read(case: Case) -> list[str]:
         )
     if plan.study.prediction.commands == "known" and _may_react(case.results):
         found.append(
-            "The orders of the next seconds were known. In a zigzag they tell when the heading will reach its limit, "
+            "The orders of the next seconds were known. In a zigzag they reveal when the heading will reach its limit, "
             "so these errors show at best what knowing the plan can give: an upper bound of its worth."
         )
     if note := too_few(table.runs):

@@ -3,7 +3,7 @@
 R1-R4 (method, section 5) are taken at the largest amount of data, from paired differences over test manoeuvres, as
 S1-S7 are: "shown" means a 95 % interval free of 0.
 
-R1 : both models have a lower H than their own A.
+R1 : both models have H below A.
 R2 : H of the inaccurate model is less than 10 % above A of the accurate one.
 R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap, with their signs, are above 0.
 R4 : at every step ahead pure data-driven has a larger error than every other predictor, physics alone included; refuted
@@ -38,7 +38,7 @@ from shipid.study.verdict import (
 
 Array = NDArray[np.float64]
 CLAIMS = {
-    "R1": "compensation beats its own physics model, accurate or not",
+    "R1": "compensated physics beats the physics alone, accurate or not",
     "R2": "the inaccurate model, compensated, is about as good as the accurate physics alone",
     "R3": "the gap between accurate and inaccurate physics shrinks after compensation",
     "R4": "pure data-driven prediction is worst over the whole horizon",
@@ -78,7 +78,7 @@ def _full_scale(results: Results, claims: Claims) -> list[Finding]:
     if any(name not in table.H for name in (good, bad, NO_MODEL)):
         return undecided(CLAIMS, "a cell that it needs has failed or is missing")
     if any(name not in table.A for name in (good, bad)):
-        return undecided(CLAIMS, "the physics of a claim is identified anew in every cell: it has no A of its own")
+        return undecided(CLAIMS, "the physics of a claim is identified again in every cell, so it has no single A")
     return judged(Rivals(table, good, bad, _steps(results, table.amounts[-1])))
 
 

@@ -61,7 +61,7 @@ CLAIMS = {
     "S2": "H falls with N_D for every model",
     "S3": "H rises with A at fixed N_D, most steeply at small N_D",
     "S4": "some high models beat pure data-driven; the worst stay worse even at the largest N_D, and fluctuate",
-    "S5": "H_90 tells the same story as H",
+    "S5": "H_90 leads to the same findings as H",
     "S6": "moderate models with small N_D beat pure data-driven with a larger one, and more accurate physics alone",
     "S7": "paths of pure data-driven at small N_D are rough, those of cooperative models are not",
 }
@@ -97,7 +97,7 @@ class Grid:
 
 
 def simulation_findings(results: Results) -> list[Finding]:
-    """Verdicts on S1-S7; all undecided where the study cannot tell, with the reason."""
+    """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
     H, H_90 = read_grid(results, "H"), read_grid(results, "H_90")
     if isinstance(H, str) or isinstance(H_90, str):
         return undecided(CLAIMS, str(H))

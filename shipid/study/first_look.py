@@ -135,7 +135,7 @@ class Look:
         seen = f"{'; '.join(self.facts)}; {errors}" if self.facts else errors
         if not self.changes:
             if self.alone < self.constant:
-                return f"{self.vessel.name} and the log agree as far as one number tells: {seen}"
+                return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
             return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
         first, *others = self.changes
         told = f"{_shown(self.vessel, first)} would explain most of it ({first.error:.3g} m)"

@@ -1,8 +1,8 @@
 """Any two or more runs side by side, cell by cell: the same family, member, method, N_D and seed.
 
 Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
-manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else each run has manoeuvres of
-its own, and they are resampled apart.
+manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else the manoeuvres of
+each run are resampled separately.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
 
 
 def _names(folders: Sequence[Path]) -> tuple[str, ...]:
-    """The last parts of folders that tell them apart, as few as do."""
+    """The shortest last parts of folders that make their names different."""
     parts = [folder.resolve().parts for folder in folders]
     for count in range(1, max(map(len, parts)) + 1):
         short = ["/".join(part[-count:]) for part in parts]

@@ -1,4 +1,4 @@
-"""What the past tells: the observer along test runs, and what memory and observer bought, paired over test runs."""
+"""What the past shows: the observer along test runs, and what memory and observer bought, paired over test runs."""
 
 from __future__ import annotations
 

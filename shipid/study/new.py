@@ -523,12 +523,12 @@ def _degraded(named: str, vessel: Vessel) -> list[Any]:
     return [
         {
             "name": "nominal",
-            "description": "the truth's own numbers: the floor that steps and held orders leave",
+            "description": "the numbers of the truth: the error that steps and held orders leave",
             "base": named,
         },
         {
             "name": "moderate",
-            "description": "each hull coefficient times a factor of its own in 0.4-1.6",
+            "description": "each hull coefficient times a separate factor in 0.4-1.6",
             "base": named,
             "members": MEMBERS["moderate"],
             "seed": 1,
@@ -555,7 +555,7 @@ def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warn
     document = tomlkit.document()
     document.add(
         tomlkit.comment(
-            "Written by `shipid study new`: the reasons stand above the values; change what you know better."
+            "Written by `shipid study new`. Above each value is its reason. Change what you know better."
         )
     )
     for line in (line for warning in warnings for line in textwrap.wrap(f"WRONG? {warning}", 110)):

@@ -180,7 +180,7 @@ class Published(Strict):
 
 
 class Condition(Strict):
-    """`[[condition]]`: what is different in one part of a study; its other parts stand beside it."""
+    """`[[condition]]`: the changes of one part of a study that has several parts."""
 
     name: Annotated[str, Field(pattern=NAME)]
     set: dict[str, Any] = Field(default={}, description="dotted path -> value")
@@ -336,8 +336,8 @@ class Plan:
     vessels : every vessel that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from.
     changes : what `--set` changed, already in the document.
-    parts : name -> a study of its own, for every repetition in every condition; empty where there is neither. Then they
-        are what is run.
+    parts : name -> a complete study for every repetition in every condition; empty where there is neither. If there
+        are parts, they are run in place of this study.
     """
 
     name: str
@@ -722,7 +722,7 @@ def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
 
 def _family_of_its_own(name: str, block: str) -> str:
     return (
-        "an identified or observed family is a family of its own: take the block out of this one and add "
+        "an identified or observed family must be a separate family: remove the block here and add "
         f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
     )
 

@@ -459,7 +459,7 @@ def judged_cells(results: Results) -> pd.DataFrame:
 
 
 def provenance_words(results: Results) -> dict[str, str]:
-    """What the results stand on, as label -> text."""
+    """What the results are based on, as label -> text."""
     record, study = results.provenance, results.plan.study
     machine = record.get("machine", {})
     words = {

@@ -99,7 +99,7 @@ def _computed(
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
-    """Where the turns of an interrupted rotation to a file are kept: a folder of its own for all that decides them."""
+    """Where the turns of an interrupted rotation to a file are kept: one folder for each study, dataset, device, version."""
     decides = [plan.digest, dataset.digest, device, __version__]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 

@@ -2,7 +2,7 @@
 
 What is known of screw, rudder and steering gear is taken as it is; the rest is guessed for the size, so that the thrust
 at the service shaft speed equals the resistance at the design speed. Times of a model are those of the ship over the
-square root of the scale (Froude). The result is a normal vessel document; better values may replace its own.
+square root of the scale (Froude). The result is a normal vessel document: better values may replace the guesses.
 """
 
 from __future__ import annotations

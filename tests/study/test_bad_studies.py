@@ -64,7 +64,7 @@ BROKEN = {
     "prediction-method-of-old": ("prediction.method", "is now called `integrator`"),
     "identify-inside-a-family": ("family.0.identify", 'add [[family]] name = "right-new", extends = "right"'),
     "identify-of-perturbed": ("family.1.identify", 'add [[family]] name = "wrong-new", extends = "wrong"'),
-    "identify-of-members": ("family.2.identify", "an identified or observed family is a family of its own"),
+    "identify-of-members": ("family.2.identify", "an identified or observed family must be a separate family"),
     "unknown-method": ("method.0.kind", "did you mean 'path-drawn'?"),
     "unknown-method-key": ("method.0.term", "did you mean 'terms'?"),
     "method-key-of-python": ("method.0.model_config", "unknown key"),

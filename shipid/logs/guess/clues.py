@@ -78,7 +78,7 @@ class Question:
 def unit_said(name: str, si: str) -> str | None:
     """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
 
-    A unit stands in brackets, or is the last part of a name or its last two.
+    A unit is in brackets, or it is the last part or the last two parts of a name.
     """
     inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
     bare = re.sub(r"[\[(].*", "", name).strip()

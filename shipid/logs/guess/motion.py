@@ -99,8 +99,8 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
 def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
     """Return the hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn.
 
-    The position may be of another point than the velocities, which looks like a sway speed. Where the track cannot
-    tell, v r < 0 decides: a ship drifts out of her turn. If they contradict, it is asked.
+    The position may be of another point than the velocities, which looks like a sway speed. Where the track is
+    no evidence, v r < 0 decides: a ship drifts out of her turn. If the two contradict, the draft asks.
     """
     assert state.psi is not None
     if best.frame == "earth":

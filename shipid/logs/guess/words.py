@@ -160,7 +160,7 @@ LEAST = 0.45  # share of a name that a phrase explains, before the name counts a
 
 
 def parts_of(name: str) -> tuple[str, ...]:
-    """Return the parts of a name in lower case, without what stands in brackets; accents and Greek are spelt out."""
+    """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", name)
     text = unicodedata.normalize("NFKD", "".join(_LETTERS.get(letter, letter) for letter in bare))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
