@@ -82,7 +82,9 @@ def loads(text: str, file: Path | str | None = None) -> Document:
     except tomllib.TOMLDecodeError as error:
         raise DocumentError(f"not valid TOML: {error}", file=file) from None
     except ValueError:  # of an integer with thousands of digits
-        raise DocumentError(f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file) from None
+        raise DocumentError(
+            f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file
+        ) from None
 
 
 def check_values(document: Any, file: Path | str | None) -> None:

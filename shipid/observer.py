@@ -127,7 +127,9 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another."""
     settings, model = settings or Observer(), dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
-        message = f"{vessel.name} has {model.num_dof} degrees of freedom, and the observer takes 3: use the model that it extends"
+        message = (
+            f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
+        )
         raise DocumentError(message, file=vessel.file, path="dof")
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:

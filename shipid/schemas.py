@@ -124,10 +124,10 @@ def _mapping() -> Schema:
         "file": (dict[str, file], {}),  # type: ignore[valid-type]
         "repair": (list[repairs], []),
     }
-    found = _schema_of(create_model("mapping", __base__=LogMapping, **fields))
-    del found["properties"]["digest"]  # is computed, not written
-    found["required"].remove("digest")
-    return found
+    schema = _schema_of(create_model("mapping", __base__=LogMapping, **fields))
+    del schema["properties"]["digest"]  # is computed, not written
+    schema["required"].remove("digest")
+    return schema
 
 
 def _vessel() -> Schema:
@@ -177,10 +177,10 @@ def _partial(node: Any) -> Any:
 
 
 def _of_kind(
-    what: str, kind: str, model: type[BaseModel], beside: Mapping[str, Any] | None = None, default: str = ""
+    what: str, kind: str, model: type[BaseModel], further: Mapping[str, Any] | None = None, default: str = ""
 ) -> type[BaseModel]:
     """The model of a kind with its `kind` fixed, and other fields beside its own."""
-    fields: dict[str, Any] = {**(beside or {}), "kind": (Literal[kind], kind if kind == default else ...)}
+    fields: dict[str, Any] = {**(further or {}), "kind": (Literal[kind], kind if kind == default else ...)}
     return create_model(f"{what}_{kind}", __base__=model, **fields)
 
 
@@ -189,8 +189,8 @@ def _either(models: list[type[BaseModel]]) -> Any:
 
 
 def _schema_of(model: type[BaseModel]) -> Schema:
-    found: Schema = _portable(model.model_json_schema())
-    return found
+    schema: Schema = _portable(model.model_json_schema())
+    return schema
 
 
 def _portable(node: Any) -> Any:

@@ -135,7 +135,7 @@ def test_a_quoted_key_may_hold_dots() -> None:
         ("a = " + "[" * 2000 + "]" * 2000, "nested deeper than 40"),
         ("a = " + "9" * 400, "a: an integer of 400 digits"),
         ("a = " + "9" * 4301, "has an integer larger than 1e+15"),
-        ("a = 1e308", "a: 1e+308: beyond 1e+24"),
+        ("a = 1e308", "a: 1e+308: larger than 1e+24"),
         ('a = "\\u001b[2J"', "a: '\\\\x1b[2J': text with a control character"),
         ('"\\u0007" = 1', "a name with a control character"),
     ],

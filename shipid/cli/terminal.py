@@ -263,11 +263,11 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
     task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
 
     def look() -> None:
-        found = watch.look()
-        progress.update(inner, visible=bool(found))
-        if found:
-            said = escape(visible(found[0].words))
-            progress.update(inner, description=said, completed=found[0].done, total=found[0].count)
+        searches = watch.look()
+        progress.update(inner, visible=bool(searches))
+        if searches:
+            text = escape(visible(searches[0].words))
+            progress.update(inner, description=text, completed=searches[0].done, total=searches[0].count)
 
     with progress, looking(look, LOOK):
         for event in events:

@@ -346,7 +346,7 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
             return folds
     (run,) = windows.spans
     length = (windows.num_past + windows.horizon) * windows.step
-    raise DataError(f"run {run!r} is too short to train and validate with windows of {length:g} s: shorten the horizon, or use more runs")
+    raise DataError(f"run {run!r} is too short to train and validate with windows of {length:g} s: shorten the horizon")
 
 
 def run_folds(
@@ -395,7 +395,9 @@ def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str,
     """Split the runs into (rest, held out), `share` of them held out, at least one on each side."""
     drawn = _drawn(runs, seed, HELD_OUT)
     if len(drawn) < 2 or not 0 < share < 1:
-        raise DataError(f"a share of {share:g} of {len(drawn)} runs cannot be held out: give at least two runs and a share between 0 and 1")
+        raise DataError(
+            f"a share of {share:g} of {len(drawn)} runs cannot be held out: give two runs or more, and 0 < share < 1"
+        )
     count = min(max(round(share * len(drawn)), 1), len(drawn) - 1)
     return tuple(drawn[count:]), tuple(drawn[:count])
 

@@ -98,11 +98,11 @@ def _names_of(prefix: str, group: str, names: Sequence[str], unit: Mapping[str, 
 
 def provenance_lines(what: Mapping[str, Any]) -> list[str]:
     """Plain lines of what is known of an origin, for a comment."""
-    found = []
+    lines = []
     for key, value in what.items():
         text = json.dumps(value, default=str, ensure_ascii=True)
-        found.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
-    return found
+        lines.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
+    return lines
 
 
 # ---------------------------------------------------------------------------------------------------------- vessel

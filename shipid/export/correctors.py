@@ -404,11 +404,11 @@ def one_step_builder(known: Known, corrector: OneStepCorrector) -> Builder:
     """Missing acceleration of one step."""
 
     def build(graph: Graph, at: Mapping[str, Value], _: Value, __: Value | None) -> tuple[Value, None]:
-        found = []
+        terms = []
         for head in corrector.heads:
             x = _features(graph, known, at, corrector.commands, head.units.normaliser.names)
-            found.append(graph.call(units_with(head.units, head.surge, head.sway_yaw), x))
-        return graph.total(found, float(len(found))), None
+            terms.append(graph.call(units_with(head.units, head.surge, head.sway_yaw), x))
+        return graph.total(terms, float(len(terms))), None
 
     return build
 

@@ -107,12 +107,12 @@ class Model:
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Entry of `now` -> least and greatest value without an alarm."""
-        found = {}
+        limits = {}
         for name, (low, high) in self.predictor.limits.items():
             if name in self.layout.now:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
-                found[name] = (float(low - slack), float(high + slack))
-        return found
+                limits[name] = (float(low - slack), float(high + slack))
+        return limits
 
     def unit(self, name: str) -> str:
         """SI unit of an entry of an input."""

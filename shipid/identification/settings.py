@@ -154,14 +154,20 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
         if not paths:
-            message = f"{pattern!r} selects no parameter that is free in the fit: add it to parameters, or remove it here"
+            message = (
+                f"{pattern!r} selects no parameter that is free in the fit: add it to parameters, or remove it here"
+            )
             raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
         return paths
 
     fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", asked)}
     free = [path for path in asked if path not in fixed]
     if not free:
-        raise DocumentError("every selected parameter is also fixed, so none is left to estimate: fix fewer", file=file, path=f"{BLOCK}.fixed")
+        raise DocumentError(
+            "every selected parameter is also fixed, so none is left to estimate: fix fewer",
+            file=file,
+            path=f"{BLOCK}.fixed",
+        )
     unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
     if unknown is not None:
         hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
@@ -258,7 +264,9 @@ def overrides(
             raise DocumentError(f"does not begin with the name of a run: {hint}", file=vessel.file, path=where)
         path = key[len(run) + 1 :]
         if path not in valid:
-            raise DocumentError(f"{path!r} cannot be set for a run: {choices(path, valid)}", file=vessel.file, path=where)
+            raise DocumentError(
+                f"{path!r} cannot be set for a run: {choices(path, valid)}", file=vessel.file, path=where
+            )
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise DocumentError(f"{value!r} is not a number", file=vessel.file, path=where)
         result[run][path] = float(value)

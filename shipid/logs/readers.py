@@ -138,12 +138,12 @@ def seconds(dates: pd.Series[Any]) -> Array:
     midnight. NaN where there is none.
     """
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        said = dates.dropna().astype(str)
-        if len(said) and said.str.fullmatch(TIME_OF_DAY).all():
+        texts = dates.dropna().astype(str)
+        if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
         for pattern in DOTTED:
             moments = pd.to_datetime(dates, format=pattern, utc=True, errors="coerce")
-            if len(said) and moments.notna().mean() > 0.5:
+            if len(texts) and moments.notna().mean() > 0.5:
                 rest = pd.to_datetime(dates, format=pattern.replace(".%f", ""), utc=True, errors="coerce")
                 return _since_1970(moments.fillna(rest))
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))

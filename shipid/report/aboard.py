@@ -118,11 +118,11 @@ def _trace(name: str, x: Floats, y: Floats, width: float) -> go.Scatter:
 def along(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error = content.instants["error"].median()
-    said = f"The median error at the end of a path is {error:.2f} m."
+    takeaway = f"The median error at the end of a path is {error:.2f} m."
     return Figure(
         id="along",
         title="Along the run",
-        takeaway=said if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
+        takeaway=takeaway if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
         how="Error at the end of the path predicted at each instant"
         + (", with the half axes of the band there" if content.banded else "")
         + "; marks are instants outside of the training, where nothing is promised.",

@@ -72,9 +72,9 @@ class IdentificationContent(PageContent):
     def answer(self) -> list[Sentence]:
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
-        said = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
-        said.append(Sentence(_bought(self), "free-runs"))
-        return [*said, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
+        sentences = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
+        sentences.append(Sentence(_bought(self), "free-runs"))
+        return [*sentences, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
 def write_identification(content: IdentificationContent, file: Path) -> Path:

@@ -41,8 +41,8 @@ class ReplayContent(PageContent):
     def answer(self) -> list[Sentence]:
         """The error over all runs."""
         row = self.errors[self.errors["run"] == "all"].iloc[0]
-        said = f"Position is {number(float(row['position']))} m off, RMS over all rows, {_length(self.ahead)}."
-        return [Sentence(said, "errors")]
+        text = f"Position is {number(float(row['position']))} m off, RMS over all rows, {_length(self.ahead)}."
+        return [Sentence(text, "errors")]
 
 
 def write_replay(content: ReplayContent, file: Path) -> Path:

@@ -241,6 +241,6 @@ def _orders(
     values = np.array(list(vessel.parameters.values()))
     parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
     state, hidden, inputs, environment = (part.reshape(records * samples, part.shape[-1]).T for part in parts)
-    found = orders_of(model, state, hidden, inputs, environment, values)
-    ordered = found.reshape(-1, records, samples).swapaxes(0, 1)
+    orders = orders_of(model, state, hidden, inputs, environment, values)
+    ordered = orders.reshape(-1, records, samples).swapaxes(0, 1)
     return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

@@ -141,7 +141,9 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     while surplus(high) < 0:
         low, high = high, 2 * high
         if high > MOST_RPM * RPM:
-            raise ShipidError(f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed")
+            raise ShipidError(
+                f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed"
+            )
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if surplus(middle) < 0 else (low, middle)

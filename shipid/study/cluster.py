@@ -97,12 +97,12 @@ def _results(
                 continue
             key, _ = left.pop(future.key)
             try:
-                found = future.result(timeout=SILENT)
+                results = future.result(timeout=SILENT)
             except KilledWorker:
                 killed.append(key)
                 continue
-            yield tasks[key], found
-            del future, found  # a worker may forget them
+            yield tasks[key], results
+            del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
         raise gone() from None
     if killed:

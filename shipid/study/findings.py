@@ -66,8 +66,8 @@ def findings(results: Results) -> list[Finding]:
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    found = _full_scale(results, claims) if claims.accurate is not None else []
-    return [*found, *(simulation_findings(results) if claims.moderate is not None else [])]
+    verdicts = _full_scale(results, claims) if claims.accurate is not None else []
+    return [*verdicts, *(simulation_findings(results) if claims.moderate is not None else [])]
 
 
 def _full_scale(results: Results, claims: Claims) -> list[Finding]:
@@ -86,23 +86,23 @@ def judged(rivals: Rivals) -> list[Finding]:
     """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval."""
     table, good, bad = rivals.table, rivals.good, rivals.bad
     place = len(table.amounts) - 1
-    own = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
+    gains = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
     gap = [(1.0, bad, ALONE), (-1.0, good, ALONE)]
     about = table.compare([[(1 + ABOUT, good, ALONE), (-1.0, bad, place)], [(1.0, good, ALONE), (-1.0, bad, place)]])
     gaps = table.compare([[*gap, (sign, bad, place), (-sign, good, place)] for sign in (-1.0, 1.0)])
     before, after = (abs(table.mean(bad, at) - table.mean(good, at)) for at in (ALONE, place))
     narrower = gaps.mean[0] < gaps.mean[1]  # the one that counts: the gap of H has the sign of that of A, or not
-    share, worst, found = _worst(rivals)
+    share, worst, worst_of_all = _worst(rivals)
     verdicts: dict[str, Verdict] = {
-        "R1": verdict(every(own.above), some(own.below)),
+        "R1": verdict(every(gains.above), some(gains.below)),
         "R2": verdict(every(about.above[:1]), some(about.below[:1])),
         "R3": verdict(every(gaps.above), some(gaps.below)),
-        "R4": found,
+        "R4": worst_of_all,
     }
     alone, H = ({model: table.mean(model, at) for model in (good, bad)} for at in (ALONE, place))
     evidence = {
         "R1": "; ".join(
-            f"{model} {metres(alone[model])} -> {metres(H[model])}, {measured(own, k)} less"
+            f"{model} {metres(alone[model])} -> {metres(H[model])}, {measured(gains, k)} less"
             for k, model in enumerate((good, bad))
         ),
         "R2": f"inaccurate and compensated {metres(H[bad])}, accurate alone {metres(alone[good])}: "
@@ -149,8 +149,8 @@ def _worst(rivals: Rivals) -> tuple[float, str, Verdict]:
     each = contrasts(ahead, rivals.table.counts, training)
     whole = np.stack([(pure - error).mean(axis=0) for error in others])
     over = noise * np.array([np.hypot((pure @ weights).mean(), (error @ weights).mean()) for error in others])
-    found = verdict(every(each.above), some(contrasts(whole, rivals.table.counts, over).below))
-    return float(worst[names.index(NO_MODEL)] / worst.sum()), names[int(worst.argmax())], found
+    decided = verdict(every(each.above), some(contrasts(whole, rivals.table.counts, over).below))
+    return float(worst[names.index(NO_MODEL)] / worst.sum()), names[int(worst.argmax())], decided
 
 
 def by_step(path: Array, future: Array, run: NDArray[np.str_]) -> Array:

@@ -553,9 +553,9 @@ def build_plan(
             check_truth(study.truth, truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
-    found = _sources(study.data, file) if sources is None and study.data is not None else sources
+    digests = _sources(study.data, file) if sources is None and study.data is not None else sources
     plan = Plan(
-        file.stem, str(file), document, study, foundations, methods, batches, truth, known, found or {}, changes or {}
+        file.stem, str(file), document, study, foundations, methods, batches, truth, known, digests or {}, changes or {}
     )
     _check_names(plan)
     _check_memory(plan)
@@ -573,7 +573,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             raise DocumentError(f"two conditions are called {name!r}", file=file, path=f"condition.{place}.name")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
-    found: dict[str, Part] = {}
+    parts: dict[str, Part] = {}
     for place, condition in enumerate(conditions or [None]):
         for number, turn in enumerate(turns, start=1):
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
@@ -582,10 +582,10 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
             part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
             whole: dict[str, Any] = {"repeat": {}, "condition": []}
-            found[name] = Part(
+            parts[name] = Part(
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
             )
-    return found
+    return parts
 
 
 def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
@@ -643,11 +643,11 @@ def mapping_of(data: Data, file: Path) -> str | None:
 def _sources(data: Data, file: Path) -> dict[str, str]:
     """Digests of what the runs come from; a missing file is reported when it is read."""
     mapping = mapping_of(data, file)
-    found = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
+    digests = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
     for key, name in (("log", data.log), ("dataset", data.dataset)):
         if name is not None and beside(file.parent, name).is_file():
-            found[key] = sha256_of(beside(file.parent, name))
-    return found
+            digests[key] = sha256_of(beside(file.parent, name))
+    return digests
 
 
 def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
@@ -675,7 +675,7 @@ def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=f"truth.set.{error.path}") from None
     except (ValueError, IndexError, TypeError, AttributeError):
-        message = f"a path goes below a number of {truth.vessel}: see its dotted paths with `shipid vessel show {truth.vessel}`"
+        message = f"a path goes below a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
         raise DocumentError(message, file=file, path="truth.set") from None
 
 
@@ -730,7 +730,7 @@ def _family_of_its_own(name: str, block: str) -> str:
 def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
     """Every member of every family; an identified family has the members of the family that it extends."""
     families = resolve(study.family, file)
-    found: list[Foundation] = []
+    foundations: list[Foundation] = []
     for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
         if family.name == NO_MODEL:
@@ -739,7 +739,9 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
         if family.identify is None and family.observer is None:
-            found += [Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
+            foundations += [
+                Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)
+            ]
             continue
         root = _root(study.family, index, file)
         parent = families[root]
@@ -749,12 +751,14 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
         described = words or ", ".join(filter(None, (parent.description, *ways)))
         for variant in members(parent, vessel, file):
             name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
-            found.append(Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer))
-    names = [foundation.name for foundation in found]
+            foundations.append(
+                Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
+            )
+    names = [foundation.name for foundation in foundations]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DocumentError(f"two models would have the name {twice!r}: rename a family", file=file, path="family")
-    return (*found, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+    return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
 
 
 def _root(families: Sequence[Family], index: int, file: Path) -> int:
@@ -863,8 +867,10 @@ def _check_claims(study: Study, models: Sequence[Foundation], file: Path) -> Non
     rivals = (("accurate", "inaccurate"), ("moderate", "high"), ("moderate", "nominal"), ("high", "nominal"))
     for one, other in rivals:
         if one in roles and roles[one] == roles.get(other):
-            raise DocumentError(f"the same family as claims.{one}: name two different families", file=file, path=f"claims.{other}")
+            raise DocumentError(
+                f"the same family as claims.{one}: name two different families", file=file, path=f"claims.{other}"
+            )
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
-        message = f"{nominal.name!r} is perturbed, but the nominal model is the base as it is: name a family without [[perturb]]"
+        message = f"{nominal.name!r} is perturbed: the nominal model must be the base as it is"
         raise DocumentError(message, file=file, path="claims.nominal")

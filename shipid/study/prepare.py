@@ -290,8 +290,8 @@ def kinds_of_runs(dataset: Dataset) -> dict[str, str]:
         if run not in longest or np.ptp(rows["t"]) > np.ptp(longest[run]["t"]):
             longest[run] = rows
     declared: Mapping[str, str] = dataset.metadata.get("manoeuvres", {})
-    found = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
-    return {run: kind for run, kind in found if kind}
+    kinds = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
+    return {run: kind for run, kind in kinds if kind}
 
 
 def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:

@@ -313,7 +313,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     )
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
-    found, naive, cells = [], constant_motion(test), _shown_cells(results)
+    rows, naive, cells = [], constant_motion(test), _shown_cells(results)
     level, edges = results.plan.study.bands.level, {}
     for row in cells:
         bands_of_cell = results.bands.get(row["cell"])
@@ -338,7 +338,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 if row["seed"] == seed and row["cell"] in edges
             }
             origin = np.zeros((1, 2))
-            found.append(
+            rows.append(
                 {
                     "run": run,
                     "t": float(test.t[index]),
@@ -350,7 +350,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                     "bands": bands,
                 }
             )
-    return found
+    return rows
 
 
 def border(region: Region, paths: np.ndarray, index: int) -> np.ndarray:

@@ -45,8 +45,8 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
 
 def notes(plan: Plan, dataset: Dataset, wanted: Sequence[Family]) -> list[str]:
     """What is left out of the windows of a study, and what the bases of the families feel and the runs do not hold."""
-    pool, _, found = partition(plan, dataset)
-    return [*found, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
+    pool, _, redrawn = partition(plan, dataset)
+    return [*redrawn, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
 
 
 def screen(
@@ -80,16 +80,16 @@ def _rows(
     for same in _equal_lags(base, values):
         vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
         for windows in parts:
-            found = physics_of(plan, vessel).distances(
+            distances = physics_of(plan, vessel).distances(
                 instants_of(plan, vessel, dataset, windows),
                 windows.future,
                 values[same],
                 engine=REPEATED,
                 device=device,
             )
-            total[same] += found.total.sum(axis=1)
-            counts[same] += found.tally
-            failed[same] += found.diverged.sum(axis=1)
+            total[same] += distances.total.sum(axis=1)
+            counts[same] += distances.tally
+            failed[same] += distances.diverged.sum(axis=1)
     whole, num_windows = failed == 0, sum(map(len, parts))
     rows = {
         "family": [variant.family for variant in variants],

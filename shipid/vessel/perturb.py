@@ -117,7 +117,9 @@ class Perturbation(BaseModel):
     def _one_meaning(self) -> Perturbation:
         selecting = [key for key, rule in RULES.items() if rule.places is None]
         if bool(self.parameters) != any(key in self.given for key in selecting):
-            raise ValueError(f"`parameters` and {_either(selecting)} are needed together: which numbers, and by how much")
+            raise ValueError(
+                f"`parameters` and {_either(selecting)} are needed together: which numbers, and by how much"
+            )
         if not (self.parameters or any(self.given.values())):
             others = ", or ".join(f"`{key}`" for key in RULES if key not in selecting)
             raise ValueError(f"has no rule: give `parameters` with {_either(selecting)}, or {others}")
@@ -131,8 +133,8 @@ class Perturbation(BaseModel):
     @property
     def given(self) -> dict[str, Any]:
         """Key of each rule that the block uses -> its argument, in the order of `RULES`."""
-        said = self.model_extra or {}
-        return {key: said[key] for key in RULES if said.get(key) is not None}
+        extra = self.model_extra or {}
+        return {key: extra[key] for key in RULES if extra.get(key) is not None}
 
     @property
     def drawn(self) -> bool:

@@ -67,7 +67,7 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
 MISTAKES = {
     "unknown path": (["--parameters", "hull.derivatives.N_urr"], "selects nothing: did you mean"),
     "nothing to identify": ([], "identify.parameters: missing"),
-    "all fixed": (["--parameters", ONE, "--fixed", "hull.*"], "nothing is left"),
+    "all fixed": (["--parameters", ONE, "--fixed", "hull.*"], "is also fixed"),
     "tied to what is fixed": (["--parameters", ONE, "--together", f"{ONE},inertia.m"], "tied but not free"),
     "unknown run": (["--parameters", ONE, "--runs", "M011"], "is no run: did you mean"),
     "no test run": (["--parameters", ONE, "--test", "ZZ*"], "'ZZ*' is no run: valid: M01"),

@@ -81,7 +81,7 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
         ("stop", (1,), {}, "ANGLES: stop takes no angles"),
         ("turning", (-35,), {}, "ANGLES: angles are positive"),
         ("turning", (), {"side": "left"}, "--side: 'left' is no side"),
-        ("turning", (), {"speed": 0.0}, "--speed: a speed of 0 m/s"),
+        ("turning", (), {"speed": 0.0}, "--speed: 0 m/s"),
         ("turning", (), {"speed": 900.0}, "--speed: no shaft speed drives"),
         ("turning", (), {"duration": 0.0}, "--duration: 0 s must be positive"),
         ("turning", (), {"step": -1.0}, "--step: -1 s must be positive"),
