@@ -248,7 +248,7 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
         answer.say(look.sentence)
     answer.say(first_look=look.sentence)
     if look.changes:
-        answer.say("draft of a correction, to begin with:")
+        answer.say("draft of a correction:")
         patch = look.patch(str(ship.file))
         answer.say(patch, correction=patch)
 
@@ -316,7 +316,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     if outcome.solution.effective:
         worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
         counts = dict(outcome.solution.effective)
-        answer.say(f"residuals count as so many independent ones: {worth}", independent_residuals=counts)
+        answer.say(f"number of independent residuals that they are worth: {worth}", independent_residuals=counts)
     profiles = [curve.sentence for curve in outcome.profiles]
     answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:

@@ -327,7 +327,7 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     shown = table(["what differs", *compared.names], rows[:MOST_DIFFERENCES])
     answer.rows("documents", documents, shown if rows else None)
     if not rows:
-        answer.say("the documents say the same")
+        answer.say("the documents are equal")
     elif len(rows) > MOST_DIFFERENCES:
         answer.say(f"and {len(rows) - MOST_DIFFERENCES} more: --json shows all")
     banded = bool(errors[["coverage_first", "coverage_other"]].notna().any(axis=None))

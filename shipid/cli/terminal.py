@@ -218,7 +218,7 @@ class Quiet:
     def look(self) -> None:
         """Print the search that moved last, if it is time to."""
         if time.monotonic() - self.last >= SILENCE and (found := self.watch.look()):
-            more = f" ({len(found)} searches go on)" if len(found) > 1 else ""
+            more = f" ({len(found)} searches are running)" if len(found) > 1 else ""
             self.say(f"... {found[0].words}{more}")
 
 

@@ -179,12 +179,12 @@ def _remarks(given: Particulars) -> Iterator[str]:
     """What the guess took for granted, where that matters most."""
     if given.scale is None and given.reduction != 1.0:
         yield (
-            f"{given.length:g} m is taken for a model at a scale of {given.reduction:.3g}: --scale says it, "
-            "and sets how fast rudder or azimuth turns"
+            f"{given.length:g} m counts as a model at a scale of {given.reduction:.3g}: give the scale by --scale; "
+            "it sets how fast rudder or azimuth turns"
         )
     if given.rpm is None:
-        unknown = "its shaft speed" if given.propeller_diameter else "its diameter and shaft speed"
-        yield f"of the screw {unknown} is a guess: --rpm is that at {given.service:.3g} m/s"
+        unknown = "The shaft speed is a guess" if given.propeller_diameter else "Diameter and shaft speed are guesses"
+        yield f"{unknown}: give the shaft speed at {given.service:.3g} m/s by --rpm"
 
 
 def _check(given: Particulars) -> None:
