@@ -1,4 +1,4 @@
-"""What this machine is and has: its processor, and memory; what cannot be had is refused before it is asked for."""
+"""Processor and memory of this machine; a demand beyond its memory is refused before it is allocated."""
 
 from __future__ import annotations
 

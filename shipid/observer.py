@@ -101,7 +101,7 @@ class Bank:
     """Numbers of every filter of one vessel in SI units.
 
     numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
-    beside the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
+    in addition to the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
     """
 
     vessel: Vessel
@@ -320,7 +320,7 @@ def _waves(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
 
 
 def _output(x: SX) -> SX:
-    """What is measured (6) of a state."""
+    """The measurement (6) of a state."""
     c, s = ca.cos(x[2]), ca.sin(x[2])
     return ca.vertcat(x[0] + c * x[11] - s * x[12], x[1] + s * x[11] + c * x[12], x[2] + x[13], x[3:6] + x[14:17])
 

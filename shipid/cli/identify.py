@@ -154,7 +154,7 @@ def _compare(
     dataset: Path,
     answer: Answer,
 ) -> None:
-    """Compare structures of the hull, print what was found, and write the vessel with the structure chosen."""
+    """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
     from shipid.identification.structures import PRESENT, STRUCTURES
     from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
 

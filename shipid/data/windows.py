@@ -114,7 +114,7 @@ class Windows:
         hidden: Mapping[str, Array] | None = None,
         estimates: Mapping[str, Array] | None = None,
     ) -> Instants:
-        """What a predictor knows: no future, but for the commands where they are `known` over the horizon."""
+        """Input of a predictor: no future, except for the commands where they are `known` over the horizon."""
         return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {})
 
     @property

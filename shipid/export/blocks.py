@@ -214,7 +214,7 @@ class Mirrored(Block):
 
     @cached_property
     def function(self) -> ca.Function:
-        """The same with matrices as constants."""
+        """The block with matrices as constants."""
         z = MX.sym("z", len(self.weight))
         image = ca.vertcat(*(float(s) * z[int(p)] for p, s in zip(self.place, self.sign, strict=True)))
         weight, offset = ca.DM(self.weight.T), ca.DM(self.offset)

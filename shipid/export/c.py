@@ -46,7 +46,7 @@ WORDS = frozenset(
 
 @dataclass(frozen=True)
 class Files:
-    """What is written: name of a file -> its text; `name` begins every public name in C."""
+    """The files: name of a file -> its text; `name` begins every public name in C."""
 
     name: str
     texts: dict[str, str]
@@ -534,7 +534,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
 {self._band(call)}"""
 
     def _promise(self) -> list[str]:
-        """What is said of the band."""
+        """Comments of the header on the band."""
         if self.bands is None:
             return [f"No band: {self.model.no_band}."]
         kinds = "".join(f", {kind} ({count})" for kind, count in self.bands.kinds.items())

@@ -1,4 +1,4 @@
-"""CasADi files: a predictor or a vessel as a `casadi.Function`, with a list of names beside it."""
+"""CasADi files: a predictor or a vessel as a `casadi.Function`, with a list of names in a second file."""
 
 from __future__ import annotations
 

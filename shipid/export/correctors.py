@@ -33,7 +33,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Taken:
-    """What a corrector takes: names of commands, names of its inputs (those of the past are not among them)."""
+    """Inputs of a corrector: names of commands, names of its inputs (without those of the past)."""
 
     commands: tuple[str, ...]
     names: tuple[str, ...]
@@ -556,7 +556,7 @@ CORRECTORS: dict[type[Any], Counterpart] = {
 
 
 def taken(corrector: Any) -> Taken:
-    """What a corrector takes; ShipidError for one that has no counterpart here."""
+    """Inputs of a corrector; ShipidError for a corrector that cannot be exported."""
     if type(corrector) not in CORRECTORS:
         kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
         named = next((kind for kind, method in METHODS.items() if method.corrector is type(corrector)), "of this kind")

@@ -53,7 +53,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Packed:
-    """What an FMU is made of: its variables in the order of value references, its C, and its name."""
+    """The parts of an FMU: its variables in the order of value references, its C, and its name."""
 
     identifier: str
     title: str

@@ -1,4 +1,4 @@
-"""What a predictor knows at an instant, as inputs of a graph, and what the physics and the memory make of it."""
+"""Inputs of a predictor at an instant as symbols of a graph, and what physics and memory compute from them."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ MOST_NUMBERS = 250_000
 
 
 class Exportable(Protocol):
-    """What is taken of a predictor, see `shipid.predictor.Predictor`."""
+    """The parts of a predictor that an export uses, see `shipid.predictor.Predictor`."""
 
     @property
     def physics(self) -> Physics: ...  # noqa: D102

@@ -77,7 +77,8 @@ class Identify(documents.Checked, BaseModel):
         description="where to begin: growing horizons, inverse dynamics, or the base",
     )
     discount: bool = Field(
-        default=False, description="correlated residuals weigh as the independent ones that they are worth, so that priors count"
+        default=False,
+        description="correlated residuals weigh as their number of independent ones, so that priors count",
     )
     ranges: bool = Field(default=False, description="numbers stay within the ranges that ships have")
     drop: Positive | None = Field(

@@ -37,7 +37,7 @@ Progress = Callable[[float], None]
 
 
 class Format(Strict):
-    """What every format declares: its kind."""
+    """Field of every format: its kind."""
 
     kind: str = "text"
 

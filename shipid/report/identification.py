@@ -338,7 +338,7 @@ def residuals(content: IdentificationContent) -> Figure | None:
         id="residuals",
         title="Autocorrelation of the residuals",
         takeaway=f"One sample later, residuals correlate by {listed(correlated)}.",
-        how="Autocorrelation of the weighted residuals, pooled over runs. White residuals fall to 0 at once; a long "
+        how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,

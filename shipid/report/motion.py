@@ -1,4 +1,4 @@
-"""Recorded motion beside simulated: speeds and yaw rate over time, and the track."""
+"""Recorded and simulated motion: speeds and yaw rate over time, and the track."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a replay: recorded runs beside what a vessel does with the recorded orders."""
+"""The page of a replay: recorded runs, and the motion of a vessel with the recorded orders."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class StructuresContent(PageContent):
 
     @property
     def answer(self) -> list[Sentence]:
-        """What was chosen, and what follows."""
+        """The structure chosen, and the sentences on it."""
         return [
             Sentence(f"{sentence[0].upper()}{sentence[1:]}.", "structures" if number == 0 else "")
             for number, sentence in enumerate(self.sentences)

@@ -224,7 +224,7 @@ def write(played: Played, file: Path) -> None:
 
 
 def summary(played: Played) -> list[str]:
-    """What an officer would have seen, as lines."""
+    """Summary of a replay, as lines."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     lines = [

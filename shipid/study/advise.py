@@ -68,7 +68,7 @@ class Sides:
 
 @dataclass(frozen=True)
 class Case:
-    """What the sentences of one study are made from: `rows` are `by_model` without families set aside."""
+    """Inputs of the sentences of one study: `rows` are `by_model` without families set aside."""
 
     results: Results
     rows: pd.DataFrame
@@ -110,7 +110,7 @@ class Case:
         return interval(float(difference.low[0]), float(difference.high[0]))
 
     def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
-        """Who is better (above 0), who worse; by sign alone where there are too few test manoeuvres."""
+        """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
         if too_few(self.table.runs):
             above, below = differences.mean > 0, differences.mean <= 0
         else:
@@ -232,7 +232,7 @@ def _against_none(case: Case, amount: int) -> Sides:
 
 
 def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
-    """What the best model has with the fewest runs, and how many runs that takes without physics."""
+    """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
     fewest, largest, best = case.smallest, case.largest, case.best
     if fewest == largest:
         return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
@@ -269,7 +269,7 @@ def _count(value: float, estimate: Estimate) -> str:
 
 
 def _headline(case: Case) -> str:
-    """What the model that validation prefers does at the largest amount of data."""
+    """Error of the model with the lowest validation loss at the largest amount of data."""
     rows = case.at(case.largest).set_index("model")
     alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
     chosen = "" if case.smallest < case.largest else "best in validation; "
@@ -308,7 +308,7 @@ def _physics_or_none(case: Case, judged: bool) -> list[str]:
 
 
 def _counted(sides: Sides, rival: str) -> str:
-    """Who is better than a rival and who is worse, as one sentence."""
+    """Which models are better than a rival and which are worse, as one sentence."""
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
         return f"every physics model with a result does better than {rival}"

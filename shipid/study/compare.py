@@ -1,4 +1,4 @@
-"""The same study in several worlds: finished folders that differ in their top-level seed alone, side by side."""
+"""One study in several worlds: comparison of finished folders that differ in their top-level seed alone."""
 
 from __future__ import annotations
 

@@ -214,7 +214,7 @@ class _Trial:
     known: dict[Gear, Instants] = field(default_factory=dict)
 
     def instants(self, gear: Gear = ()) -> Instants:
-        """What the vessel with changed actuators knows at every window: planned commands, and where they are."""
+        """Instants for the vessel with changed actuators: planned commands, and positions of the actuators."""
         if gear not in self.known:
             hidden = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
             self.known[gear] = self.windows.instants(known=True, hidden=hidden)

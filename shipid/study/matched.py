@@ -1,4 +1,4 @@
-"""Any two or more runs side by side, cell by cell: the same family, member, method, N_D and seed.
+"""Two or more runs compared cell by cell: the same family, member, method, N_D and seed.
 
 Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
 manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else the manoeuvres of
@@ -274,7 +274,7 @@ def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: 
 
 
 def _verdicts(compared: Contrasts) -> list[str]:
-    """What is shown of each difference, corrected for their number in each direction."""
+    """Verdict on each difference, corrected for their number in each direction."""
     if not np.isfinite(compared.below).all():
         return [""] * len(compared)
     lower, higher = shown(compared.below), shown(compared.above)

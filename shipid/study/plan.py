@@ -379,7 +379,7 @@ class Plan:
 
     @property
     def digest_in_any_world(self) -> str:
-        """The same digest without the top-level seed: equal for repetitions of one study."""
+        """Digest without the top-level seed: equal for repetitions of one study."""
         return self._digest({key: value for key, value in self.document.items() if key != "seed"})
 
     def _digest(self, document: Document) -> str:
@@ -471,7 +471,7 @@ class Plan:
         return sorted((tuple(sorted(pairs, key=order.__getitem__)) for _, pairs in groups), key=lambda g: order[g[0]])
 
     def cut(self, columns: int) -> Cut:
-        """What decides how much memory the windows take, for a dataset of so many columns."""
+        """The numbers that decide the memory of the windows, for a dataset of so many columns."""
         prediction = self.study.prediction
         rolled = len(self.foundations)
         return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)

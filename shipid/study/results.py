@@ -158,7 +158,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
 
 
 def _observed(predictor: Predictor, dataset: Dataset, known: dict[str, Estimates]) -> Estimates | None:
-    """What the observer of a predictor knows along the runs; `known` keeps it for predictors of one vessel."""
+    """Estimates of the observer of a predictor along the runs; `known` caches them for predictors of one vessel."""
     if predictor.vessel is None or predictor.physics.observer is None:
         return None
     key = f"{predictor.vessel.digest} {predictor.physics.observer.model_dump_json()}"

@@ -44,7 +44,7 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
 
 
 def notes(plan: Plan, dataset: Dataset, wanted: Sequence[Family]) -> list[str]:
-    """What is left out of the windows of a study, and what the bases of the families feel and the runs do not hold."""
+    """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
     pool, _, redrawn = partition(plan, dataset)
     return [*redrawn, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
 

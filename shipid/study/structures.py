@@ -101,7 +101,7 @@ class Compared:
 
     @property
     def sentences(self) -> list[str]:
-        """What was chosen and why, and what follows."""
+        """The structure chosen, the reason, and notes."""
         rows = {str(row["structure"]): row for row in _records(self.table)}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         said = [

@@ -1,4 +1,4 @@
-"""What a dataset holds, run by run, and which of its runs are typical: what a study of it is chosen from."""
+"""Summary of a dataset, run by run, and its typical runs: the choices of a new study use it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a finding is, when it counts as shown, and how its numbers are said."""
+"""Findings: when one counts as shown, and how its numbers are written."""
 
 from __future__ import annotations
 

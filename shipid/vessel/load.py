@@ -151,7 +151,7 @@ def sources(vessel: Vessel) -> dict[str, str]:
 
 
 def _source(document: Document, path: str) -> str:
-    """What a document says of where a block comes from: nothing where it does not hold the block."""
+    """The source that a document gives for a block; empty if the document does not contain the block."""
     try:
         block = documents.get(document, path)
     except KeyError:

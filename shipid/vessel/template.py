@@ -176,7 +176,7 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
 
 
 def _remarks(given: Particulars) -> Iterator[str]:
-    """What the guess took for granted, where that matters most."""
+    """The most important assumptions of the guess, one sentence each."""
     if given.scale is None and given.reduction != 1.0:
         yield (
             f"{given.length:g} m counts as a model at a scale of {given.reduction:.3g}: give the scale by --scale; "

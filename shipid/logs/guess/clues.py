@@ -69,7 +69,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Question:
-    """What the log cannot decide and a person must answer: the columns of the dataset concerned, and the question."""
+    """A question that the log cannot decide: columns of the dataset concerned, and its text for a person."""
 
     about: tuple[str, ...]
     sentence: str
