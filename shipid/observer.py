@@ -514,12 +514,12 @@ def observed_paths(
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
     """Columns of windows with the estimates of the last row at or before each instant: `observer.*` (S,) added."""
-    frame, found = dataset.frame, np.zeros(len(windows), dtype=np.intp)
+    frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:
         rows, chosen = np.flatnonzero(names == run), windows.run == run
-        found[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
-    return {**windows.columns, **{name: values[found] for name, values in estimates.columns.items()}}
+        index[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
+    return {**windows.columns, **{name: values[index] for name, values in estimates.columns.items()}}
 
 
 def tune_observer(

@@ -204,7 +204,7 @@ def looking(look: Callable[[], None], every: float) -> Iterator[None]:
 
 
 class Quiet:
-    """Plain lines of a run: when nothing has been said for a while, how far the searches are."""
+    """Plain lines of a run: after a silence, how far the searches are."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch

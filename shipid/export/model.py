@@ -144,8 +144,8 @@ class Model:
         reached = [np.asarray((instants.hidden or orders)[name], dtype=float) for name in names.reached]
         estimates = [np.asarray(instants.estimates[name]) for name in names.estimates]
         groups = {"now": now, "reached": reached, "past": past, "planned": planned, "estimates": estimates}
-        found = {key: np.stack(rows, axis=1) if rows else np.zeros((count, 0)) for key, rows in groups.items()}
-        return {**found, "parameters": np.tile(self.parameters, (count, 1))}
+        stacked = {key: np.stack(rows, axis=1) if rows else np.zeros((count, 0)) for key, rows in groups.items()}
+        return {**stacked, "parameters": np.tile(self.parameters, (count, 1))}
 
 
 def model(predictor: Exportable) -> Model:

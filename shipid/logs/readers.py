@@ -132,7 +132,7 @@ def read_table(
 
 
 def seconds(dates: pd.Series[Any]) -> Array:
-    """Return dates as seconds since 1970 (UTC where no zone is said), times of day as seconds since midnight.
+    """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
     Read are ISO 8601, dates of pandas, day.month.year and year/month/day with a time; a time of day goes on after
     midnight. NaN where there is none.

@@ -30,14 +30,14 @@ class AboardContent(PageContent):
     Parameters
     ----------
     title, name : in words, and the predictor.
-    said : the lines of the summary; the first ones are the answer.
+    lines : the lines of the summary; the first ones are the answer.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
         [m] and band_course [rad, clockwise from north].
     track : run, t [s], north, east [m], as measured.
     """
 
-    said: Sequence[str]
+    lines: Sequence[str]
     instants: pd.DataFrame
     points: pd.DataFrame
     track: pd.DataFrame
@@ -45,7 +45,7 @@ class AboardContent(PageContent):
     @property
     def answer(self) -> list[Sentence]:
         """What was predicted, how often the alarm was raised, and whether the band kept its promise."""
-        kept = [text for text in self.said if text.startswith(("alarm:", "band of")) or " predictions in " in text]
+        kept = [text for text in self.lines if text.startswith(("alarm:", "band of")) or " predictions in " in text]
         return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in kept]
 
     @property

@@ -31,7 +31,7 @@ def _percent(value: float) -> str:
 
 
 def _judged(frame: pd.DataFrame) -> float:
-    """Level that most is said about: 0.9 where it is promised, else the highest."""
+    """The level of the sentences: 0.9 where it is promised, else the highest."""
     levels = [float(level) for level in pd.unique(frame.level)]
     return 0.9 if 0.9 in levels else max(levels)
 

@@ -131,8 +131,8 @@ def _valued(row: Row) -> Cell:
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if value != value:
         return text(None)
-    said = f"{value:.4g}" + (f" ({low:.4g} … {high:.4g})" if low == low and high == high else "")
-    return Cell(said.replace("-", "−"), value)
+    shown = f"{value:.4g}" + (f" ({low:.4g} … {high:.4g})" if low == low and high == high else "")
+    return Cell(shown.replace("-", "−"), value)
 
 
 def groups(content: StructuresContent) -> Table | None:

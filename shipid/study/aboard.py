@@ -110,7 +110,7 @@ def _along(
     """Predictions along one unbroken stretch; how many rows came before there was a past."""
     t = rows["t"].to_numpy()
     slack = clock_slack(t)
-    found: list[dict[str, Any]] = []
+    predicted: list[dict[str, Any]] = []
     paths, skipped, due = [], 0, t[0]
     for i in range(len(t)):
         if t[i] < due - slack:
@@ -130,12 +130,12 @@ def _along(
         points.insert(0, "run", run)
         points.insert(1, "t", t[i])
         paths.append(points)
-        found.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
+        predicted.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
         if band is not None:
-            found[-1]["reach"] = reach
-    if band is not None and found:
-        _adapt(predictor, found, paths, band)
-    return found, paths, skipped
+            predicted[-1]["reach"] = reach
+    if band is not None and predicted:
+        _adapt(predictor, predicted, paths, band)
+    return predicted, paths, skipped
 
 
 def _adapt(predictor: Predictor, instants: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:

@@ -109,9 +109,9 @@ def groups_frame(results: Results) -> pd.DataFrame:
 
         def add(by: str, group: str, chosen: Array, inside: Array, wide: float, note: str = "") -> None:
             low, high = share_interval(inside, test.run[chosen])
-            told = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
+            entry = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
             runs = len(np.unique(test.run[chosen]))
-            rows.append({**told, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
+            rows.append({**entry, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
 
         for name in np.unique(kind):
             chosen, known = kind == name, bands.kinds.get(str(name), 0)
@@ -142,10 +142,10 @@ def answer(results: Results) -> list[tuple[str, str]]:
         return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
-    said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
-    said += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
-    said += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
-    sentences = [(said, "coverage")]
+    sentence = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
+    sentence += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
+    sentence += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
+    sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
     few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
     if few:
@@ -168,8 +168,8 @@ def worst_frame(results: Results) -> pd.DataFrame:
             for run in test.spans:
                 mine = test.run == run
                 inside = float((reach[mine] <= 1).mean())
-                told = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
-                rows.append({**told, "reach": float(reach[mine].max())})
+                entry = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
+                rows.append({**entry, "reach": float(reach[mine].max())})
     columns = ["model", "run", "kind", "coverage", "reach"]
     return pd.DataFrame(rows, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])
 

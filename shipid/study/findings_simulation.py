@@ -101,10 +101,10 @@ def simulation_findings(results: Results) -> list[Finding]:
     H, H_90 = read_grid(results, "H"), read_grid(results, "H_90")
     if isinstance(H, str) or isinstance(H_90, str):
         return undecided(CLAIMS, str(H))
-    found = [*judged(H, H_90), _S7(results, H)]
+    verdicts = [*judged(H, H_90), _S7(results, H)]
     few, left_out = too_few(H.table.runs), named(H.left_out)
     notes = [*([few] if few else []), *([f"left out for want of results: {left_out}"] if left_out else [])]
-    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in found]
+    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in verdicts]
 
 
 def judged(H: Grid, H_90: Grid) -> list[Finding]:

@@ -41,13 +41,13 @@ FAR = (0.15, 0.4, 2.5, 7.0)  # of what may be off by more: lags and rates
 FINER = (0.82, 0.93, 1.07, 1.22)
 SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
-SAID = 0.15  # of the error that all groups together must save, else nothing is said
+SAID = 0.15  # of the error that all groups together must save, else nothing is reported
 PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
 MODEST = 5.0  # factor
-OFF = 1.15  # a factor by which speed or turning may differ before it is said
+OFF = 1.15  # a factor by which speed or turning may differ before it is reported
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
 

@@ -85,10 +85,10 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
             notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
     frames, called = [], [dict[str, str]()]
     for name, results in zip(names[1:], runs[1:], strict=True):
-        frame, matched, said = _beside(runs[0], results, pairs or {})
+        frame, matched, sentences = _beside(runs[0], results, pairs or {})
         frames.append(frame.assign(folder=name))
         called.append(matched)
-        notes += [f"{name}: {words}" for words in said]
+        notes += [f"{name}: {words}" for words in sentences]
     sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
     documents = document_differences([results.plan for results in runs], sessions, called)
     documents.columns = pd.Index(["path", *names])

@@ -245,15 +245,15 @@ def observer_frame(results: Results) -> pd.DataFrame:
 
 def orders_frame(results: Results) -> pd.DataFrame:
     """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
-    found = []
+    frames = []
     for run, rows in results.dataset.frame.groupby("run", sort=False):
         if run in shown_runs(results):
             values = rows[results.dataset.commands].to_numpy(dtype=float)
             steps = np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9
             moved = steps.any(axis=1)
             begins = moved & ~np.concatenate([[False], moved[:-1]])
-            found += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
-    return pd.DataFrame(found, columns=["run", "t"])
+            frames += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
+    return pd.DataFrame(frames, columns=["run", "t"])
 
 
 def _exemplar(results: Results) -> tuple[str, Predictor] | None:

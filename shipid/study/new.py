@@ -374,26 +374,26 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
 def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[Any]:
     """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2."""
     taken = {NO_MODEL, "inaccurate"}
-    found: list[Any] = []
+    families: list[Any] = []
     for named, vessel in vessels.items():
         name = re.sub(r"[^A-Za-z0-9_.+-]", "-", vessel.key)
         name = name if name[:1].isalpha() else f"ship-{name}"
         while name in taken:
             name += "-own"
         taken.add(name)
-        found.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
+        families.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
         look = looks.get(named)
         if look is not None and look.changes:
             groups = ", ".join(f"{change.group.name} x {change.factor:.3g}" for change in look.changes)
             words = f"{vessel.name} with {groups}: from all runs that do not test, whatever N_D"
             corrected = {"name": f"{name}{CORRECTED}", "description": words, "base": named}
-            found.append({**corrected, "perturb": [{"set": look.values}]})
+            families.append({**corrected, "perturb": [{"set": look.values}]})
     named, vessel = next(iter(vessels.items()))
     blocks = _inaccurate(vessel)
-    words = f"{found[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
+    words = f"{families[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
     if blocks:
-        found.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
-    return found
+        families.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
+    return families
 
 
 def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:

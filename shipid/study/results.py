@@ -429,8 +429,8 @@ def repairs_frame(results: Results) -> pd.DataFrame:
 
 def naive_summary(results: Results) -> dict[str, float]:
     """Mean, p90 and rms [m] of constant u, v, r on the test windows."""
-    found = summary(results.naive)
-    return {"mean": found["mean"], "p90": found["p90"], "rms": found["rms"]}
+    errors = summary(results.naive)
+    return {"mean": errors["mean"], "p90": errors["p90"], "rms": errors["rms"]}
 
 
 def reproducing_command(results: Results) -> str:

@@ -34,13 +34,13 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     drawn = [family for family in resolve(plan.study.family, plan.file) if any(block.drawn for block in family.perturb)]
     if name is None and not drawn:
         raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
-    found = [family for family in drawn if name in (None, family.name)]
-    if not found:
+    chosen = [family for family in drawn if name in (None, family.name)]
+    if not chosen:
         known = name in [family.name for family in plan.study.family]
         fault = "draws no factor from a range" if known else "is no family"
         hint = choices(str(name), [family.name for family in drawn])
         raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
-    return found
+    return chosen
 
 
 def notes(plan: Plan, dataset: Dataset, wanted: Sequence[Family]) -> list[str]:
@@ -142,7 +142,7 @@ def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
             factor = part[paths[0]].to_numpy()
             pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
             rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
-    found = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
-    largest = found.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
-    order = largest["family"].map(list(dict.fromkeys(found["family"])).index)
+    effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
+    largest = effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
+    order = largest["family"].map(list(dict.fromkeys(effects["family"])).index)
     return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)

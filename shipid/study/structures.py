@@ -104,32 +104,32 @@ class Compared:
         """The structure chosen, the reason, and notes."""
         rows = {str(row["structure"]): row for row in _records(self.table)}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
-        said = [
+        notes = [
             f"{self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the fit has "
             f"not seen: {rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
-            said.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
+            notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
         elif others:
-            said.append(f"not shown to be worse: {', '.join(others)}")
+            notes.append(f"not shown to be worse: {', '.join(others)}")
         elif len(rows) > 1:
-            said.append("all others are shown to be worse")
+            notes.append("all others are shown to be worse")
         wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
-            said.append(
+            notes.append(
                 "structures differ by more than the interval within one in "
                 f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
                 f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
             )
-        said += [*self.beyond, *self.uneven]
+        notes += [*self.beyond, *self.uneven]
         if len(self.programme):
             first = self.programme.iloc[0]
-            said.append(
+            notes.append(
                 f"to run next: {first['manoeuvre']}, in which the structures are {first['apart']:.2g} standard "
                 "deviations of the residuals apart"
             )
-        return said
+        return notes
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""

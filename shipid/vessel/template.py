@@ -518,7 +518,7 @@ def azimuth(given: Particulars, side: int) -> Values:
 
 
 def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, float, str, str]:
-    """Diameter [m] and k_T of a unit whose thrust at the given shaft speed is the resistance, and how they were found.
+    """Diameter [m] and k_T of a unit whose thrust at the given shaft speed is the resistance, and their derivation.
 
     A diameter that is not given follows from the shaft speed first, then k_T.
     """
