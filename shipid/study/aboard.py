@@ -110,7 +110,7 @@ def _along(
     """Predictions along one unbroken stretch; how many rows came before there was a past."""
     t = rows["t"].to_numpy()
     slack = clock_slack(t)
-    predicted: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     paths, skipped, due = [], 0, t[0]
     for i in range(len(t)):
         if t[i] < due - slack:
@@ -130,12 +130,12 @@ def _along(
         points.insert(0, "run", run)
         points.insert(1, "t", t[i])
         paths.append(points)
-        predicted.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
+        entries.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
         if band is not None:
-            predicted[-1]["reach"] = reach
-    if band is not None and predicted:
-        _adapt(predictor, predicted, paths, band)
-    return predicted, paths, skipped
+            entries[-1]["reach"] = reach
+    if band is not None and entries:
+        _adapt(predictor, entries, paths, band)
+    return entries, paths, skipped
 
 
 def _adapt(predictor: Predictor, instants: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:
