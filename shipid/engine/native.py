@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache, lru_cache
 from itertools import product
 from pathlib import Path
@@ -30,6 +30,7 @@ from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
+from shipid.engine.vectors import Target, head
 from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
@@ -55,31 +56,9 @@ _OPERATIONS = {
 }
 C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
-_ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
 
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
-_HEAD = """
-#include <math.h>
-typedef double V __attribute__((vector_size(8 * W)));
-typedef long long M __attribute__((vector_size(8 * W)));
-typedef double U __attribute__((vector_size(8 * W), aligned(8), may_alias));
-#define K(x) ((V){} + (x))
-#define NUMBER(m) ((V)((m) & (M)K(1.0)))
-#define EACH(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i]); return r;
-#define EACH2(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i], y[i]); return r;
-static inline V v_fabs(V x) { return (V)((M)x & ((M){} + 0x7fffffffffffffffLL)); }
-static inline V v_sqrt(V x) { EACH(__builtin_sqrt) }
-static inline V v_floor(V x) { EACH(__builtin_floor) }
-static inline V v_ceil(V x) { EACH(__builtin_ceil) }
-#ifdef __AVX__ // one instruction, that compilers do not find
-#define PICK(name, relation) V r; __asm__(name " %2, %1, %0" : "=v"(r) : "v"(x), "vm"(y)); return r;
-#else
-#define PICK(name, relation) M m = x relation y; return (V)((m & (M)x) | (~m & (M)y));
-#endif
-static inline V v_min(V x, V y) { PICK("vminpd", <) }
-static inline V v_max(V x, V y) { PICK("vmaxpd", >) }
-"""
 _MEASURE = f"""
 static inline V measured(V north, V east, long samples, unsigned *tally) {{
   V distance = v_sqrt(north * north + east * east);
@@ -88,15 +67,6 @@ static inline V measured(V north, V east, long samples, unsigned *tally) {{
   return distance;
 }}
 """
-
-
-@dataclass(frozen=True)
-class Target:
-    """Target of the C compiler: lanes of a vector, compiler flags, prefix of glibc's vector functions (or empty)."""
-
-    lanes: int
-    flags: tuple[str, ...]
-    prefix: str
 
 
 @cache
@@ -111,7 +81,7 @@ def _probed() -> tuple[str, bytes] | None:
         tried.add(os.path.realpath(command))
         with suppress(OSError), tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "probe.so"
-            failure = build(_command(command, Target(1, (), "")), trial, library, PROBE_LIMIT)
+            failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
             if failure is None:
                 return command, library.read_bytes()
             log.warning("the C compiler %s cannot be used (%s)", command, failure.splitlines()[0])
@@ -165,18 +135,18 @@ def target() -> Target:
     """Widest vectors of this processor, with the vector functions of glibc if they can be linked."""
     command, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
     if x86 and "avx512f" in _processor():
-        best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
+        best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8", fused=True)
     elif x86 and {"avx2", "fma"} <= _processor():
-        best = Target(4, ("-march=native",), "_ZGVdN4")
+        best = Target(4, ("-march=native",), "_ZGVdN4", fused=True)
     else:
-        best = Target(2, (), "")
+        best = Target(2)
     if command is None or not best.prefix:
         return best
     probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
     probe += f"V run(V x) {{ return {best.prefix}v_tanh(x); }}"
     with tempfile.TemporaryDirectory() as folder:
         failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
-    return best if failure is None else Target(best.lanes, best.flags, "")
+    return best if failure is None else replace(best, prefix="")
 
 
 def _command(command: str, wanted: Target) -> list[str]:
@@ -189,21 +159,6 @@ def _command(command: str, wanted: Target) -> list[str]:
 def compiler_version(command: str) -> str:
     """Version text of a compiler."""
     return run_compiler([command, "--version"], limit=PROBE_LIMIT)[1]
-
-
-def _vector_functions(wanted: Target) -> str:
-    lines = []
-    for name in _ONE:
-        if wanted.prefix:
-            lines.append(f"V {wanted.prefix}v_{name}(V);\n#define v_{name} {wanted.prefix}v_{name}")
-        else:
-            lines.append(f"static inline V v_{name}(V x) {{ EACH({name}) }}")
-    for name in _TWO:
-        if wanted.prefix:
-            lines.append(f"V {wanted.prefix}vv_{name}(V, V);\n#define v_{name} {wanted.prefix}vv_{name}")
-        else:
-            lines.append(f"static inline V v_{name}(V x, V y) {{ EACH2({name}) }}")
-    return "\n".join(lines)
 
 
 class Parts:
@@ -417,11 +372,6 @@ def compiled(source: str) -> Any:
         return load(library)
     except OSError as error:
         raise NoLibrary(f"{library} is gone ({error.strerror})") from None
-
-
-def head(wanted: Target) -> str:
-    """Common beginning of all C sources: the vector type of the target and its functions."""
-    return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
 
 
 def padded(array: Array, wide: int) -> Array:

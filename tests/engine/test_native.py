@@ -15,8 +15,9 @@ import pytest
 
 from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
-from shipid.engine.native import Target, compiler, run_native, target
+from shipid.engine.native import compiler, run_native, target
 from shipid.engine.rollout import distances, rollout
+from shipid.engine.vectors import Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
@@ -53,7 +54,7 @@ def own_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step of 1 s from rates that are the operations; with vector functions, and without."""
     if wanted != "here":
-        monkeypatch.setattr(native, "target", lambda: Target(2, (), ""))
+        monkeypatch.setattr(native, "target", lambda: Target(2))
     x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
     values, model = operations(x[0], x[1], p[0] / 4e5), dynamics(SHIP)
     sizes = [("memory", 0), ("commands", 4), ("environment", 2)]
