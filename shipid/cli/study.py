@@ -139,20 +139,26 @@ def study_screen(
     out: Annotated[
         Path | None, typer.Option(help="file for a row per member: .csv or .parquet; default: <study>-screen.csv")
     ] = None,
+    single: Annotated[
+        bool, typer.Option("--single", help="single precision: half the time, A to about six digits")
+    ] = False,
     changes: Changes = None,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    from shipid.engine.engines import REPEATED, named
     from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain
 
+    engine = "single" if single else REPEATED
+    named(engine, device)
     plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     for note in screen.notes(plan, dataset, wanted):
         typer.echo(note, err=True)
-    blocks = counted(screen.screen(plan, dataset, wanted, members, device), members * len(wanted))
+    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)
