@@ -13,7 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 import shipid
-from shipid.cli import app
+from shipid.cli import COMMANDS, GROUPS, _named, app
 from tests.cli.running import BAD, said, shell
 from tests.study.tiny import TINY
 
@@ -29,6 +29,15 @@ def test_help_and_version_are_light() -> None:
         result = shell(*arguments, code=code)
         assert re.search(r"(0|2|None) \[\]$", result.stdout.strip()), (arguments, result)
     assert shipid.__version__ in shell("--version").stdout
+
+
+def test_help_reads_the_same_whatever_is_built_for_it() -> None:
+    """Of what the first argument does not name, nothing is built."""
+    for arguments in (["--help"], *([name, "--help"] for name in (*COMMANDS, *GROUPS)), ["study", "run", "--help"]):
+        light, whole = (CliRunner().invoke(one, arguments, prog_name="shipid") for one in (_named(arguments), app))
+        assert light.exit_code == whole.exit_code == 0
+        assert light.output == whole.output
+    assert _named(["no-such"]) is _named([]) is app
 
 
 def test_help_names_every_command() -> None:
