@@ -13,7 +13,8 @@ import typer
 from typer.testing import CliRunner
 
 import shipid
-from shipid.cli import COMMANDS, GROUPS, _named, app
+from shipid import cli
+from shipid.cli import app
 from tests.cli.running import BAD, said, shell
 from tests.study.tiny import TINY
 
@@ -33,11 +34,15 @@ def test_help_and_version_are_light() -> None:
 
 def test_help_reads_the_same_whatever_is_built_for_it() -> None:
     """Of what the first argument does not name, nothing is built."""
-    for arguments in (["--help"], *([name, "--help"] for name in (*COMMANDS, *GROUPS)), ["study", "run", "--help"]):
-        light, whole = (CliRunner().invoke(one, arguments, prog_name="shipid") for one in (_named(arguments), app))
+    for arguments in (
+        ["--help"],
+        *([name, "--help"] for name in (*cli.COMMANDS, *cli.GROUPS)),
+        ["study", "run", "--help"],
+    ):
+        light, whole = (CliRunner().invoke(one, arguments, prog_name="shipid") for one in (cli._named(arguments), app))
         assert light.exit_code == whole.exit_code == 0
         assert light.output == whole.output
-    assert _named(["no-such"]) is _named([]) is app
+    assert cli._named(["no-such"]) is cli._named([]) is app
 
 
 def test_help_names_every_command() -> None:
