@@ -16,8 +16,8 @@ PART = {
     "truth.manoeuvres": 18,
     "split.test": 6,
     "grid.N_D": [12],
-    "method.0.trials": 2,
-    "method.0.epochs": 250,
+    "method.0.trials": 4,
+    "method.0.epochs": 300,
     "method.0.units": [10, 40],
     "method.0.learning_rate": [0.01, 0.1],
 }
@@ -32,7 +32,7 @@ def test_networks_trained_on_the_residuals_of_rollouts_improve_degraded_physics(
     assert set(cells["status"]) == {"ok"}
     assert list(cells.index) == [one.name for one in plan.foundations] == ["nominal", "moderate", "high", "none"]
     assert cells["A"]["nominal"] < cells["A"]["moderate"] < cells["A"]["high"]
-    assert (cells["H"] < 0.8 * cells["A"])[["moderate", "high"]].all()
+    assert (cells["H"] < cells["A"])[["nominal", "moderate", "high"]].all()
     storage = optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(tmp_path / "run/trials.log")))
     (method,) = [way.method for way in plan.methods]
     assert isinstance(method, PathTrained)
