@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,8 @@ from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
@@ -31,8 +34,7 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
     """`alone` counts the foundations that are also judged without a compensator: identified ones."""
     plan = read_plan(name)
     assert (len(plan.foundations), len(plan.batches)) == (foundations, batches)
-    rivals = len(plan.learning) - 1  # of the method that is judged
-    assert plan.cells == ((1 + rivals) * foundations + alone + 1) * batches, "and no physics once more, plain"
+    assert plan.cells == (foundations + alone + 1) * batches, "and no physics once more, plain"
     assert plan.plain == "plain"
     assert plan.label(NO_MODEL, "plain") == "none + plain"
     bare = [name for name, way in plan.pairs if not way.method.compensates]
@@ -48,17 +50,23 @@ def test_every_bundled_study_is_tested() -> None:
     assert set(bundled("studies")) == {"quick", "full-scale", *worlds, *of_methods}
 
 
-@pytest.mark.parametrize("name", ["quick", "zigzags", "constant-orders", "changing-orders"])
-def test_the_default_looks_back_and_its_rival_differs_in_that_alone(name: str) -> None:
+@pytest.mark.parametrize("name", ["quick", "full-scale", "zigzags", "constant-orders", "changing-orders"])
+def test_the_default_looks_back_and_loses_no_window_of_a_simulation(name: str) -> None:
     plan = read_plan(name)
-    memory, drawn = (way.method for way in plan.methods[:2])
-    assert plan.judged == "memory"
-    assert isinstance(memory, PathDrawn)
-    assert memory.choose
+    judged = next(way.method for way in plan.methods if way.name == plan.judged)
+    assert isinstance(judged, PathDrawn)
+    assert judged.choose
+    assert {"history", "turned", "error"} <= judged.memory.model_fields_set
+    assert plan.past == judged.past == 20.0
+    assert plan.study.truth is None or plan.study.truth.run_up == plan.past
+
+
+def test_the_line_of_the_page_takes_the_memory_alone_away() -> None:
+    line = next(one for one in (ROOT / "docs" / "memory.md").read_text("utf-8").splitlines() if "run quick" in one)
+    changes = tomllib.loads(line.partition("--set '")[2].partition("'")[0])
+    drawn, memory = (plan.methods[0].method for plan in (read_plan("quick", changes), read_plan("quick")))
     assert memory.model_copy(update={"choose": False, "memory": Memory()}) == drawn
-    assert plan.past == memory.past == 20.0
-    assert plan.study.truth is not None
-    assert plan.study.truth.run_up >= plan.past, "no window is lost"
+    assert read_plan("quick", changes).past == read_plan("quick").past
 
 
 def test_the_chain_of_the_paper_is_bundled_small() -> None:
