@@ -33,7 +33,9 @@ def test_networks_trained_on_the_residuals_of_rollouts_improve_degraded_physics(
     assert list(cells.index) == [one.name for one in plan.foundations] == ["nominal", "moderate", "high", "none"]
     assert cells["A"]["nominal"] < cells["A"]["moderate"] < cells["A"]["high"]
     assert (cells["H"] < cells["A"])[["nominal", "moderate", "high"]].all()
-    storage = optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(tmp_path / "run/trials.log")))
+    storage = optuna.storages.JournalStorage(
+        optuna.storages.journal.JournalFileBackend(str(tmp_path / "run/trials.log"))
+    )
     (method,) = [way.method for way in plan.methods]
     assert isinstance(method, PathTrained)
     for cell in cells["cell"]:
