@@ -161,14 +161,14 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
             seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
             hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
             parts = _parts(seen, hidden, group.outputs, device)
-            errors, by_fold, missed = _left_out(parts, ridges, blocks, terms)
+            errors, by_fold, kept = _left_out(parts, ridges, blocks, terms)
             for k, key in enumerate(group.names):
                 ridge = ridges[errors[:, k].argmin()]
                 params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
                 network = partial(_network, seen, hidden, parts, mine, ridge, basis)
-                without = partial(_chosen_without, by_fold[:, :, k], missed, mine)
+                without = partial(_chosen_without, by_fold[:, :, k], kept, mine)
                 best[key].consider(params, value, network, without)
                 rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
             seconds = (time.process_time() - start) / len(group.names)
@@ -360,7 +360,7 @@ def _left_out(
                 error = solved(part.eigenvalues + ridges[i])
                 if block.judged.shape != block.out.shape:
                     error = error.take_along_dim(block.judged[:, :, None], dim=1)
-                squares = error.square().sum(dim=1).unflatten(1, (len(sides), -1, terms))
+                squares = error.square().sum(dim=1).reshape(len(error), len(sides), -1, terms)
                 by_fold[i, folds] += squares.sum(dim=(1, 3))
                 errors.keep(i, folds, rows, sides, error)
             first += len(block.out)
