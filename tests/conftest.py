@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import typer.testing
 from hypothesis import settings
 
 from shipid.document import bundled
@@ -21,6 +22,7 @@ from shipid.vessel.load import Vessel, load_vessel
 torch.set_num_threads(1)  # the machine is shared
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+typer.testing._get_command = typer.main.get_command = cache(typer.main.get_command)  # 0.1 s each time otherwise
 
 LAG = {
     "n": {"kind": "first_order", "T": 1.0, "rate": 0.17},
