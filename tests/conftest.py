@@ -15,7 +15,9 @@ import torch
 import typer.testing
 from hypothesis import settings
 
+from shipid.data.dataset import Dataset
 from shipid.document import bundled
+from shipid.logs.importing import import_log, read_mapping
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
@@ -78,6 +80,15 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("no folder with recorded data: set SHIPID_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def hsva(shared_data: Path) -> Dataset:
+    """The published zigzags of a model of KVLCC2, as their bundled mapping reads them; not to be changed."""
+    folder = shared_data / "kvlcc2_hsva"
+    if not folder.is_dir():
+        pytest.skip(f"no {folder.name} in the folder of recorded data")
+    return import_log(read_mapping("kvlcc2-hsva"), folder)
 
 
 @pytest.fixture(scope="session", params=list(variety()))

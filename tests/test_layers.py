@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -41,7 +40,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def refused(package: Path) -> Iterator[str]:
+def refused(package: Path) -> str:
     """What is said of the copy with a file more for everything that is forbidden."""
     files = []
     for name, (folder, text) in FORBIDDEN.items():
@@ -51,7 +50,7 @@ def refused(package: Path) -> Iterator[str]:
     for file in files:
         file.unlink()
     assert result.returncode == 1, result.stdout + result.stderr
-    yield result.stdout
+    return result.stdout
 
 
 def lint(folder: Path) -> subprocess.CompletedProcess[str]:

@@ -29,9 +29,9 @@ def said(*arguments: object) -> str:
 def ended(*arguments: object) -> tuple[object, str, str]:
     """Exit status, output and error of a command in this process, as its entry point runs it."""
     out, err = StringIO(), StringIO()
-    with patch.object(sys, "argv", ["shipid", *map(str, arguments)]), redirect_stdout(out), redirect_stderr(err):
-        with pytest.raises(SystemExit) as end:
-            main()
+    typed = patch.object(sys, "argv", ["shipid", *map(str, arguments)])
+    with typed, redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main()
     return end.value.code, out.getvalue(), err.getvalue()
 
 
