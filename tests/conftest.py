@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Mapping
@@ -154,5 +155,12 @@ def tiny_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def pytest_configure() -> None:
     """A job in the background of a shell ignores Ctrl-C; tests that raise it need the handler of Python."""
+    gc.disable()  # what is imported and collected stays
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """What there is before the first test is never garbage: it is not searched again and again."""
+    gc.freeze()
+    gc.enable()

@@ -107,7 +107,7 @@ def _groups(
 
 def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
     """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate."""
-    said = []
+    sentences = []
     rows = [row for row in groups.to_dict("records") if row["side"]]
     for group in dict.fromkeys(row["group"] for row in rows):
         of = [row for row in rows if row["group"] == group]
@@ -118,7 +118,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         apart = abs(worse["turning"]) - abs(better["turning"])
         sure = apart > SURE * float(np.hypot(worse["error"], better["error"]))
         if sure and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
-            said.append(
+            sentences.append(
                 f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
                 f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
                 f"next: turns to both sides{where}"
@@ -126,11 +126,11 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
             continue
         better, worse = sorted(of, key=lambda row: float(row["r"]))
         if np.isfinite([worse["error"], better["error"]]).all() and worse["r"] > WORSE * better["r"]:
-            said.append(
+            sentences.append(
                 f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
                 f"as to {better['side']}"
             )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def shown(groups: pd.DataFrame) -> list[list[str]]:

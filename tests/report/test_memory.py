@@ -59,14 +59,14 @@ def little(past: ReportContent) -> ReportContent:
 
 def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent) -> None:
     text = page(little, ONLY, "study")
-    assert "What the past tells" in text
+    assert "What the past shows" in text
     assert NASTY not in text
     (section,) = drawn(ONLY, little)
     assert [item.id for item in section.items] == list(SECTIONS["the-past"].anchors)
 
 
 def test_a_study_without_a_past_has_no_such_section(little: ReportContent) -> None:
-    assert "What the past tells" not in page(replace(little, frames={}), ONLY, "study")
+    assert "What the past shows" not in page(replace(little, frames={}), ONLY, "study")
 
 
 def test_an_observer_alone_is_shown(past: ReportContent) -> None:
