@@ -10,7 +10,7 @@ import pytest
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
-from tests.cli.running import said, shell
+from tests.cli.running import ended, said
 
 
 def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,10 +34,10 @@ def test_manoeuvres_that_cannot_be() -> None:
         (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
         (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
     ):
-        result = shell(*arguments)
-        assert result.returncode == 1
-        assert result.stderr.startswith(expected)
-        assert result.stderr.count("\n") == 1
+        status, _, err = ended(*arguments)
+        assert status == 1
+        assert err.startswith(expected)
+        assert err.count("\n") == 1
 
 
 def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:

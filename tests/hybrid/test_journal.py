@@ -129,7 +129,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_several_processes_write_at_once(tmp_path: Path) -> None:
     file = tmp_path / "t.log"
     Journal(file)
-    context = get_context("spawn")
+    context = get_context("fork")
     workers = [context.Process(target=_write, args=(file, name)) for name in "abc"]
     for worker in workers:
         worker.start()
