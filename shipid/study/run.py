@@ -28,7 +28,7 @@ from shipid.hybrid.training import check_device, use_threads, vectors
 from shipid.metrics import position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
-from shipid.study.claims import WAIT, Claims, pause
+from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, apart, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
@@ -50,7 +50,7 @@ PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow",
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
 Results = list[tuple[dict[str, Any], Predictor | None]]
-Computed = Iterator[tuple[Unit, Results]]
+Computed = Iterator[tuple[Unit, Results | str]]
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
@@ -119,7 +119,7 @@ def run_study(
         make_folder(folder / store.JOURNALS)
 
         def compute(units: Iterable[Unit]) -> Computed:
-            return _compute(plan, prepared, units, workers, scheduler, device, folder)
+            return _compute(plan, prepared, units, workers, scheduler, device, claims.holder, folder)
 
         cells = 0
         for event in _shared(plan, folder, claims, compute, leave):
@@ -226,8 +226,16 @@ def _shared(
             lambda key: store.is_finished(folder, units[key]),
         )
         for unit, results in compute(units[key] for key in free):
-            store.write_unit(folder, unit, results)
-            claims.give_back(unit.key)
+            try:
+                claims.holder.check(unit.key)
+                if isinstance(results, str):
+                    raise TakenOver(results)
+                store.write_unit(folder, unit, results)
+            except TakenOver as lost:
+                yield Event("note", str(lost))
+                continue
+            finally:
+                claims.give_back(unit.key)
             known.add(unit.key)
             for row, _ in results:
                 cells += 1
@@ -248,15 +256,22 @@ def run_batch(
     return run_unit(plan, prepared, plan.whole(batch), device)
 
 
-def run_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path | None = None) -> Results:
+def run_unit(
+    plan: Plan,
+    prepared: Prepared,
+    unit: Unit,
+    device: str,
+    trials: Path | None = None,
+    check: Callable[[], object] = lambda: None,
+) -> Results:
     """All cells of one unit of work: (row of results, predictor) each. Pure: the same on every worker.
 
     trials : the folder of the journals in which searches go on; on a machine that does not see it, they are kept in
-        memory.
+        memory. check : called before each write to a journal; what it raises ends the search.
     """
     use_threads(1)
     check_device(device)
-    journal = Journal(trials / f"{unit.key}.log") if trials is not None and trials.is_dir() else None
+    journal = Journal(trials / f"{unit.key}.log", check) if trials is not None and trials.is_dir() else None
     batch = unit.batch
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
@@ -477,17 +492,18 @@ def _compute(
     workers: int | None,
     scheduler: str | None,
     device: str,
+    holder: Holder,
     folder: Path,
 ) -> Computed:
     """Units and their results in the order in which they finish."""
     trials = (folder / store.JOURNALS).absolute()
     if scheduler is None:
-        work = partial(run_unit, plan, prepared, device=device, trials=trials)
+        work = partial(_claimed, plan, prepared, device=device, trials=trials, holder=holder)
         yield from on_workers(work, units, workers or os.cpu_count() or 1)
         return
     from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
 
-    shared = plan, prepared, device, trials
+    shared = plan, prepared, device, trials, holder
     noted: list[Mapping[str, Any]] = []
     for unit, (session, results) in on_dask(scheduler, _there, shared, {unit.key: unit for unit in units}, plan.digest):
         if session not in noted:
@@ -497,7 +513,15 @@ def _compute(
         yield unit, results
 
 
-def _there(shared: tuple[Plan, Prepared, str, Path], unit: Unit) -> tuple[dict[str, Any], Results]:
+def _there(shared: tuple[Plan, Prepared, str, Path, Holder], unit: Unit) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
-    plan, prepared, device, trials = shared
-    return session_on(device), run_unit(plan, prepared, unit, device, trials)
+    plan, prepared, device, trials, holder = shared
+    return session_on(device), _claimed(plan, prepared, unit, device, trials, holder)
+
+
+def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:
+    """A unit whose claim is looked at before each write; a sentence in place of results where it is lost."""
+    try:
+        return run_unit(plan, prepared, unit, device, trials, partial(holder.check, unit.key))
+    except TakenOver as lost:
+        return str(lost)

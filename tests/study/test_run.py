@@ -156,6 +156,37 @@ def test_what_another_process_finishes_is_waited_for(tmp_path: Path, tiny_run: P
     assert numbers(folder) == numbers(tiny_run)
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over(
+    late: bool, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its search writes no more to the journal, or its results are not stored; the other units go on."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    store.open_folder(folder, plan)
+    fit, lost = PathDrawn.fit, list[str]()
+    with Claims(folder) as other:
+
+        def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
+            found = fit(self, task) if late or lost else {}
+            if not lost:
+                (claim,) = (folder / "claims").glob("N*")
+                claim.unlink()
+                assert other.take(claim.name)
+                lost.append(claim.name)
+            return found or fit(self, task)
+
+        monkeypatch.setattr(PathDrawn, "fit", held_up)
+        *events, end = events_here(plan, folder, leave=True)
+        said = [event.text for event in events if "has taken it over" in event.text]
+        assert [words.split(":")[0] for words in said] == lost
+        assert (end.done, end.total) == (4, 8)
+        assert not (folder / "batches" / f"{lost[0]}.json").exists()
+        journal = folder / "trials" / f"{lost[0]}.log"
+        assert (journal.stat().st_size > 0) == late
+    run_here(plan, folder)
+    assert numbers(folder) == numbers(tiny_run)
+
+
 def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:
     """Rows that an earlier version stored by batch count for all units of the batch, and keep their order."""
     plan, folder = mixed_plan(tmp_path), tmp_path / "run"

@@ -64,7 +64,8 @@ def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.E
 
     def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
         for unit in units:
-            yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
+            *_, holder, place = rest
+            yield unit, run._claimed(plan, prepared, unit, "cpu", place / store.JOURNALS, holder)
 
     with patch.object(run, "_compute", compute):
         yield from run.run_study(plan, folder, leave=leave)
