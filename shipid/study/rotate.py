@@ -113,9 +113,9 @@ def _computed(
             return frames[batch] is not None
 
         def keep(batch: Batch = batch, file: Path = file, check: Callable[[], None] = check) -> None:
-            frames[batch] = computed(batch, trials, check)
+            frames[batch] = frame = computed(batch, trials, check)
             check()
-            write_table(file, frames[batch])
+            write_table(file, frame)
 
         claims.once(file.stem, is_done, keep)
     return pd.concat([frames[batch] for batch in turn.batches])

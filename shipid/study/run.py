@@ -49,6 +49,7 @@ PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow",
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
+MENDING, MENDED = "mending", "mended"  # claims: on the look at all files, and of the process that has looked
 Results = list[tuple[dict[str, Any], Predictor | None]]
 Computed = Iterator[tuple[Unit, Results | str]]
 
@@ -100,9 +101,8 @@ def run_study(
     if scheduler is None:
         import_for_workers()
     with Claims(folder) as claims:
-        if not claims.others():  # else the first of them has looked
-            for words in seals.mend(folder):
-                yield Event("note", words)
+        for words in _mended(folder, claims):
+            yield Event("note", words)
         for words in _other_session(folder, claims, device):
             yield Event("note", words)
         if not seals.is_sealed(folder, DATA):
@@ -127,7 +127,7 @@ def run_study(
             yield event
         if cells == plan.cells:
             finish = partial(_finish, plan, folder, claims, prepared, device, begun)
-            claims.once(store.RESULTS, partial(seals.is_sealed, folder, store.RESULTS), finish)
+            claims.once(store.RESULTS, partial(_is_finished, folder), finish)
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
 
 
@@ -176,7 +176,19 @@ def _finish(plan: Plan, folder: Path, claims: Claims, prepared: Prepared, device
         record["machine"] = {**machine(), "device": device}
         record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
         write_json(folder / store.PROVENANCE, record)
-    store.write_results(folder, store.read_rows(folder, plan))
+    rows = store.read_rows(folder, plan)
+    store.write_results(folder, rows, whole=len(rows) == plan.cells)
+
+
+def _is_finished(folder: Path) -> bool:
+    """Whether the tables hold all cells, and the provenance what the end of a run says."""
+    return seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in read_json(folder / store.PROVENANCE)
+
+
+def _mended(folder: Path, claims: Claims) -> list[str]:
+    """Take away damaged files, so that they are computed again; one process looks, others wait until it has."""
+    with claims.alone(MENDING):
+        return list(seals.mend(folder)) if claims.take(MENDED) else []
 
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
@@ -218,7 +230,11 @@ def _shared(
     cells = _cells(units[key] for key in known)
     yield Event("start", done=cells, total=plan.cells)
     wait = WAIT
-    while left := [key for key in units if key not in known]:
+    while True:
+        if known >= units.keys():  # unless another process has just mended some of them
+            known = {unit.key for unit in store.finished(folder, plan.units)}
+        if not (left := [key for key in units if key not in known]):
+            return
         before = len(known)
         free = claims.free(
             left,
@@ -505,7 +521,8 @@ def _compute(
 
     shared = plan, prepared, device, trials, holder
     noted: list[Mapping[str, Any]] = []
-    for unit, (session, results) in on_dask(scheduler, _there, shared, {unit.key: unit for unit in units}, plan.digest):
+    named = ((unit.key, unit) for unit in units)
+    for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest):
         if session not in noted:
             noted.append(session)
             with Claims(folder) as claims, claims.alone(SESSIONS):
