@@ -2,9 +2,9 @@
 
 There is one Optuna study for each cell. A process that works on a unit is alone in its journal: before it writes it
 looks whether it still is, and of trials that two have written all the same each number counts once. `merge` makes one
-file of those of a run. A trial is written when it has ended, in one line: a search has no trial that is half done, and the
-order of the lines is the order of the trials. A line that a killed process left behind half
-written is cut off by the next one that writes.
+file of those of a run. A trial is written when it has ended, in one line: a search has no trial that is half done, and
+the order of the lines is the order of the trials. A line that a killed process left behind half written is cut off by
+the next one that writes.
 """
 
 from __future__ import annotations

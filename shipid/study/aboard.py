@@ -17,7 +17,7 @@ from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
-from shipid.logs.guess.draft import moment
+from shipid.logs.guess.draft import moment as date
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.observer import observe
@@ -323,4 +323,4 @@ def _between(first: float, last: float) -> str:
     """Two moments as the log has them: dates in UTC, or seconds on its clock."""
     if first < DATED:
         return f"from {first:.1f} to {last:.1f} s"
-    return f"from {moment(first, 'date')} to {moment(last, 'date')} UTC"
+    return f"from {date(first, 'date')} to {date(last, 'date')} UTC"

@@ -45,7 +45,8 @@ def on_dask(
     Parameters
     ----------
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
-    shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the whole work, so that no other has its keys.
+    shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
+        whole work, so that no other has its keys.
 
     Raises
     ------

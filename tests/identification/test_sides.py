@@ -86,12 +86,9 @@ def test_of_many_groups_alike_few_are_said_to_differ() -> None:
 
 def test_the_error_of_the_yaw_rate_is_tested_too() -> None:
     """Twice as large on one side by the chance of a piece is not said; by every piece it is."""
-    groups = pd.DataFrame(
-        [
-            {"group": "all", "side": side, "rows": 200, "u": 0.1, "v": 0.1, "r": r, "r_error": error, "turning": 0.0, "error": 0.001, "pieces": 10}
-            for side, r, error in (("starboard", 0.01, 0.004), ("port", 0.025, 0.009))
-        ]
-    )  # fmt: skip
+    row = {"group": "all", "rows": 200, "u": 0.1, "v": 0.1, "turning": 0.0, "error": 0.001, "pieces": 10}
+    sides = {"starboard": {"r": 0.01, "r_error": 0.004}, "port": {"r": 0.025, "r_error": 0.009}}
+    groups = pd.DataFrame([{**row, "side": side, **error} for side, error in sides.items()])
     assert uneven(groups) == ()
     sure = groups.assign(r_error=[0.001, 0.002])
     assert uneven(sure) == ("the error of the yaw rate is 2.5 times as large to port as to starboard",)
