@@ -204,7 +204,7 @@ def test_a_screw_in_four_quadrants_is_continuous_and_finite_at_rest() -> None:
     assert in_four_quadrants(0.0, 0.0)[0] == 0
 
 
-QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4, "rho": 1014.0}
+QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4}
 
 
 def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
@@ -214,7 +214,7 @@ def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
 
 def quadratic_flow(u: float, n: float, **other: Any) -> np.ndarray:
     nu_r = ca.SX(np.array([u, 0.1, 0, 0, 0, 0]))
-    given = {name: value for name, value in {**QUADRATIC, **other}.items() if name != "x"}
+    given = {name: value for name, value in {**QUADRATIC, "rho": 1014.0, **other}.items() if name != "x"}
     return np.array(ca.evalf(quadratic_wash(nu_r, ca.SX(n), **given))).ravel()
 
 
