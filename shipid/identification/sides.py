@@ -66,8 +66,10 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
 def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
     """Relative error of the change of heading, and standard errors from the pieces, which are independent."""
     _, place = np.unique(pieces, return_inverse=True)
-    share, error = _ratio(np.bincount(place, away), np.bincount(place, r))
-    square, more = _ratio(np.bincount(place, away**2), np.bincount(place).astype(float))
+    of_row = (away, r, away**2, np.ones_like(r))
+    missed, turned, squares, rows = (np.bincount(place, values).astype(float) for values in of_row)
+    share, error = _ratio(missed, turned)
+    square, more = _ratio(squares, rows)
     rms = float(np.sqrt(square))
     return {
         "turning": share,
