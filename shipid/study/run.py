@@ -233,6 +233,7 @@ def _shared(
     while True:
         if known >= units.keys():  # unless another process has just mended some of them
             known = {unit.key for unit in store.finished(folder, plan.units)}
+            cells = _cells(units[key] for key in known)
         if not (left := [key for key in units if key not in known]):
             return
         before = len(known)
@@ -260,7 +261,7 @@ def _shared(
         if cells < _cells(units[key] for key in known):
             cells = _cells(units[key] for key in known)
             yield Event("others", done=cells, total=plan.cells)
-        if leave:
+        if leave and not known >= units.keys():
             return
         wait = pause(wait) if len(known) == before else WAIT
 
