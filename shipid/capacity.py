@@ -1,4 +1,4 @@
-"""What this machine is and has: its processor, and memory; what cannot be had is refused before it is asked for."""
+"""Processor and memory of this machine; a demand beyond its memory is refused before it is allocated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _GROUP = Path("/sys/fs/cgroup")  # limits of a container
 
 
 def processor() -> str:
-    """Name of the processor; its family where the system tells no more."""
+    """Name of the processor; its family where the system gives no name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

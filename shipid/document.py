@@ -62,7 +62,7 @@ def read(file: Path | str) -> Document:
         if Path(file).exists() and not Path(file).is_file():
             raise DocumentError("cannot be read: it is no file", file=file)
         if Path(file).stat().st_size > LARGEST:
-            raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB: no document is", file=file)
+            raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
         text = Path(file).read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
@@ -82,7 +82,9 @@ def loads(text: str, file: Path | str | None = None) -> Document:
     except tomllib.TOMLDecodeError as error:
         raise DocumentError(f"not valid TOML: {error}", file=file) from None
     except ValueError:  # of an integer with thousands of digits
-        raise DocumentError(f"holds an integer beyond {MOST_INTEGER:.0e}", file=file) from None
+        raise DocumentError(
+            f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file
+        ) from None
 
 
 def check_values(document: Any, file: Path | str | None) -> None:
@@ -109,7 +111,7 @@ def check_values(document: Any, file: Path | str | None) -> None:
         elif isinstance(value, int) and abs(value) > MOST_INTEGER:
             fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
         elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):
-            fault = f"{value:g}: beyond {MOST_NUMBER:.0e}, no quantity of a ship in SI units is"
+            fault = f"{value:g}: larger than {MOST_NUMBER:.0e}: no quantity of a ship in SI units is so large"
         elif isinstance(value, str) and any(
             unicodedata.category(sign) == "Cc" and sign not in "\n\r\t" for sign in value
         ):

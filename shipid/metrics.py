@@ -38,7 +38,7 @@ def position_error(predicted: Array, true: Array) -> Array:
 def summary(error: Array) -> Summary:
     """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
     if error.size == 0:
-        raise ValueError("no window to summarise")
+        raise ValueError("there is no window to summarise")
     failed = ~np.isfinite(error).all(axis=0)
     if failed.any():
         return Summary(mean=np.nan, p90=np.nan, rms=np.nan, status="diverged", failed_share=float(failed.mean()))

@@ -101,7 +101,7 @@ class Bank:
     """Numbers of every filter of one vessel in SI units.
 
     numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
-    beside the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
+    in addition to the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
     """
 
     vessel: Vessel
@@ -127,7 +127,9 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another."""
     settings, model = settings or Observer(), dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
-        message = f"{vessel.name} moves in {model.num_dof}: the observer takes 3, such as the model that it extends"
+        message = (
+            f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
+        )
         raise DocumentError(message, file=vessel.file, path="dof")
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:
@@ -318,7 +320,7 @@ def _waves(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
 
 
 def _output(x: SX) -> SX:
-    """What is measured (6) of a state."""
+    """The measurement (6) of a state."""
     c, s = ca.cos(x[2]), ca.sin(x[2])
     return ca.vertcat(x[0] + c * x[11] - s * x[12], x[1] + s * x[11] + c * x[12], x[2] + x[13], x[3:6] + x[14:17])
 
@@ -512,12 +514,12 @@ def observed_paths(
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
     """Columns of windows with the estimates of the last row at or before each instant: `observer.*` (S,) added."""
-    frame, found = dataset.frame, np.zeros(len(windows), dtype=np.intp)
+    frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:
         rows, chosen = np.flatnonzero(names == run), windows.run == run
-        found[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
-    return {**windows.columns, **{name: values[found] for name, values in estimates.columns.items()}}
+        index[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
+    return {**windows.columns, **{name: values[index] for name, values in estimates.columns.items()}}
 
 
 def tune_observer(

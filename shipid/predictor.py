@@ -246,7 +246,7 @@ class Predictor:
 
 
 class _Header(BaseModel):
-    """What the header of a predictor holds beside vessel, observer and method, with its types."""
+    """Further fields of the header of a predictor (besides vessel, observer and method), with their types."""
 
     horizon: Annotated[int, Field(ge=1, le=MOST_STEPS)]
     step: Annotated[float, Field(gt=0, le=1e4)]

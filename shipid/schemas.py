@@ -27,7 +27,7 @@ from shipid.vessel.schema import TABLE, vessel_model
 
 Schema = dict[str, Any]
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors of TOML know
-FOLDER = ".shipid"  # beside a document: where the schema that its first line names is
+FOLDER = ".shipid"  # in the folder of a document: holds the schema that its first line names
 PARTIAL = "part of "  # of the names of blocks of which anything may be left out
 NOISE = ("title", "discriminator")
 
@@ -43,7 +43,7 @@ def schema(name: str) -> Schema:
 
 
 def with_schema(text: str, file: Path, name: str) -> str:
-    """Return the text of a document with a first line that names its schema, which is written beside its file.
+    """Return the text of a document with a first line that names its schema. The schema is written next to it.
 
     The line holds a relative path, so that it works wherever the folder goes: on another machine, or in a repository.
     """
@@ -124,10 +124,10 @@ def _mapping() -> Schema:
         "file": (dict[str, file], {}),  # type: ignore[valid-type]
         "repair": (list[repairs], []),
     }
-    found = _schema_of(create_model("mapping", __base__=LogMapping, **fields))
-    del found["properties"]["digest"]  # is computed, not written
-    found["required"].remove("digest")
-    return found
+    schema = _schema_of(create_model("mapping", __base__=LogMapping, **fields))
+    del schema["properties"]["digest"]  # is computed, not written
+    schema["required"].remove("digest")
+    return schema
 
 
 def _vessel() -> Schema:
@@ -163,7 +163,7 @@ def _vessel() -> Schema:
 
 
 def _partial(node: Any) -> Any:
-    """The same schema with nothing required, all the way down."""
+    """The schema without any required key, at every level."""
     if isinstance(node, list):
         return [_partial(entry) for entry in node]
     if not isinstance(node, Mapping):
@@ -177,10 +177,10 @@ def _partial(node: Any) -> Any:
 
 
 def _of_kind(
-    what: str, kind: str, model: type[BaseModel], beside: Mapping[str, Any] | None = None, default: str = ""
+    what: str, kind: str, model: type[BaseModel], further: Mapping[str, Any] | None = None, default: str = ""
 ) -> type[BaseModel]:
-    """The model of a kind with its `kind` fixed, and other fields beside its own."""
-    fields: dict[str, Any] = {**(beside or {}), "kind": (Literal[kind], kind if kind == default else ...)}
+    """The model of a kind with a fixed `kind` and further fields."""
+    fields: dict[str, Any] = {**(further or {}), "kind": (Literal[kind], kind if kind == default else ...)}
     return create_model(f"{what}_{kind}", __base__=model, **fields)
 
 
@@ -189,8 +189,8 @@ def _either(models: list[type[BaseModel]]) -> Any:
 
 
 def _schema_of(model: type[BaseModel]) -> Schema:
-    found: Schema = _portable(model.model_json_schema())
-    return found
+    schema: Schema = _portable(model.model_json_schema())
+    return schema
 
 
 def _portable(node: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What a command has found: tables and lines for people, or one JSON object for programs."""
+"""Output of a command: tables and lines for people, or one JSON object for programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Json = Annotated[bool, typer.Option("--json", help="print one JSON object instea
 
 
 class Answer:
-    """Collects what a command has found, for JSON, or prints it at once.
+    """Collects the output of a command for JSON, or prints it immediately.
 
     Parameters
     ----------

@@ -27,10 +27,10 @@ def files(*endings: str) -> Offer:
     def offer(incomplete: str) -> list[str]:
         head, slash, start = incomplete.rpartition("/")
         try:
-            found = sorted(Path(head + slash or ".").iterdir())
+            entries = sorted(Path(head + slash or ".").iterdir())
         except OSError:
             return []
-        named = ((head + slash + path.name, path) for path in found if start or not path.name.startswith("."))
+        named = ((head + slash + path.name, path) for path in entries if start or not path.name.startswith("."))
         return [
             name + "/" * path.is_dir()
             for name, path in named

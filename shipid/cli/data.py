@@ -93,13 +93,13 @@ def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) 
     ]
     shown = ((*list(c.values())[:3], f"{c['sure']:.0%}", c["why"]) for c in columns)
     answer.rows("columns", columns, table(["column", "from", "unit", "sure", "why"], shown))
-    found = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    shown = ((f["finding"], f"{f['sure']:.0%}", f["what"]) for f in found)
-    answer.rows("findings", found, table(["finding", "sure", "what"], shown) if found else None)
+    findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
+    shown = ((f["finding"], f"{f['sure']:.0%}", f["what"]) for f in findings)
+    answer.rows("findings", findings, table(["finding", "sure", "what"], shown) if findings else None)
     source = guessed.source
     if source.pattern is not None:
-        said = f"{len(source.files)} files {source.pattern!r} are one source of as many runs"
-        answer.say(said, files=len(source.files), pattern=source.pattern)
+        sentence = f"{len(source.files)} files {source.pattern!r} are one source of as many runs"
+        answer.say(sentence, files=len(source.files), pattern=source.pattern)
     left = [{"left out": name, "because": why} for name, why in source.skipped.items()]
     answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)
     notes = [f"note: {note}" for note in guessed.sniffed.notes]

@@ -73,7 +73,7 @@ def aboard(
         content = AboardContent(
             title=f"{log.stem}, played as if at sea",
             name=predictor.stem,
-            said=summary(played),
+            lines=summary(played),
             instants=played.instants,
             points=played.points,
             track=played.track,

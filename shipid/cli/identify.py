@@ -160,38 +160,38 @@ def _compare(
     dataset: Path,
     answer: Answer,
 ) -> None:
-    """Compare structures of the hull, print what was found, and write the vessel with the structure chosen."""
+    """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
     from shipid.identification.structures import PRESENT, STRUCTURES
     from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
 
     names = [PRESENT, *STRUCTURES] if structures == "all" else [name.strip() for name in structures.split(",")]
     try:
         with steps() as say:
-            found = compare_structures(
+            compared = compare_structures(
                 ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how
             )
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: nothing was written\n")
         sys.exit(130)
-    _show_structures(found, answer)
-    written = write_chosen(found, file)
-    answer.say(f"vessel with the structure {found.chosen} -> {written}", chosen=found.chosen, file=written)
+    _show_structures(compared, answer)
+    written = write_chosen(compared, file)
+    answer.say(f"vessel with the structure {compared.chosen} -> {written}", chosen=compared.chosen, file=written)
     if html is not None:
         from shipid.report.structures import write_structures
 
-        page = structures_content(found, dataset, command_line())
+        page = structures_content(compared, dataset, command_line())
         answer.say(f"page -> {write_structures(page, html)}", page=html)
 
 
-def _show_structures(found: Compared, answer: Answer) -> None:
+def _show_structures(compared: Compared, answer: Answer) -> None:
     """Print errors on runs held out, standard manoeuvres, errors by side, and what to run next."""
     from math import degrees
 
     from shipid.identification.sides import HEADS, shown
 
-    length = f"of {found.ahead:g} s" if found.ahead else "as long as the runs"
+    length = f"of {compared.ahead:g} s" if compared.ahead else "as long as the runs"
     answer.say(
-        f"{found.vessel.name}: {len(found.runs)} runs; free runs {length} that the fit has not seen, mean of RMS:"
+        f"{compared.vessel.name}: {len(compared.runs)} runs; free runs {length} that the fit has not seen, mean of RMS:"
     )
     rows = [
         [
@@ -202,13 +202,13 @@ def _show_structures(found: Compared, answer: Answer) -> None:
             digits(row["test"]),
             row["note"],
         ]
-        for row in found.table.to_dict("records")
+        for row in compared.table.to_dict("records")
     ]
     heads = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "more [m]", "95 % interval"]
-    answer.rows("structures", found.table, table([*heads, "test runs [m]", ""], rows))
-    known = [row for row in found.manoeuvres.to_dict("records") if row["measure"]]
-    names = [name for name in found.table["structure"] if name in {row["structure"] for row in known}]
-    wide = {(row["manoeuvre"], row["measure"]): row for row in found.spread.to_dict("records")}
+    answer.rows("structures", compared.table, table([*heads, "test runs [m]", ""], rows))
+    known = [row for row in compared.manoeuvres.to_dict("records") if row["measure"]]
+    names = [name for name in compared.table["structure"] if name in {row["structure"] for row in known}]
+    wide = {(row["manoeuvre"], row["measure"]): row for row in compared.spread.to_dict("records")}
     rows = []
     for place in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in known):
         by = {row["structure"]: row for row in known if (row["manoeuvre"], row["measure"]) == place}
@@ -216,16 +216,16 @@ def _show_structures(found: Compared, answer: Answer) -> None:
         two = [digits(wide[place][name]) if place in wide else "-" for name in ("spread", "width")]
         rows.append([*place, *cells, *two, next(iter(by.values()))["unit"]])
     heads = ["calm water", "measure", *names, "between", "within", "unit"]
-    answer.rows("manoeuvres", found.manoeuvres, table(heads, rows))
+    answer.rows("manoeuvres", compared.manoeuvres, table(heads, rows))
     answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
-    if len(found.groups):
-        answer.say(f"Errors of {found.chosen} by side, helm and speed, on runs that the fit has not seen:")
-        answer.rows("groups", found.groups, table(list(HEADS), shown(found.groups)))
-    answer.say("\n".join(found.sentences), sentences=list(found.sentences))
-    for name, fit in found.fits.items():
+    if len(compared.groups):
+        answer.say(f"Errors of {compared.chosen} by side, helm and speed, on runs that the fit has not seen:")
+        answer.rows("groups", compared.groups, table(list(HEADS), shown(compared.groups)))
+    answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
+    for name, fit in compared.fits.items():
         if fit.caution:
             typer.echo(f"warning: intervals of {name}: {fit.caution}", err=True)
-    notes = found.manoeuvres[(found.manoeuvres["note"].fillna("") != "") & (found.manoeuvres["measure"] == "")]
+    notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & (compared.manoeuvres["measure"] == "")]
     for row in notes.to_dict("records"):
         typer.echo(f"warning: {row['structure']}, {row['manoeuvre']}: {row['note']}", err=True)
 
@@ -245,17 +245,17 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
     fitted, _ = pick_runs(log, runs, test)
     try:
         ahead, step = proposed_horizon(ship, log)
-        found = first_look(ship, log, fitted, ahead=ahead, step=step)
+        look = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
         return  # the fit says what is missing
-    if found.wrong:
-        typer.echo(f"warning: {found.sentence}", err=True)
+    if look.wrong:
+        typer.echo(f"warning: {look.sentence}", err=True)
     else:
-        answer.say(found.sentence)
-    answer.say(first_look=found.sentence)
-    if found.changes:
-        answer.say("draft of a correction, to begin with:")
-        patch = found.patch(str(ship.file))
+        answer.say(look.sentence)
+    answer.say(first_look=look.sentence)
+    if look.changes:
+        answer.say("draft of a correction:")
+        patch = look.patch(str(ship.file))
         answer.say(patch, correction=patch)
 
 
@@ -297,7 +297,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     answer.rows("estimates", outcome.estimates, table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
     answer.say(
-        f"Factors are on the base; standard errors and intervals are theirs, by {words[outcome.statistics.chosen]}."
+        f"Factors are relative to the base, and so are errors and intervals, by {words[outcome.statistics.chosen]}."
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
@@ -322,7 +322,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     if outcome.solution.effective:
         worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
         counts = dict(outcome.solution.effective)
-        answer.say(f"residuals count as so many independent ones: {worth}", independent_residuals=counts)
+        answer.say(f"number of independent residuals that they are worth: {worth}", independent_residuals=counts)
     profiles = [curve.sentence for curve in outcome.profiles]
     answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:

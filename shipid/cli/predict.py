@@ -31,5 +31,5 @@ def predict(
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:
-        said = f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)"
-        typer.echo(said + (": no band is promised there" if level is not None else ""))
+        sentence = f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)"
+        typer.echo(sentence + (": no band is promised there" if level is not None else ""))

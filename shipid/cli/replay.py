@@ -48,18 +48,18 @@ def replay(
     ship, log = load_vessel(vessel), read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
     settings = Identify(parameters=[next(iter(ship.parameters))], step=step)
-    found = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
+    replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     rows = [
         [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
         if row["position"] == row["position"]
         else [row["run"], "diverges", "", "", ""]
-        for row in found.errors.to_dict("records")
+        for row in replayed.errors.to_dict("records")
     ]
     content = ReplayContent(
         title=f"{ship.name}: recorded runs, replayed",
         name=ship.key,
-        series=found.series,
-        errors=found.errors.drop(columns="model"),
+        series=replayed.series,
+        errors=replayed.errors.drop(columns="model"),
         ahead=ahead,
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
@@ -72,9 +72,9 @@ def replay(
     with answering(as_json) as answer:
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
         heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
-        answer.rows("errors", found.errors.drop(columns="model"), table(heads, rows))
+        answer.rows("errors", replayed.errors.drop(columns="model"), table(heads, rows))
         if csv is not None:
-            write_table(csv, found.series)
+            write_table(csv, replayed.series)
             answer.say(f"motions -> {csv}", csv=csv)
         page = write_replay(content, file)
         answer.say(f"page -> {page}", page=page)

@@ -77,7 +77,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
     plan = read_plan(study, parsed(changes))
     if plan.truth is None:
-        raise DocumentError("has no [truth]: its runs are recorded", file=plan.file)
+        raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)

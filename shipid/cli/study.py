@@ -76,12 +76,12 @@ def study_new(
                 answer.say(look.sentence)
             elif look.changes:
                 corrected = f"{look.vessel.key}-corrected"
-                answer.say(f"draft of a correction, in the study as {corrected}; as a patch of its own:")
+                answer.say(f"draft of a correction; in the study it is {corrected}; as a patch:")
                 patch = look.patch(named)
                 answer.say(patch, correction=patch)
         names = [model.name for model in draft.plan.foundations]
-        said = f"{draft.plan.cells} cells of {len(names)} foundations ({', '.join(names)}) -> {file}"
-        answer.say(said, file=file, cells=draft.plan.cells, foundations=names, warnings=draft.warnings)
+        sentence = f"{draft.plan.cells} cells of {len(names)} foundations ({', '.join(names)}) -> {file}"
+        answer.say(sentence, file=file, cells=draft.plan.cells, foundations=names, warnings=draft.warnings)
         answer.say(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
 
 
@@ -104,7 +104,7 @@ def study_variants(
         models = prepared.foundations
         known = [model.name for model in models if model.vessel and model.identify is None]
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
-    found = [
+    foundations = [
         {
             "foundation": model.name,
             "A": scores.get(model.name),
@@ -115,7 +115,7 @@ def study_variants(
     ]
     with answering(as_json) as answer:
         heads = ["foundation", "A [m]", "changed", "factors"]
-        answer.rows("foundations", found, table(heads, map(_factors, found)))
+        answer.rows("foundations", foundations, table(heads, map(_factors, foundations)))
         if save is not None:
             from shipid.study.store import write_patches
 
@@ -139,20 +139,26 @@ def study_screen(
     out: Annotated[
         Path | None, typer.Option(help="file for a row per member: .csv or .parquet; default: <study>-screen.csv")
     ] = None,
+    single: Annotated[
+        bool, typer.Option("--single", help="single precision: half the time, A to about six digits")
+    ] = False,
     changes: Changes = None,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    from shipid.engine.engines import REPEATED, named
     from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain
 
+    engine = "single" if single else REPEATED
+    named(engine, device)
     plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     for note in screen.notes(plan, dataset, wanted):
         typer.echo(note, err=True)
-    blocks = counted(screen.screen(plan, dataset, wanted, members, device), members * len(wanted))
+    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)
@@ -195,8 +201,8 @@ def study_rotate(
 
     kept = rotate.kept_folder(file, plan, dataset, device)
     blocks = rotate.rotate(plan, dataset, wanted, device, kept)
-    said = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
-    frame = pd.concat(list(counted(blocks, cells, "cells", said)), ignore_index=True)
+    sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
+    frame = pd.concat(list(counted(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)
     rotate.forget(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
@@ -208,18 +214,18 @@ def study_rotate(
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
     band = f"in band of {plan.study.bands.level:.0%}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
-    found = rotate.turn_findings(frame, plan)
+    verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
     with answering(as_json) as answer:
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"naive floor {digits(naive)} m", naive=naive)
-        if found:
+        if verdicts:
             answer.say("findings over the turns, in brackets 95 % intervals:")
         shown = table(
-            ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in found)
+            ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in verdicts)
         )
-        answer.rows("findings", found, shown if found else None)
+        answer.rows("findings", verdicts, shown if verdicts else None)
         answer.say(f"{len(frame)} cells -> {file}", file=file)
 
 
@@ -271,10 +277,10 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
     """Check that the files of a run's folder are whole and as they were written; ends with 1 if one is not."""
     from shipid.study.check import check_folder
 
-    found = check_folder(folder)
+    report = check_folder(folder)
     with answering(as_json) as answer:
-        answer.say("\n".join(found.lines), lines=found.lines, faults=found.faults)
-        if found.faults:
+        answer.say("\n".join(report.lines), lines=report.lines, faults=report.faults)
+        if report.faults:
             raise typer.Exit(1)
 
 
@@ -319,24 +325,34 @@ def _counterpart(pair: str) -> tuple[str, str]:
     return first, other
 
 
-def _show_matched(found: Comparison, answer: Answer) -> DataFrame:
+def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     """Show what differs between runs, and the errors of cells that match; returns these."""
-    documents, errors = found.documents, found.errors
-    answer.say("", folders=found.names)
+    documents, errors = compared.documents, compared.errors
+    answer.say("", folders=compared.names)
     rows = [[short(str(text), 60) for text in row] for row in documents.itertuples(index=False)]
-    shown = table(["what differs", *found.names], rows[:MOST_DIFFERENCES])
+    shown = table(["what differs", *compared.names], rows[:MOST_DIFFERENCES])
     answer.rows("documents", documents, shown if rows else None)
     if not rows:
-        answer.say("the documents say the same")
+        answer.say("the documents are equal")
     elif len(rows) > MOST_DIFFERENCES:
         answer.say(f"and {len(rows) - MOST_DIFFERENCES} more: --json shows all")
     banded = bool(errors[["coverage_first", "coverage_other"]].notna().any(axis=None))
     for name, part in errors.groupby("folder", sort=False):
-        answer.say(f"H [m] of {found.names[0]}, of {name}, and the difference with its 95 % interval:")
-        heads = ["family", "method", "N_D", "cells", found.names[0], str(name), "difference", *["in band"] * banded, ""]
+        answer.say(f"H [m] of {compared.names[0]}, of {name}, and the difference with its 95 % interval:")
+        heads = [
+            "family",
+            "method",
+            "N_D",
+            "cells",
+            compared.names[0],
+            str(name),
+            "difference",
+            *["in band"] * banded,
+            "",
+        ]
         lines = [_difference(row, banded) for row in part.to_dict("records")]
         answer.rows("errors", errors, table(heads, lines))
-    answer.say("\n".join(found.notes), notes=found.notes)
+    answer.say("\n".join(compared.notes), notes=compared.notes)
     return errors
 
 

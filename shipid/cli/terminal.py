@@ -204,7 +204,7 @@ def looking(look: Callable[[], None], every: float) -> Iterator[None]:
 
 
 class Quiet:
-    """Plain lines of a run: when nothing has been said for a while, how far the searches are."""
+    """Plain lines of a run: after a silence, how far the searches are."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
@@ -218,7 +218,7 @@ class Quiet:
     def look(self) -> None:
         """Print the search that moved last, if it is time to."""
         if time.monotonic() - self.last >= SILENCE and (found := self.watch.look()):
-            more = f" ({len(found)} searches go on)" if len(found) > 1 else ""
+            more = f" ({len(found)} searches are running)" if len(found) > 1 else ""
             self.say(f"... {found[0].words}{more}")
 
 
@@ -263,11 +263,11 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
     task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
 
     def look() -> None:
-        found = watch.look()
-        progress.update(inner, visible=bool(found))
-        if found:
-            said = escape(visible(found[0].words))
-            progress.update(inner, description=said, completed=found[0].done, total=found[0].count)
+        searches = watch.look()
+        progress.update(inner, visible=bool(searches))
+        if searches:
+            text = escape(visible(searches[0].words))
+            progress.update(inner, description=text, completed=searches[0].done, total=searches[0].count)
 
     with progress, looking(look, LOOK):
         for event in events:

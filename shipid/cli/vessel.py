@@ -47,8 +47,8 @@ def vessel_show(
     with answering(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
         answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
-        said = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
-        answer.say(f"particulars: {said}", particulars=known)
+        sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
+        answer.say(f"particulars: {sentence}", particulars=known)
         rows = ((t["term"], t["kind"] + ", off" * t["off"], t["source"]) for t in terms)
         answer.rows("terms", terms, table(["term", "kind", "source"], rows))
         for path, _, block in term_blocks(document):
@@ -82,7 +82,8 @@ def vessel_new(
     ] = None,
     tunnel_thruster: Annotated[bool, typer.Option("--tunnel-thruster", help="there is one at the bow")] = False,
     scale: Annotated[
-        float | None, typer.Option(help="of a model: ship length over its own; 1: a ship. Default: 160 m if below 10 m")
+        float | None,
+        typer.Option(help="of a model: ship length over model length; 1: a ship. Default: 160 m if below 10 m"),
     ] = None,
     density: Annotated[float | None, typer.Option(help="kg/m^3 of the water; default: sea, fresh for a model")] = None,
     ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",

@@ -251,7 +251,7 @@ def _drift(rows: pd.DataFrame) -> Array:
 
 
 def check_series(dataset: Dataset) -> pd.DataFrame:
-    """What the checks of motion compare, row by row: run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]."""
+    """Signals that the checks of motion compare: run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]."""
     parts = []
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()

@@ -160,7 +160,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     """Raise DataError unless the table holds what `Dataset` promises."""
     check_metadata(metadata)
     if len(frame) == 0:
-        raise DataError("the dataset has no rows")
+        raise DataError("the dataset has no rows: it needs at least one run")
     names = [str(name) for name in frame.columns]
     for name in ("run", "flags", *required()):
         if name not in names:
@@ -173,7 +173,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
         if name in names and other not in names:
             raise DataError(f"wind needs V_w and beta_w: {other} is missing", path=name)
     if int(frame["flags"].max()) >= 1 << len(metadata.get("flags", [])) or int(frame["flags"].min()) < 0:
-        raise DataError("a bit is set that metadata['flags'] does not name", path="flags")
+        raise DataError("a row has a flag bit that metadata['flags'] does not name", path="flags")
     units = metadata.get("units", {})
     for name, unit in units_of(names).items():
         if units.get(name, unit) != unit:

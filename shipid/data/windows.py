@@ -16,7 +16,7 @@ from shipid.errors import DataError
 Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
-"""Purposes of a draw of runs: one seed gives each an order of its own."""
+"""Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
@@ -114,7 +114,7 @@ class Windows:
         hidden: Mapping[str, Array] | None = None,
         estimates: Mapping[str, Array] | None = None,
     ) -> Instants:
-        """What a predictor knows: no future, but for the commands where they are `known` over the horizon."""
+        """Input of a predictor: no future, except for the commands where they are `known` over the horizon."""
         return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {})
 
     @property
@@ -302,7 +302,7 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
 def covered(windows: Windows) -> float:
     """Recorded time [s] that windows see, pasts and futures included: the length of the union of their intervals.
 
-    Runs with clocks of their own are added up; on a shared clock a moment that two runs hold counts once.
+    Runs with separate clocks are added up; on a shared clock a moment in two runs counts once.
     """
     length = (windows.num_past + windows.horizon) * windows.step
     runs = [windows.t] if windows.shared_clock else [windows.t[windows.run == run] for run in windows.spans]
@@ -319,7 +319,7 @@ def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, 
     names = set(validation_runs)
     unknown = names - set(windows.spans)
     if unknown:
-        raise DataError(f"no windows of the runs {', '.join(sorted(unknown))}")
+        raise DataError(f"these runs have no windows: {', '.join(sorted(unknown))}")
     validation = np.isin(windows.run, sorted(names))
     training = ~validation
     if windows.shared_clock:
@@ -346,7 +346,7 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
             return folds
     (run,) = windows.spans
     length = (windows.num_past + windows.horizon) * windows.step
-    raise DataError(f"run {run!r} is too short to train and validate on with windows of {length:g} s")
+    raise DataError(f"run {run!r} is too short to train and validate with windows of {length:g} s: shorten the horizon")
 
 
 def run_folds(
@@ -387,7 +387,7 @@ def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[st
     """Deal the runs into folds of (nearly) equal number: the validation runs of every fold."""
     drawn = _drawn(runs, seed, FOLDS)
     if not 2 <= num_folds <= len(drawn):
-        raise DataError(f"{len(drawn)} runs cannot be dealt into {num_folds} folds: choose 2 to {len(drawn)}")
+        raise DataError(f"{len(drawn)} runs cannot be divided into {num_folds} folds: choose 2 to {len(drawn)}")
     return [tuple(drawn[fold::num_folds]) for fold in range(num_folds)]
 
 
@@ -395,7 +395,9 @@ def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str,
     """Split the runs into (rest, held out), `share` of them held out, at least one on each side."""
     drawn = _drawn(runs, seed, HELD_OUT)
     if len(drawn) < 2 or not 0 < share < 1:
-        raise DataError(f"a share of {share:g} of {len(drawn)} runs cannot be held out: two runs, 0 < share < 1")
+        raise DataError(
+            f"a share of {share:g} of {len(drawn)} runs cannot be held out: give two runs or more, and 0 < share < 1"
+        )
     count = min(max(round(share * len(drawn)), 1), len(drawn) - 1)
     return tuple(drawn[count:]), tuple(drawn[:count])
 

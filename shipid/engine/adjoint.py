@@ -21,10 +21,8 @@ from shipid.engine.integrate import Array, Batch, Job, Method, integrate
 from shipid.engine.native import (
     C,
     Parts,
-    Target,
     address,
     compiled_for,
-    head,
     longs,
     num_parts,
     packed_records,
@@ -34,6 +32,7 @@ from shipid.engine.native import (
     width,
 )
 from shipid.engine.printing import STAGES, print_function
+from shipid.engine.vectors import Target, head
 from shipid.errors import ShipidError
 from shipid.vessel.dynamics import INPUTS, Dynamics
 

@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache, lru_cache
 from itertools import product
 from pathlib import Path
@@ -30,7 +30,8 @@ from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
-from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
+from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
+from shipid.metrics import BINS, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
 log = logging.getLogger(__name__)
@@ -55,48 +56,8 @@ _OPERATIONS = {
 }
 C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
-_ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
 
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
-
-_HEAD = """
-#include <math.h>
-typedef double V __attribute__((vector_size(8 * W)));
-typedef long long M __attribute__((vector_size(8 * W)));
-typedef double U __attribute__((vector_size(8 * W), aligned(8), may_alias));
-#define K(x) ((V){} + (x))
-#define NUMBER(m) ((V)((m) & (M)K(1.0)))
-#define EACH(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i]); return r;
-#define EACH2(f) V r; for (int i = 0; i < W; ++i) r[i] = f(x[i], y[i]); return r;
-static inline V v_fabs(V x) { return (V)((M)x & ((M){} + 0x7fffffffffffffffLL)); }
-static inline V v_sqrt(V x) { EACH(__builtin_sqrt) }
-static inline V v_floor(V x) { EACH(__builtin_floor) }
-static inline V v_ceil(V x) { EACH(__builtin_ceil) }
-#ifdef __AVX__ // one instruction, that compilers do not find
-#define PICK(name, relation) V r; __asm__(name " %2, %1, %0" : "=v"(r) : "v"(x), "vm"(y)); return r;
-#else
-#define PICK(name, relation) M m = x relation y; return (V)((m & (M)x) | (~m & (M)y));
-#endif
-static inline V v_min(V x, V y) { PICK("vminpd", <) }
-static inline V v_max(V x, V y) { PICK("vmaxpd", >) }
-"""
-_MEASURE = f"""
-static inline V measured(V north, V east, long samples, unsigned *tally) {{
-  V distance = v_sqrt(north * north + east * east);
-  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({MOST!r})) >> {SHIFT}) - {FIRST};
-  for (int i = 0; i < W && i < samples; ++i) ++tally[bins[i]];
-  return distance;
-}}
-"""
-
-
-@dataclass(frozen=True)
-class Target:
-    """Target of the C compiler: lanes of a vector, compiler flags, prefix of glibc's vector functions (or empty)."""
-
-    lanes: int
-    flags: tuple[str, ...]
-    prefix: str
 
 
 @cache
@@ -111,7 +72,7 @@ def _probed() -> tuple[str, bytes] | None:
         tried.add(os.path.realpath(command))
         with suppress(OSError), tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "probe.so"
-            failure = build(_command(command, Target(1, (), "")), trial, library, PROBE_LIMIT)
+            failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
             if failure is None:
                 return command, library.read_bytes()
             log.warning("the C compiler %s cannot be used (%s)", command, failure.splitlines()[0])
@@ -161,22 +122,24 @@ def _processor() -> frozenset[str]:
 
 
 @cache
-def target() -> Target:
+def target(precision: Precision = DOUBLE) -> Target:
     """Widest vectors of this processor, with the vector functions of glibc if they can be linked."""
-    command, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
+    command, x86, wide = compiler(), platform.machine() in ("x86_64", "AMD64"), 64 // precision.bits
     if x86 and "avx512f" in _processor():
-        best = Target(8, ("-march=native", "-mprefer-vector-width=512"), "_ZGVeN8")
+        flags = ("-march=native", "-mprefer-vector-width=512")
+        best = Target(8 * wide, flags, f"_ZGVeN{8 * wide}", fused=True, precision=precision)
     elif x86 and {"avx2", "fma"} <= _processor():
-        best = Target(4, ("-march=native",), "_ZGVdN4")
+        best = Target(4 * wide, ("-march=native",), f"_ZGVdN{4 * wide}", fused=True, precision=precision)
     else:
-        best = Target(2, (), "")
+        best = Target(2 * wide, precision=precision)
     if command is None or not best.prefix:
         return best
-    probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); V {best.prefix}v_tanh(V); "
-    probe += f"V run(V x) {{ return {best.prefix}v_tanh(x); }}"
+    called = f"{best.prefix}v_tanh{precision.letter}"
+    probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
+    probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
     with tempfile.TemporaryDirectory() as folder:
         failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
-    return best if failure is None else Target(best.lanes, best.flags, "")
+    return best if failure is None else replace(best, prefix="")
 
 
 def _command(command: str, wanted: Target) -> list[str]:
@@ -191,19 +154,19 @@ def compiler_version(command: str) -> str:
     return run_compiler([command, "--version"], limit=PROBE_LIMIT)[1]
 
 
-def _vector_functions(wanted: Target) -> str:
-    lines = []
-    for name in _ONE:
-        if wanted.prefix:
-            lines.append(f"V {wanted.prefix}v_{name}(V);\n#define v_{name} {wanted.prefix}v_{name}")
-        else:
-            lines.append(f"static inline V v_{name}(V x) {{ EACH({name}) }}")
-    for name in _TWO:
-        if wanted.prefix:
-            lines.append(f"V {wanted.prefix}vv_{name}(V, V);\n#define v_{name} {wanted.prefix}vv_{name}")
-        else:
-            lines.append(f"static inline V v_{name}(V x, V y) {{ EACH2({name}) }}")
-    return "\n".join(lines)
+def _measure(of: Precision) -> str:
+    """C function: distances of a group, tallied. A number without its last bits is the number of its bin."""
+    shift, bins = SHIFT - 52 + of.mantissa, BINS // (OCTAVES[1] - OCTAVES[0])
+    first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * bins
+    most = float(np.nextafter(of.dtype.type(2.0 ** OCTAVES[1]), 0))
+    return f"""
+static inline V measured(V north, V east, long samples, unsigned *tally) {{
+  V distance = v_sqrt(north * north + east * east);
+  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({most!r})) >> {shift}) - {first};
+  for (int i = 0; i < W && i < samples; ++i) ++tally[bins[i]];
+  return distance;
+}}
+"""
 
 
 class Parts:
@@ -251,7 +214,7 @@ class _Source(Parts):
             count = f"counts[{place}]"
         else:
             rows = ", ".join("{" + ", ".join(repr(float(value)) for value in row) + "}" for row in term.arrays)
-            before.append(f"static const double values[][{entries}] = {{ {rows} }};")
+            before.append(f"static const REAL values[][{entries}] = {{ {rows} }};")
             head = f"V component[{entries}]; for (int j = 0; j < {entries}; ++j) component[j] = K(values[c][j]);"
             count = str(len(term.arrays))
         adds = [f"total[{j}] += {text};" for j, text in enumerate(printed.outputs)]
@@ -300,7 +263,7 @@ const V dt[1] = {{ K(step) }};
 
         def add(state: str, a: float, k: str) -> str:
             out = name(num_states)
-            lines.append(f"for (int i = 0; i < {num_states}; ++i) {out}[i] = {state}[i] + {a!r} * {k}[i];")
+            lines.append(f"for (int i = 0; i < {num_states}; ++i) {out}[i] = {state}[i] + K({a!r}) * {k}[i];")
             return out
 
         after, memory_after = integrate(rates, advance, add, "x", "m", self.step, self.method)
@@ -320,16 +283,16 @@ const V dt[1] = {{ K(step) }};
         )
         return f"""{head(wanted)}
 {self.functions()}
-{_MEASURE}
+{_measure(wanted.precision)}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
 #define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
 #define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
 #define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
 #define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
 void run(long first, long last, long stride, long samples, long steps, long every, const long *lengths,
-         const double *numbers, double *start, double *memory, double *commands, double *environment, double *extra,
-         const double *const *drawn, const long *counts, const long *rows, long num_rows, double *records,
-         const U *goal, double *sums, unsigned *tally, double *worst) {{
+         const REAL *numbers, REAL *start, REAL *memory, REAL *commands, REAL *environment, REAL *extra,
+         const REAL *const *drawn, const long *counts, const long *rows, long num_rows, REAL *records,
+         const U *goal, REAL *sums, unsigned *tally, REAL *worst) {{
 V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
 V states[{block}][{nx}], memories[{block}][{max(1, nm)}], taus[{block}][{n}], greatest[{block}], distance[{block}];
 for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
@@ -378,9 +341,9 @@ for (long front = first; front < last; front += {block}) {{
 
 
 @lru_cache(maxsize=64)
-def _library(model: Dynamics, step: float, method: Method) -> Any:
+def _library(model: Dynamics, step: float, method: Method, precision: Precision = DOUBLE) -> Any:
     """The compiled function `run` of a model, from the cache if possible."""
-    return compiled_for(lambda: _Source(model, step, method).text(target()))
+    return compiled_for(lambda: _Source(model, step, method).text(target(precision)))
 
 
 def compiled_for(source: Callable[[], str]) -> Any:
@@ -419,78 +382,87 @@ def compiled(source: str) -> Any:
         raise NoLibrary(f"{library} is gone ({error.strerror})") from None
 
 
-def head(wanted: Target) -> str:
-    """Common beginning of all C sources: the vector type of the target and its functions."""
-    return f"#define W {wanted.lanes}\n{_HEAD}\n{_vector_functions(wanted)}"
-
-
-def padded(array: Array, wide: int) -> Array:
+def padded(array: Array, wide: int, precision: Precision = DOUBLE) -> Array:
     """Pad samples to whole vectors: (..., S) -> (..., wide), the last sample repeated."""
     fill = wide - array.shape[-1]
     filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
-    return np.ascontiguousarray(filled, dtype=float)
+    return np.ascontiguousarray(filled, dtype=precision.dtype)
 
 
-def _packed(array: Array, lanes: int) -> Array:
+def _packed(array: Array, lanes: int, precision: Precision) -> Array:
     """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
     count, entries, num_samples = array.shape
     groups = -(-num_samples // lanes)
-    filled = padded(array, groups * lanes).reshape(count, entries, groups, lanes)
+    filled = padded(array, groups * lanes, precision).reshape(count, entries, groups, lanes)
     return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
 
 
-def run_native(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def run_native(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S)."""
     num_samples = batch.state.shape[1]
-    records, worst = packed_records(model, batch, job)
+    records, worst = packed_records(model, batch, job, precision)
     return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
 
 
-def packed_records(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def packed_records(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
     """Records (V, R, C, width) and the greatest speed (V, width) as C writes them, whole vectors of samples."""
-    num_variants, wide = len(batch.parameters), width(batch)
-    records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide))
-    worst = np.empty((num_variants, wide))
-    _run(model, batch, job, worst, records=records)
+    num_variants, wide = len(batch.parameters), width(batch, precision)
+    records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide), precision.dtype)
+    worst = np.empty((num_variants, wide), precision.dtype)
+    _run(model, batch, job, precision, worst, records=records)
     return records, worst
 
 
-def measure_native(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+def measure_native(
+    model: Dynamics, batch: Batch, job: Job, goal: Array, precision: Precision = DOUBLE
+) -> tuple[Array, Array, Array]:
     """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
 
     The distances are those of the job's two channels to `goal` (T, 2, S), after every step.
     """
-    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch)
-    sums, worst = np.empty((num_variants, wide)), np.empty((num_variants, wide))
-    tally = np.zeros((num_parts(batch), num_variants, BINS), dtype=np.uint32)
-    there = _packed(goal, target().lanes)
-    _run(model, batch, job, worst, goal=there, sums=sums, tally=tally)
-    return sums[:, :num_samples], tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
+    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch, precision)
+    sums, worst = (np.empty((num_variants, wide), precision.dtype) for _ in range(2))
+    tally = np.zeros((num_parts(batch, precision), num_variants, BINS), dtype=np.uint32)
+    there = _packed(goal, target(precision).lanes, precision)
+    _run(model, batch, job, precision, worst, goal=there, sums=sums, tally=tally)
+    return sums[:, :num_samples].astype(float), tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
 
 
-def width(batch: Batch) -> int:
+def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+    """As `run_native`, in single precision."""
+    records, worst = run_native(model, batch, job, SINGLE)
+    return records.astype(float), worst
+
+
+def measure_single(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+    """As `measure_native`, in single precision."""
+    return measure_native(model, batch, job, goal, SINGLE)
+
+
+def width(batch: Batch, precision: Precision = DOUBLE) -> int:
     """Number of samples, rounded up to whole vectors."""
-    lanes = target().lanes
+    lanes = target(precision).lanes
     return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
-def num_parts(batch: Batch) -> int:
+def num_parts(batch: Batch, precision: Precision = DOUBLE) -> int:
     """Number of parts of the samples for the threads: enough for an even load."""
-    num_variants, groups = len(batch.parameters), width(batch) // target().lanes
+    num_variants, groups = len(batch.parameters), width(batch, precision) // target(precision).lanes
     return min(-(-4 * cores() // num_variants), groups)
 
 
-def _run(model: Dynamics, batch: Batch, job: Job, worst: Array, **wanted: Array) -> None:
+def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, worst: Array, **wanted: Array) -> None:
     """Run a job and fill `worst` and the arrays in `wanted`; parts of the samples run on threads."""
-    run, lanes, wide, parts = _library(model, job.step, job.method), target().lanes, width(batch), num_parts(batch)
-    series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    run, lanes = _library(model, job.step, job.method, precision), target(precision).lanes
+    wide, parts = width(batch, precision), num_parts(batch, precision)
+    series = [padded(part, wide, precision) for part in (batch.commands, batch.environment, batch.tau_extra)]
     lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
-    drawn = [_packed(part.transpose(2, 0, 1), lanes) for part in batch.components]
+    drawn = [_packed(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
     counts = (ctypes.c_long * max(1, len(drawn)))(*(part.shape[1] for part in drawn))
     pointers = (ctypes.c_void_p * max(1, len(drawn)))(*(part.ctypes.data for part in drawn))
     places = (ctypes.c_long * len(job.rows))(*job.rows)
-    inputs = [padded(batch.state, wide), padded(batch.memory, wide), *series]
-    values = np.ascontiguousarray(batch.parameters, dtype=float)
+    inputs = [padded(batch.state, wide, precision), padded(batch.memory, wide, precision), *series]
+    values = np.ascontiguousarray(batch.parameters, dtype=precision.dtype)
     edges = np.linspace(0, wide // lanes, parts + 1).astype(int).tolist()
     records, goal, sums, tally = (wanted.get(name) for name in ("records", "goal", "sums", "tally"))
 

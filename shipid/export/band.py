@@ -15,9 +15,9 @@ from shipid.hybrid.bands import LEVELS, Bands
 
 Array = np.ndarray
 CHOICE = ("level", "pointwise", "kind")
-"""What is asked of a band: its level, whether it holds each step alone (0 or 1), the kind of manoeuvre (0: any)."""
+"""Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
 COLUMNS = ("along", "across", "ahead_x", "ahead_y")
-"""What a band says of each step: half axes [m], and the unit vector of the track in body axes."""
+"""Outputs of a band for each step: half axes [m], and the unit vector of the track in body axes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def band_graph(bands: Bands, now: Sequence[str], step: float, radius: Radii) -> 
 
 
 def _point(size: int, places: Sequence[int], bands: Bands) -> Formula:
-    """What is measured, by what counts as distance 1."""
+    """Measured columns, each divided by its unit of distance."""
     now = SX.sym("now", size)
     return formula("point", [("now", now)], [now[place] / bands.spread[i] for i, place in enumerate(places)])
 

@@ -214,7 +214,7 @@ class Mirrored(Block):
 
     @cached_property
     def function(self) -> ca.Function:
-        """The same with matrices as constants."""
+        """The block with matrices as constants."""
         z = MX.sym("z", len(self.weight))
         image = ca.vertcat(*(float(s) * z[int(p)] for p, s in zip(self.place, self.sign, strict=True)))
         weight, offset = ca.DM(self.weight.T), ca.DM(self.offset)
@@ -504,12 +504,12 @@ class Graph(Block):
         self._lines.append(("scan", (name, self._note(body), n, start.text, _rows(each, sizes), _texts(fixed), count)))
         if not _smooth(body):
             return Value(name, 0, MX(n * count, 1))
-        x, found = start.symbol, []
+        x, outputs = start.symbol, []
         parts = [_split(value.symbol, count) for value in each]
         for k in range(count):
             x = body.function(x, *(part[k] for part in parts), *(value.symbol for value in fixed))
-            found.append(x)
-        return Value(name, 0, ca.vertcat(*found))
+            outputs.append(x)
+        return Value(name, 0, ca.vertcat(*outputs))
 
     def map(self, body: Block, each: Sequence[Value], fixed: Sequence[Value], count: int) -> Value:
         """`body(row k of each, fixed)` for all rows, one after the other."""
@@ -521,8 +521,8 @@ class Graph(Block):
             return Value(name, 0, MX(n * count, 1))
         parts = [_split(value.symbol, count) for value in each]
         rest = [value.symbol for value in fixed]
-        found = [body.function(*(part[k] for part in parts), *rest) for k in range(count)]
-        return Value(name, 0, ca.vertcat(*found))
+        results = [body.function(*(part[k] for part in parts), *rest) for k in range(count)]
+        return Value(name, 0, ca.vertcat(*results))
 
     def finish(self, output: Value) -> Graph:
         """Say what the output is."""
@@ -611,7 +611,7 @@ def _statement(kind: str, given: tuple[Any, ...], call: dict[int, str], precisio
 
 def in_order(block: Block) -> list[Block]:
     """A block and all that it calls, each once, those that are called first."""
-    found: list[Block] = []
+    ordered: list[Block] = []
     seen: set[int] = set()
 
     def visit(one: Block) -> None:
@@ -619,10 +619,10 @@ def in_order(block: Block) -> list[Block]:
             seen.add(id(one))
             for part in one.parts():
                 visit(part)
-            found.append(one)
+            ordered.append(one)
 
     visit(block)
-    return found
+    return ordered
 
 
 def num_numbers(block: Block) -> int:

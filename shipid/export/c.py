@@ -46,7 +46,7 @@ WORDS = frozenset(
 
 @dataclass(frozen=True)
 class Files:
-    """What is written: name of a file -> its text; `name` begins every public name in C."""
+    """The files: name of a file -> its text; `name` begins every public name in C."""
 
     name: str
     texts: dict[str, str]
@@ -98,11 +98,11 @@ def _names_of(prefix: str, group: str, names: Sequence[str], unit: Mapping[str, 
 
 def provenance_lines(what: Mapping[str, Any]) -> list[str]:
     """Plain lines of what is known of an origin, for a comment."""
-    found = []
+    lines = []
     for key, value in what.items():
         text = json.dumps(value, default=str, ensure_ascii=True)
-        found.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
-    return found
+        lines.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
+    return lines
 
 
 # ---------------------------------------------------------------------------------------------------------- vessel
@@ -534,7 +534,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
 {self._band(call)}"""
 
     def _promise(self) -> list[str]:
-        """What is said of the band."""
+        """Comments of the header on the band."""
         if self.bands is None:
             return [f"No band: {self.model.no_band}."]
         kinds = "".join(f", {kind} ({count})" for kind, count in self.bands.kinds.items())
@@ -870,7 +870,7 @@ int main(void)
     {name}_init(&ship);
     for (i = 0; i < {rows}; ++i) {{
         {name}_record(&ship, {self.model.physics.step!r} * i, row);
-        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* north, as if she sailed that way */
+        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* a straight run to the north */
     }}
     status = {name}_{predict};
     printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");
@@ -883,7 +883,7 @@ int main(void)
 
 def _must(vessel: Vessel | None) -> Vessel:
     if vessel is None:
-        raise ShipidError("there is no vessel")
+        raise ShipidError("the predictor has no vessel")
     return vessel
 
 

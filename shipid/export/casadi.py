@@ -1,4 +1,4 @@
-"""CasADi files: a predictor or a vessel as a `casadi.Function`, with a list of names beside it."""
+"""CasADi files: a predictor or a vessel as a `casadi.Function`, with a list of names in a second file."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) 
     """Write `file` (for `casadi.Function.load`) and `file.json` with the names of inputs and outputs."""
     with whole(file) as temporary:
         function.save(str(temporary))
-    beside = file.with_name(file.name + ".json")
+    listing = file.with_name(file.name + ".json")
     write_json(
-        beside,
+        listing,
         {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},
     )
-    return [file, beside]
+    return [file, listing]

@@ -33,7 +33,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Taken:
-    """What a corrector takes: names of commands, names of its inputs (those of the past are not among them)."""
+    """Inputs of a corrector: names of commands, names of its inputs (without those of the past)."""
 
     commands: tuple[str, ...]
     names: tuple[str, ...]
@@ -404,11 +404,11 @@ def one_step_builder(known: Known, corrector: OneStepCorrector) -> Builder:
     """Missing acceleration of one step."""
 
     def build(graph: Graph, at: Mapping[str, Value], _: Value, __: Value | None) -> tuple[Value, None]:
-        found = []
+        terms = []
         for head in corrector.heads:
             x = _features(graph, known, at, corrector.commands, head.units.normaliser.names)
-            found.append(graph.call(units_with(head.units, head.surge, head.sway_yaw), x))
-        return graph.total(found, float(len(found))), None
+            terms.append(graph.call(units_with(head.units, head.surge, head.sway_yaw), x))
+        return graph.total(terms, float(len(terms))), None
 
     return build
 
@@ -556,7 +556,7 @@ CORRECTORS: dict[type[Any], Counterpart] = {
 
 
 def taken(corrector: Any) -> Taken:
-    """What a corrector takes; ShipidError for one that has no counterpart here."""
+    """Inputs of a corrector; ShipidError for a corrector that cannot be exported."""
     if type(corrector) not in CORRECTORS:
         kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
         named = next((kind for kind, method in METHODS.items() if method.corrector is type(corrector)), "of this kind")

@@ -53,7 +53,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Packed:
-    """What an FMU is made of: its variables in the order of value references, its C, and its name."""
+    """The parts of an FMU: its variables in the order of value references, its C, and its name."""
 
     identifier: str
     title: str
@@ -79,68 +79,72 @@ def vessel_unit(vessel: Vessel, name: str, method: Method, largest: float | None
     groups = parts.groups()
     length = float(vessel.document.get("particulars", {}).get("L_pp", 30.0))
     largest = largest or round(LARGEST_STEP * min(1.0, (length / 30.0) ** 0.5), 4)
-    found = [
+    variables = [
         Variable(key, "output", "continuous",
                  parts.unit("carry", key), described(key) if not key.startswith("actual.")
                  else f"reached: {described(key.removeprefix('actual.'))}", 0.0)
         for key in groups["carry"]
     ]  # fmt: skip
-    found += [
+    variables += [
         Variable(key, "input", "continuous", parts.unit("commands", key), f"order: {described(key)}", neutral(key))
         for key in groups["commands"]
     ]
-    found += [
+    variables += [
         Variable(key, "input", "continuous", parts.unit("environment", key), described(key), 0.0)
         for key in groups["environment"]
     ]
-    found += [
+    variables += [
         Variable(
             f"load.{key}", "input", "continuous", parts.unit("loads", key), f"added {key}, such as waves or a tug", 0.0
         )
         for key in groups["loads"]
     ]
-    found += [
+    variables += [
         Variable(key, "parameter", "tunable", vessel.units[key], "number of the vessel document", value)
         for key, value in vessel.parameters.items()
     ]
-    found.append(Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest))
+    variables.append(
+        Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
+    )
     sizes = {group: len(names) for group, names in groups.items()}
     return Packed(
-        name, vessel.name, tuple(found), vessel_files(vessel, name, method, Precision()),
-        _vessel_wrapper(name, sizes, parts.equations.num_states, found), None,
+        name, vessel.name, tuple(variables), vessel_files(vessel, name, method, Precision()),
+        _vessel_wrapper(name, sizes, parts.equations.num_states, variables), None,
     )  # fmt: skip
 
 
 def predictor_unit(model: Model, name: str) -> Packed:
     """The FMU of a predictor: motion, weather and commands in, path, band and alarm out."""
     parts, names = PredictorParts(model, name, Precision()), model.layout
-    found = []
+    variables = []
     for key in parts.row:
         low, high = model.limits.get(key, (0.0, 0.0))
         start = (low + high) / 2 if np.isfinite(low + high) else 0.0
-        found.append(Variable(key, "input", "continuous", model.unit(key), described(key), start))
+        variables.append(Variable(key, "input", "continuous", model.unit(key), described(key), start))
     for k in range(names.horizon if names.planned else 0):
         for key in names.planned:
             text = f"order in force in step {k + 1} of the horizon: {described(key)}"
-            found.append(Variable(f"planned[{k + 1}].{key}", "input", "continuous", model.unit(key), text, 0.0))
+            variables.append(Variable(f"planned[{k + 1}].{key}", "input", "continuous", model.unit(key), text, 0.0))
     step = model.physics.step
     for axis, word in (("x", "ahead"), ("y", "to starboard")):
         for k in range(names.horizon):
             text = f"way {word} after {step * (k + 1):g} s, in body axes at the instant of prediction"
-            found.append(Variable(f"{axis}[{k + 1}]", "output", "continuous", "m", text, None))
+            variables.append(Variable(f"{axis}[{k + 1}]", "output", "continuous", "m", text, None))
     bands = model.predictor.bands
     for key, (unit, word) in _BAND.items() if bands is not None else ():
         for k in range(names.horizon):
             text = f"band after {step * (k + 1):g} s: {word}"
-            found.append(Variable(f"{key}[{k + 1}]", "output", "continuous", unit, text, None))
-    found.append(Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None))
+            variables.append(Variable(f"{key}[{k + 1}]", "output", "continuous", unit, text, None))
+    variables.append(
+        Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None)
+    )
     for key, value in zip(names.parameters, model.parameters, strict=True):
-        found.append(
+        variables.append(
             Variable(key, "parameter", "tunable", model.unit(key), "number of the vessel document", float(value))
         )
     if names.planned:
         text = "1: orders stay as they are over the horizon; 0: as in planned[...]"
-        found.append(Variable("held", "parameter", "tunable", "-", text, 1.0))
+        variables.append(Variable("held", "parameter", "tunable", "-", text, 1.0))
     if bands is not None:
         kinds = ", ".join(f"{number}: {kind}" for number, kind in enumerate(("any", *bands.kinds)))
         usual = next(level for level in (0.9, 0.8, 0.5) if bands.promises(level) or level == 0.5)
@@ -149,12 +153,12 @@ def predictor_unit(model: Model, name: str) -> Packed:
             ("pointwise", "1: the share is that of positions at each step alone", 0.0),
             ("kind", f"of the manoeuvre under way: {kinds}", 0.0),
         ):
-            found.append(Variable(key, "parameter", "tunable", "-", text, value))
+            variables.append(Variable(key, "parameter", "tunable", "-", text, value))
     what = "no physics" if model.vessel is None else model.vessel.name
     return Packed(
-        name, f"{what}, {model.predictor.method}", tuple(found), predictor_files(model, name, Precision()),
+        name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, Precision()),
         _predictor_wrapper(
-            name, len(parts.row), names.horizon, len(names.planned), len(names.parameters), bands is not None, found
+            name, len(parts.row), names.horizon, len(names.planned), len(names.parameters), bands is not None, variables
         ),
         step,
     )  # fmt: skip

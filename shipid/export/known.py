@@ -1,4 +1,4 @@
-"""What a predictor knows at an instant, as inputs of a graph, and what the physics and the memory make of it."""
+"""Inputs of a predictor at an instant as symbols of a graph, and what physics and memory compute from them."""
 
 from __future__ import annotations
 
@@ -377,7 +377,7 @@ def feature_table(now: SX_of, commands: Sequence[str]) -> dict[str, SX]:
 
 
 def _history(names: Layout, groups: SX_of, inputs: Inputs, step: float) -> dict[str, SX]:
-    found = {}
+    columns = {}
     now = dict(zip(names.now, ca.vertsplit(groups["now"]), strict=True))
 
     def before(name: str, seconds: float) -> SX:
@@ -387,10 +387,10 @@ def _history(names: Layout, groups: SX_of, inputs: Inputs, step: float) -> dict[
     for seconds in inputs.memory.history:
         for name in (*MOTIONS, *inputs.commands):
             component, dot, signal = name.rpartition(".")
-            found[f"{component}{dot}past-{seconds:g}.{signal}"] = before(name, seconds) - now[name]
+            columns[f"{component}{dot}past-{seconds:g}.{signal}"] = before(name, seconds) - now[name]
     for seconds in inputs.memory.turned:
-        found[f"turned-{seconds:g}.psi"] = now["psi"] - before("psi", seconds)
-    return found
+        columns[f"turned-{seconds:g}.psi"] = now["psi"] - before("psi", seconds)
+    return columns
 
 
 def _estimates(names: Layout, groups: SX_of) -> dict[str, SX]:

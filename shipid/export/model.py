@@ -29,7 +29,7 @@ MOST_NUMBERS = 250_000
 
 
 class Exportable(Protocol):
-    """What is taken of a predictor, see `shipid.predictor.Predictor`."""
+    """The parts of a predictor that an export uses, see `shipid.predictor.Predictor`."""
 
     @property
     def physics(self) -> Physics: ...  # noqa: D102
@@ -107,12 +107,12 @@ class Model:
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Entry of `now` -> least and greatest value without an alarm."""
-        found = {}
+        limits = {}
         for name, (low, high) in self.predictor.limits.items():
             if name in self.layout.now:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
-                found[name] = (float(low - slack), float(high + slack))
-        return found
+                limits[name] = (float(low - slack), float(high + slack))
+        return limits
 
     def unit(self, name: str) -> str:
         """SI unit of an entry of an input."""
@@ -144,8 +144,8 @@ class Model:
         reached = [np.asarray((instants.hidden or orders)[name], dtype=float) for name in names.reached]
         estimates = [np.asarray(instants.estimates[name]) for name in names.estimates]
         groups = {"now": now, "reached": reached, "past": past, "planned": planned, "estimates": estimates}
-        found = {key: np.stack(rows, axis=1) if rows else np.zeros((count, 0)) for key, rows in groups.items()}
-        return {**found, "parameters": np.tile(self.parameters, (count, 1))}
+        stacked = {key: np.stack(rows, axis=1) if rows else np.zeros((count, 0)) for key, rows in groups.items()}
+        return {**stacked, "parameters": np.tile(self.parameters, (count, 1))}
 
 
 def model(predictor: Exportable) -> Model:

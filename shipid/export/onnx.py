@@ -120,7 +120,7 @@ def _compensation(nodes: _Nodes, corrector: Compensator, horizon: int) -> tuple[
 
 def _acceleration(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str], str, list[int]]:
     names = list(dict.fromkeys(name for head in corrector.heads for name in head.units.normaliser.names))
-    found = []
+    terms = []
     for head in corrector.heads:
         units = head.units
         even, odd = _parts(nodes, units, nodes.chosen("inputs", names, units.normaliser.names))
@@ -130,8 +130,8 @@ def _acceleration(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str]
         surge = nodes.layer(even, head.surge[1:] / size, head.surge[0], False)
         bias = head.sway_yaw[0] if first else np.zeros(2)
         sway_yaw = nodes.layer(odd, head.sway_yaw[first:] / size, bias, False)
-        found.append(nodes.node("Concat", surge, sway_yaw, axis=1))
-    return names, nodes.mean(found), [3]
+        terms.append(nodes.node("Concat", surge, sway_yaw, axis=1))
+    return names, nodes.mean(terms), [3]
 
 
 def _parts(nodes: _Nodes, units: Units, x: str) -> tuple[str, str]:

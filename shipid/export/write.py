@@ -47,9 +47,9 @@ def export_predictor(
         return _fmu(predictor_unit(kept, title), file)
     if target == "casadi":
         band = band_function(kept, f"{title}_band")
-        beside = file.with_name(f"{file.stem}-band{file.suffix}")
+        band_file = file.with_name(f"{file.stem}-band{file.suffix}")
         written = write_function(*predictor_function(kept, title), file)
-        return written if band is None else [*written, *write_function(*band, beside)]
+        return written if band is None else [*written, *write_function(*band, band_file)]
     return [write_onnx(kept, title, file, single=single)]
 
 

@@ -326,7 +326,9 @@ def _stretch(
         columns |= {name: smoothed.state(name) for name in STATES}
     absent = next((name for name in model.commands if name not in columns), None)
     if absent is not None:
-        raise DataError(f"command {absent!r} is needed by {vessel.name} and not logged", path=str(rows["run"].iloc[0]))
+        raise DataError(
+            f"command {absent!r} is missing in the log, and {vessel.name} needs it", path=str(rows["run"].iloc[0])
+        )
     zero = np.zeros(len(t))
     columns |= {**aboard(columns), "down": columns.get("z", zero)}
     state = np.array([columns.get(name, zero) for name in (*model.state, *model.hidden)])

@@ -180,7 +180,7 @@ def pick_runs(
     tested = chosen(held_out, "held out")
     fitted = [run for run in (chosen(runs, "runs") if runs else dataset.runs) if run not in tested]
     if not fitted:
-        raise DataError("every run is held out: leave at least one to the fit", path="runs")
+        raise DataError("every run is held out: leave at least one run for the fit", path="runs")
     return tuple(fitted), tuple(tested)
 
 
@@ -227,7 +227,7 @@ def run_identification(
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         if (solution.at_bound | solution.held).all():
-            raise ShipidError("every parameter is at a bound, held or dropped: no parameter is left to estimate")
+            raise ShipidError("every parameter is at a bound, fixed or dropped: free more parameters, or widen bounds")
         _go_on(held)
         judged = statistics(LinearFit.of(solution))
         curves = tuple(_profile(path, dataset, solution, judged) for path in profiles)
@@ -389,15 +389,15 @@ def _banded(
 
     def performed(kind: str, angles: Sequence[float]) -> Measure:
         def measure(one: Vessel) -> dict[str, float]:
-            found = _measured(one, kind, angles)
+            measures = _measured(one, kind, angles)
             names = [name.replace("_", " ") for name in COMPARED[kind]]
-            return {name: float(found[name]["value"]) for name in names if name in found}
+            return {name: float(measures[name]["value"]) for name in names if name in measures}
 
         return measure
 
     titled = [(_title(kind, angles), performed(kind, angles)) for kind, angles in TRIED]
-    found = bands(vessel, solution, judged, titled, level)
-    ends = found[["manoeuvre", "measure", "low", "high"]]
+    measures = bands(vessel, solution, judged, titled, level)
+    ends = measures[["manoeuvre", "measure", "low", "high"]]
     return manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"]), ""
 
 

@@ -128,13 +128,13 @@ def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
     ratio = kind.ratio(numbers[path], numbers, length)
     if ratio is None:
         return ""
-    said = f"{path} = {numbers[path]:.4g}: {kind.words} is {ratio:.3g}"
+    sentence = f"{path} = {numbers[path]:.4g}: {kind.words} is {ratio:.3g}"
     usual = f"of ships {_number(kind.low)} to {_number(kind.high)}" if math.isfinite(kind.low) else "of ships below 0"
     if not kind.low <= ratio <= kind.high:
-        return f"{said}, {usual}: no ship has that; hold it, or give it a prior"
+        return f"{sentence}, {usual}: no ship has that; hold it, or give it a prior"
     width = kind.high - kind.low
     if math.isfinite(width) and min(ratio - kind.low, kind.high - ratio) < NEAR * width:
-        return f"{said}, at the end of the range {usual}"
+        return f"{sentence}, at the end of the range {usual}"
     return ""
 
 

@@ -121,7 +121,11 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     twice = next(((run, path) for run, values in overridden.items() for path in values if path in free), None)
     if twice is not None:
         path = f"{BLOCK}.runs.{'.'.join(twice)}"
-        raise DocumentError("is free in the fit: fix it, or set it in no run", file=vessel.file, path=path)
+        raise DocumentError(
+            "is free in the fit and also set for a run: fix it, or remove the value of the run",
+            file=vessel.file,
+            path=path,
+        )
     return Problem(
         vessel=vessel,
         runs=tuple(runs),

@@ -77,7 +77,8 @@ class Identify(documents.Checked, BaseModel):
         description="where to begin: growing horizons, inverse dynamics, or the base",
     )
     discount: bool = Field(
-        default=False, description="correlated residuals count as so many independent ones, so that priors count"
+        default=False,
+        description="correlated residuals weigh as their number of independent ones, so that priors count",
     )
     ranges: bool = Field(default=False, description="numbers stay within the ranges that ships have")
     drop: Positive | None = Field(
@@ -90,10 +91,10 @@ class Identify(documents.Checked, BaseModel):
         for names, valid, what in ((self.weights, SIGNALS, "weights"), (self.nuisance, NUISANCES, "nuisance")):
             unknown = next((name for name in names if name not in valid), None)
             if unknown is not None:
-                raise ValueError(f"{what}.{unknown} is none: {choices(unknown, valid)}")
+                raise ValueError(f"{what}.{unknown} is no valid name: {choices(unknown, valid)}")
         for path, (low, high) in self.bounds.items():
             if not low <= high:
-                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] runs backwards, give [low, high]")
+                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
         if self.horizon and self.horizon < 2 * self.step:
             raise ValueError(f"horizon {self.horizon:g} s must hold two steps of {self.step:g} s, or be 0")
         return self
@@ -154,14 +155,20 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
         if not paths:
-            message = f"{pattern!r} reaches nothing that is free in the fit: add it to parameters, or leave it out"
+            message = (
+                f"{pattern!r} selects no parameter that is free in the fit: add it to parameters, or remove it here"
+            )
             raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
         return paths
 
     fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", asked)}
     free = [path for path in asked if path not in fixed]
     if not free:
-        raise DocumentError("every parameter is fixed again: nothing is left", file=file, path=f"{BLOCK}.fixed")
+        raise DocumentError(
+            "every selected parameter is also fixed, so none is left to estimate: fix fewer",
+            file=file,
+            path=f"{BLOCK}.fixed",
+        )
     unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
     if unknown is not None:
         hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
@@ -255,11 +262,13 @@ def overrides(
         where = f"{BLOCK}.runs.{key}"
         if run is None:
             hint = choices(key.split(".", 1)[0], result)
-            raise DocumentError(f"begins with no run of the data: {hint}", file=vessel.file, path=where)
+            raise DocumentError(f"does not begin with the name of a run: {hint}", file=vessel.file, path=where)
         path = key[len(run) + 1 :]
         if path not in valid:
-            raise DocumentError(f"{path!r} is nothing to set: {choices(path, valid)}", file=vessel.file, path=where)
+            raise DocumentError(
+                f"{path!r} cannot be set for a run: {choices(path, valid)}", file=vessel.file, path=where
+            )
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise DocumentError(f"{value!r} is no number", file=vessel.file, path=where)
+            raise DocumentError(f"{value!r} is not a number", file=vessel.file, path=where)
         result[run][path] = float(value)
     return {run: result[run] for run in runs}

@@ -126,7 +126,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
 
     Each is shown by a t test over the pieces; the level is divided by the number of tests (Bonferroni).
     """
-    said = []
+    sentences = []
     rows = [row for row in groups.to_dict("records") if row["side"]]
     by = {
         group: [row for row in rows if row["group"] == group] for group in dict.fromkeys(row["group"] for row in rows)
@@ -140,7 +140,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         apart = abs(worse["turning"]) - abs(better["turning"])
         chance = _chance(apart, float(np.hypot(worse["error"], better["error"])), freedom)
         if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
-            said.append(
+            sentences.append(
                 f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
                 f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
                 f"next: turns to both sides{where}"
@@ -149,11 +149,11 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         better, worse = sorted(of, key=lambda row: float(row["r"]))
         chance = _chance(worse["r"] - better["r"], float(np.hypot(worse["r_error"], better["r_error"])), freedom)
         if chance <= level and worse["r"] > WORSE * better["r"]:
-            said.append(
+            sentences.append(
                 f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
                 f"as to {better['side']}"
             )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def _chance(apart: float, error: float, freedom: int) -> float:

@@ -96,7 +96,7 @@ class LinearFit:
         if not (np.isfinite(self.residuals).all() and np.isfinite(self.jacobian).all()):
             raise ShipidError("residuals and sensitivities must be finite: the prediction diverges at the estimate")
         if m <= n:
-            raise ShipidError(f"{m} residuals cannot say how well {n} parameters are known: take more data")
+            raise ShipidError(f"{m} residuals are too few to estimate the errors of {n} parameters: use more data")
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
 
 
 def run_of(file: Path, folder: Path, pattern: str) -> str:
-    """Return the name of the run in a file: what a single star stands for, else its path in the folder, less ending."""
+    """Return the name of the run in a file: the text that a single star matches, else its path without ending."""
     if pattern.count("*") == 1 and "/" not in pattern:
         before, _, after = pattern.partition("*")
         return file.name.removeprefix(before).removesuffix(after)
@@ -193,19 +193,19 @@ def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> 
     records = _passed_over(log)
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
-        beside = file.parent / entry.path
-        table = read_table(beside, entry.format, entry.clock.source)
-        times = _instants(table, entry.clock, entry.format, beside, f"file.{name}.clock")
-        files[name] = (table, times, entry.format, beside)
+        other = file.parent / entry.path
+        table = read_table(other, entry.format, entry.clock.source)
+        times = _instants(table, entry.clock, entry.format, other, f"file.{name}.clock")
+        files[name] = (table, times, entry.format, other)
         records += _passed_over(table)
     channels: dict[str, Channel] = {}
     for name, column in mapping.columns.items():
-        table, _, _, beside = files[column.file or ""]
-        _column(table, column.source, beside, f"columns.{name}.from")
+        table, _, _, other = files[column.file or ""]
+        _column(table, column.source, other, f"columns.{name}.from")
     uses = Counter((column.file or "", column.source) for column in mapping.columns.values())
     for name, column in mapping.columns.items():
-        table, times, form, beside = files[column.file or ""]
-        numbers = _numbers(table, column.source, form, beside, f"columns.{name}.from")
+        table, times, form, other = files[column.file or ""]
+        numbers = _numbers(table, column.source, form, other, f"columns.{name}.from")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
         values = numbers * factor if factor != 1.0 else numbers
@@ -308,7 +308,11 @@ def _common_clock(
     spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
     empty = [name for name, times in spans.items() if not len(times)]
     if empty:
-        raise DataError("holds no number at all", file=file, path=f"columns.{empty[0]}.from")
+        raise DataError(
+            "has no number in any row: name another column, or check decimal and separator",
+            file=file,
+            path=f"columns.{empty[0]}.from",
+        )
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
@@ -455,7 +459,10 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     for _, stretch in rows.groupby(np.cumsum(broken), sort=False):
         if len(stretch) < 2:
             at = f"t = {stretch['t'].iloc[0]:g} s"
-            raise DataError(f"a single row between two breaks at {at}: nothing to estimate from", file=file)
+            raise DataError(
+                f"a single row between two breaks at {at}: nothing to estimate from; remove the row",
+                file=file,
+            )
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
         smoothed = smooth(stretch["t"].to_numpy(), logged, noise)
         squares += smoothed.consistency * len(stretch)

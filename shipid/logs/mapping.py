@@ -61,7 +61,7 @@ class Source(Strict):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
     With `runs`, a pattern such as `Z_*.dat` or `**/*.csv`, the log is a folder. Every file of that name is one run with
-    a separate clock. Its name is what the star stands for, or, of a pattern with more stars or with sub-folders, the
+    a separate clock. Its name is the text that the star matches; with more stars or with sub-folders it is the
     path without its ending. `skip` are files, by their path in the folder, that are left out. `manoeuvres` says what
     runs are.
     """
@@ -277,11 +277,13 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
             message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
             raise DocumentError(message, file=file, path=f"{path}.direction")
         if column.wrap and unit != "rad":
-            raise DocumentError("only an angle wraps", file=file, path=f"{path}.wrap")
+            raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")
         if column.relative and name != "beta_w":
-            raise DocumentError("only beta_w can be relative to the bow", file=file, path=f"{path}.relative")
+            raise DocumentError(
+                "only beta_w can be relative to the bow: remove relative", file=file, path=f"{path}.relative"
+            )
     for name in sorted(column for column in columns.keys() - {"u", "v"} if columns[column].frame == "earth"):
-        raise DocumentError("only u and v can be earth-fixed", file=file, path=f"columns.{name}.frame")
+        raise DocumentError("only u and v can be earth-fixed: remove frame", file=file, path=f"columns.{name}.frame")
     if "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame:
         raise DocumentError(
             "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
@@ -295,7 +297,11 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
     columns = mapping.columns
     for name, other in REPLACED.items():
         if name in columns and other in columns:
-            raise DocumentError(f"{other} becomes {name}: map one of them", file=file, path=f"columns.{name}")
+            raise DocumentError(
+                f"{other} is converted to {name}, so both cannot be mapped: remove one of them",
+                file=file,
+                path=f"columns.{name}",
+            )
     for pair in (("latitude", "longitude"), ("speed", "course"), ("u", "v")):
         missing = set(pair) - columns.keys()
         if len(missing) == 1 and (pair != ("u", "v") or mapping.estimate is None):
@@ -310,14 +316,18 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
             f"missing: a dataset needs {', '.join(list(required())[1:])}{remedy}", file=file, path=f"columns.{name}"
         )
     if mapping.origin is not None and "latitude" not in columns:
-        raise DocumentError("belongs to latitude and longitude, which are not mapped", file=file, path="origin")
+        raise DocumentError(
+            "is used with latitude and longitude only, and they are not mapped: remove it", file=file, path="origin"
+        )
     if mapping.source.runs is not None and "latitude" in columns and mapping.origin is None:
         raise DocumentError("missing: one origin for the files of all runs", file=file, path="origin")
     lacking = [name for name in ESTIMATED if name not in columns and REPLACED.get(name) not in columns]
     if mapping.estimate is not None and not lacking:
-        raise DocumentError("u, v and r are all logged: nothing to estimate", file=file, path="estimate")
+        raise DocumentError(
+            "u, v and r are all logged, so there is nothing to estimate: remove [estimate]", file=file, path="estimate"
+        )
     if "u" in columns and columns["u"].frame == "earth" and "v" not in columns:
-        raise DocumentError("an earth-fixed u needs v", file=file, path="columns.u.frame")
+        raise DocumentError("an earth-fixed u cannot be turned without v: map v too", file=file, path="columns.u.frame")
     for index, repair in enumerate(mapping.repair):
         moves = isinstance(repair, LeverArm) and repair.moves != "position" and not {"u", "v"} <= set(lacking)
         if moves and "r" in lacking:
@@ -333,7 +343,11 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             message = f"no [file.{column.file}]: {choices(column.file, mapping.file)}"
             raise DocumentError(message, file=file, path=f"{path}.file")
         if column.interpolation == "angle" and (INPUTS.get(name) or unit_of(name)) != "rad":
-            raise DocumentError("only an angle is interpolated as one", file=file, path=f"{path}.interpolation")
+            raise DocumentError(
+                "only a column in rad or deg can be interpolated as an angle: use linear or previous",
+                file=file,
+                path=f"{path}.interpolation",
+            )
         if column.interpolation is not None and not mapping.resamples:
             message = "nothing is interpolated at other instants: set [clock] step, a latency or a file"
             raise DocumentError(message, file=file, path=f"{path}.interpolation")
@@ -343,15 +357,25 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
     clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
         if clock.date is not None and clock.unit != "date":
-            message = f"a column of dates beside a clock in {clock.unit!r}: write unit = 'date'"
+            message = (
+                f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'"
+            )
             raise DocumentError(message, file=file, path=f"{path}.date")
     if mapping.resamples and mapping.clock.max_gap is None:
         message = "missing: columns are interpolated at other instants, so set the longest gap"
         raise DocumentError(message, file=file, path="clock.max_gap")
     if mapping.source.runs is not None and mapping.file:
-        raise DocumentError("one run a file, or several files a run; not both", file=file, path="source.runs")
+        raise DocumentError(
+            "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
+            file=file,
+            path="source.runs",
+        )
     if mapping.source.runs is not None and mapping.segment:
-        raise DocumentError("one run a file: remove the segments or source.runs", file=file, path="segment")
+        raise DocumentError(
+            "source.runs reads one run from each file: remove the segments, or remove source.runs",
+            file=file,
+            path="segment",
+        )
     for index, repair in enumerate(mapping.repair):
         if isinstance(repair, WrapInterpolation) and mapping.resamples:
             message = "cannot see false samples after resampling: import without step, file and latency"

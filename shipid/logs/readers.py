@@ -37,7 +37,7 @@ Progress = Callable[[float], None]
 
 
 class Format(Strict):
-    """What every format declares: its kind."""
+    """Field of every format: its kind."""
 
     kind: str = "text"
 
@@ -94,7 +94,7 @@ def require_file(file: Path) -> int:
         if stat.S_ISDIR(state.st_mode):
             raise DataError("cannot be read (it is a folder)", file=file)
         if not stat.S_ISREG(state.st_mode):
-            raise DataError("a device or a pipe, not a file: save what it says to a file first", file=file)
+            raise DataError("a device or a pipe, not a file: save its output to a file first", file=file)
         return state.st_size
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
@@ -132,18 +132,18 @@ def read_table(
 
 
 def seconds(dates: pd.Series[Any]) -> Array:
-    """Return dates as seconds since 1970 (UTC where no zone is said), times of day as seconds since midnight.
+    """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
     Read are ISO 8601, dates of pandas, day.month.year and year/month/day with a time; a time of day goes on after
     midnight. NaN where there is none.
     """
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        said = dates.dropna().astype(str)
-        if len(said) and said.str.fullmatch(TIME_OF_DAY).all():
+        texts = dates.dropna().astype(str)
+        if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
         for pattern in DOTTED:
             moments = pd.to_datetime(dates, format=pattern, utc=True, errors="coerce")
-            if len(said) and moments.notna().mean() > 0.5:
+            if len(texts) and moments.notna().mean() > 0.5:
                 rest = pd.to_datetime(dates, format=pattern.replace(".%f", ""), utc=True, errors="coerce")
                 return _since_1970(moments.fillna(rest))
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
@@ -189,7 +189,7 @@ def widest(head: bytes, separator: str, file: Path) -> None:
         count = line.count(mark) + 1
         if count > WIDEST:
             raise DataError(
-                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table turned over?", file=file
+                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table transposed?", file=file
             )
 
 
@@ -219,7 +219,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
         raise DataError(message, file=file, path="format.encoding") from None
     except pd.errors.EmptyDataError:
-        message = f"nothing is left after {form.skip_rows} skipped lines"
+        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
         raise DataError(message, file=file, path="format.skip_rows") from None
     except (pd.errors.ParserError, ValueError) as error:
         message = f"not a table with this separator ({error}): check separator and skip_rows"
@@ -229,7 +229,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
     table = table.loc[~blank]
     if not len(table):
-        message = f"nothing is left after {form.skip_rows} skipped lines"
+        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
         raise DataError(message, file=file, path="format.skip_rows")
     names, table = _named_columns(table, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)

@@ -28,7 +28,7 @@ class Strict(BaseModel):
 
 
 class Repair(Strict):
-    """What every repair declares: its kind, why it is right, and whether it is on."""
+    """Fields of every repair: its kind, the reason for it, and whether it is enabled."""
 
     kind: str
     reason: str = Field(min_length=1)

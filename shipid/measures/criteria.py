@@ -113,10 +113,10 @@ def _lengths(measures: Measures, name: str, length: float | None) -> float:
 
 def _wrong(measures: Measures, asked: dict[str, float]) -> str:
     """Text of the angles that differ from those of a test [deg]; empty if none differs."""
-    said = {name: (measures[name].value / DEGREE, angle) for name, angle in asked.items()}
+    angles = {name: (measures[name].value / DEGREE, angle) for name, angle in asked.items()}
     return ", ".join(
         f"{name.replace('_', ' ')} is {value:.1f} deg, not {angle:g}"
-        for name, (value, angle) in said.items()
+        for name, (value, angle) in angles.items()
         if not abs(value - angle) <= SAME / DEGREE
     )
 

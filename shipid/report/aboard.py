@@ -17,8 +17,8 @@ from shipid.report.palette import INK, category
 from shipid.report.section import Section
 from shipid.report.selection import spread
 
-SAILED, PATH, PHYSICS, BAND, ALARM = "as it went", "predicted path", "physics alone", "band", "alarm"
-COLOURS = {SAILED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
+LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
+COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
 DASHES = {PHYSICS: "dash", BAND: "dot"}
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
@@ -30,14 +30,14 @@ class AboardContent(PageContent):
     Parameters
     ----------
     title, name : in words, and the predictor.
-    said : the lines of the summary; the first ones are the answer.
+    lines : the lines of the summary; the first ones are the answer.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
         [m] and band_course [rad, clockwise from north].
     track : run, t [s], north, east [m], as measured.
     """
 
-    said: Sequence[str]
+    lines: Sequence[str]
     instants: pd.DataFrame
     points: pd.DataFrame
     track: pd.DataFrame
@@ -45,7 +45,7 @@ class AboardContent(PageContent):
     @property
     def answer(self) -> list[Sentence]:
         """What was predicted, how often the alarm was raised, and whether the band kept its promise."""
-        kept = [text for text in self.said if text.startswith(("alarm:", "band of")) or " predictions in " in text]
+        kept = [text for text in self.lines if text.startswith(("alarm:", "band of")) or " predictions in " in text]
         return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in kept]
 
     @property
@@ -77,7 +77,7 @@ def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
 
 def seen(content: AboardContent) -> Figure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
-    drawn = [SAILED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
+    drawn = [LOGGED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
     drawn += [BAND] if content.banded else []
     return Figure(
         id="seen",
@@ -98,7 +98,7 @@ def _map(content: AboardContent, run: str) -> go.Figure:
     points = content.points[content.points["run"] == run]
     times = points["t"].unique()
     shown = times[np.unique(np.linspace(0, len(times) - 1, MOMENTS).round().astype(int))]
-    traces = [_trace(SAILED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
+    traces = [_trace(LOGGED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
     for t in shown:
         mine = points[points["t"] == t]
         traces.append(_trace(PATH, mine["east"].to_numpy(), mine["north"].to_numpy(), 2.4))
@@ -118,11 +118,11 @@ def _trace(name: str, x: Floats, y: Floats, width: float) -> go.Scatter:
 def along(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error = content.instants["error"].median()
-    said = f"The median error at the end of a path is {error:.2f} m."
+    takeaway = f"The median error at the end of a path is {error:.2f} m."
     return Figure(
         id="along",
         title="Along the run",
-        takeaway=said if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
+        takeaway=takeaway if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
         how="Error at the end of the path predicted at each instant"
         + (", with the half axes of the band there" if content.banded else "")
         + "; marks are instants outside of the training, where nothing is promised.",

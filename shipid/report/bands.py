@@ -31,7 +31,7 @@ def _percent(value: float) -> str:
 
 
 def _judged(frame: pd.DataFrame) -> float:
-    """Level that most is said about: 0.9 where it is promised, else the highest."""
+    """The level of the sentences: 0.9 where it is promised, else the highest."""
     levels = [float(level) for level in pd.unique(frame.level)]
     return 0.9 if 0.9 in levels else max(levels)
 
@@ -102,15 +102,15 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
     below = mine[mine.high < level]
     by_width = mine.sort_values("width")
     least, most = by_width.iloc[0], by_width.iloc[-1]
-    said = (
+    text = (
         f"With N_D = {size}, bands of {_percent(level)} hold {_percent(float(mine.coverage.mean()))} of the test paths "
     )
-    said += f"on average over {counted(len(mine), 'model')}; "
-    said += f"the mean radius is {metres(least.width)} ({least.model})"
-    said += f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". "
+    text += f"on average over {counted(len(mine), 'model')}; "
+    text += f"the mean radius is {metres(least.width)} ({least.model})"
+    text += f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". "
     if below.empty:
-        return said + "No interval lies below its promise."
-    return said + f"Below their promise, interval and all: {listed([str(name) for name in below.model])}."
+        return text + "No interval lies below its promise."
+    return text + f"Below their promise, interval and all: {listed([str(name) for name in below.model])}."
 
 
 def width_map(content: ReportContent) -> Figure | None:
@@ -208,8 +208,8 @@ def _lowest(frame: pd.DataFrame) -> str:
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
-    said = f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}."
-    return f"{said} The band for this kind (--kind of shipid predict) holds its share." if worst.by == "kind" else said
+    text = f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}."
+    return f"{text} The band for this kind (--kind of shipid predict) holds its share." if worst.by == "kind" else text
 
 
 def worst(content: ReportContent) -> Table | None:
@@ -231,9 +231,9 @@ def worst(content: ReportContent) -> Table | None:
     mean = frame.groupby("run").coverage.mean()
     half = int((mean < 0.5).sum())
     have = "has less than half of its" if half == 1 else "have less than half of their"
-    said = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
+    takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
     columns = ["test run", "manoeuvre", "model", "paths in the band", "greatest error over the band [1]"]
-    return Table("coverage-runs", "Who pays", said, columns, [False, False, False, True, True], rows)
+    return Table("coverage-runs", "Who pays", takeaway, columns, [False, False, False, True, True], rows)
 
 
 SECTION = Section(

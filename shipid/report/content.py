@@ -75,7 +75,7 @@ def _empty(*columns: str) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PageContent:
-    """What a page shows beside its sections; a page that is no study's adds frames and a property `answer`.
+    """What a page shows besides its sections; a page that is no study's adds frames and a property `answer`.
 
     Parameters
     ----------

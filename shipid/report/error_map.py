@@ -88,11 +88,11 @@ def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: s
     span = (float(means.H.min()), float(means.H.max()))
     good = [spot for spot in spots if math.isfinite(spot.H)]
     best, worst = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
-    said = f"From {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
+    text = f"From {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
     return Figure(
         id=id,
         title=title,
-        takeaway=f"{said}N_D = {worst.size}).",
+        takeaway=f"{text}N_D = {worst.size}).",
         how=how,
         alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
         height=HEIGHT,

@@ -193,7 +193,7 @@ def _word(source: str) -> str:
 
 
 def _visible(x: Floats, y: Floats) -> Indices:
-    """Points of a line that the height of the plot can tell apart; a line with gaps is kept whole."""
+    """Indices of the points of a line that differ visibly at the height of the plot; a line with gaps keeps all."""
     if not np.isfinite(y).all() or len(y) < 3:
         return np.arange(len(y))
     span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]

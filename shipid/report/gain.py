@@ -144,8 +144,8 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
         parts.append(
             f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
         )
-    said = f" {content.best} is the best in validation." if content.best else ""
-    return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}.{said}"
+    best = f" {content.best} is the best in validation." if content.best else ""
+    return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}.{best}"
 
 
 def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:

@@ -72,9 +72,9 @@ class IdentificationContent(PageContent):
     def answer(self) -> list[Sentence]:
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
-        said = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
-        said.append(Sentence(_bought(self), "free-runs"))
-        return [*said, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
+        sentences = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
+        sentences.append(Sentence(_bought(self), "free-runs"))
+        return [*sentences, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
 def write_identification(content: IdentificationContent, file: Path) -> Path:
@@ -338,7 +338,7 @@ def residuals(content: IdentificationContent) -> Figure | None:
         id="residuals",
         title="Autocorrelation of the residuals",
         takeaway=f"One sample later, residuals correlate by {listed(correlated)}.",
-        how="Autocorrelation of the weighted residuals, pooled over runs. White residuals fall to 0 at once; a long "
+        how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,

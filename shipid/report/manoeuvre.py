@@ -58,8 +58,8 @@ class ManoeuvreContent(PageContent):
     def answer(self) -> list[Sentence]:
         """Return sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(FIRST[self.kind])]
-        said = [f"{row.measure}: {_amount(float(str(row.value)), str(row.unit))}" for row in known.itertuples()]
-        sentences = [Sentence("; ".join(said).capitalize() + ".", "measures")]
+        measures = [f"{row.measure}: {_amount(float(str(row.value)), str(row.unit))}" for row in known.itertuples()]
+        sentences = [Sentence("; ".join(measures).capitalize() + ".", "measures")]
         judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
         if len(judged):
             met = int((judged["verdict"] == "met").sum())

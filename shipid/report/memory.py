@@ -1,4 +1,4 @@
-"""What the past tells: the observer along a test run, and what memory and observer bought, paired over test runs."""
+"""What the past shows: the observer along a test run, and what memory and observer bought, paired over test runs."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _has_current(frame: pd.DataFrame) -> bool:
 def _fade(frame: pd.DataFrame) -> str:
     fade, ahead = float(frame.fade.iloc[0]), float(frame.ahead.iloc[0])
     if fade == 0:
-        return "In a prediction the force counts for nothing: it fades at once."
+        return "In a prediction the force has no effect: it fades immediately."
     if not math.isfinite(fade):
         return f"In a prediction the force is held over the horizon of {ahead:g} s: it does not fade."
     left = 100 * math.exp(-ahead / fade)
@@ -466,7 +466,7 @@ def table(content: ReportContent) -> Table | None:
 
 
 SECTION = Section(
-    "What the past tells",
+    "What the past shows",
     draw=lambda content: (observer(content), gain(content), windows(content), difference_map(content), table(content)),
     anchors=("observer", "memory-gain", "memory-windows", "memory-map", "memory-table"),
 )

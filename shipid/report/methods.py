@@ -24,7 +24,7 @@ ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MethodsContent(PageContent):
-    """A page of its own for a study of several parts.
+    """The page of a study of several parts.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ class MethodsContent(PageContent):
 
 def verdicts(frame: pd.DataFrame) -> list[str]:
     """Which method errs least with physics, by condition, at the smallest and the largest N_D."""
-    found = []
+    sentences = []
     for condition in _conditions(frame):
         mine = frame[frame.condition.eq(condition) & frame.family.eq(EVERY)]
         ends = sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []
-        found += [_verdict(mine[mine.N_D.eq(N_D)], condition, N_D) for N_D in ends]
-    return found
+        sentences += [_verdict(mine[mine.N_D.eq(N_D)], condition, N_D) for N_D in ends]
+    return sentences
 
 
 def _verdict(mine: pd.DataFrame, condition: str, N_D: int) -> str:
@@ -57,11 +57,11 @@ def _verdict(mine: pd.DataFrame, condition: str, N_D: int) -> str:
     if whole.empty:
         return f"{where}: no method has a result in every cell with physics."
     best = whole.iloc[0]
-    said = f"{where}: {best.method} errs least over all cells with physics, {number(best.H)} m"
+    text = f"{where}: {best.method} errs least over all cells with physics, {number(best.H)} m"
     if best.method != best.reference and math.isfinite(best.low):
-        said += f", {_bracket(best.difference, best.low, best.high)} from {best.reference}"
+        text += f", {_bracket(best.difference, best.low, best.high)} from {best.reference}"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
-    return said + (f"; without a result: {listed(failed)}." if failed else ".")
+    return text + (f"; without a result: {listed(failed)}." if failed else ".")
 
 
 def _bracket(value: float, low: float, high: float) -> str:

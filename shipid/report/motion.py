@@ -1,4 +1,4 @@
-"""Recorded motion beside simulated: speeds and yaw rate over time, and the track."""
+"""Recorded and simulated motion: speeds and yaw rate over time, and the track."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ def panels(rows: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], framed: S
     """
     start, parts = float(rows["t"].min()), {name: _joined(rows[rows["model"] == name]) for name in lines}
     inks = {name: {**ink, "width": 1.4 if name == LOG else 2} for name, ink in lines.items()}
-    found = []
+    result = []
     for column, (title, unit, factor) in SIGNALS.items():
         traces = [
             line(name, mine["t"].to_numpy() - start, factor * mine[column].to_numpy(), [name], unit, line=inks[name])
             for name, mine in parts.items()
         ]
         y = axis(f"{title} [{unit}]", nticks=6, zeroline=True, zerolinecolor=GRID)
-        found.append(Panel(go.Figure(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
+        result.append(Panel(go.Figure(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
     tracks = [
         line(name, mine["east"].to_numpy(), mine["north"].to_numpy(), [name], line=inks[name])
         for name, mine in parts.items()
     ]
     shown = pd.concat([parts[name] for name in framed])
     bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
-    return [*found, Panel(go.Figure(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
+    return [*result, Panel(go.Figure(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
 
 
 def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:

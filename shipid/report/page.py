@@ -27,7 +27,7 @@ from shipid.report.wording import bound, number
 
 
 class Shown(Protocol):
-    """The parts of every page beside its sections."""
+    """The parts of every page besides its sections."""
 
     @property
     def title(self) -> str:
@@ -61,7 +61,7 @@ class Shown(Protocol):
 
     @property
     def command(self) -> str:
-        """What reproduces the page; empty for none."""
+        """The command that reproduces the page; empty for none."""
         ...
 
 

@@ -319,10 +319,10 @@ def _takeaway(content: ReportContent, size: int) -> str:
     alone = _mean_end_error(windows, {k for k in keys if k[1] == "physics"})
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
     parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
-    said = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
+    errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
     return (
         f"In the {counted(len(windows), 'window')} to look at, N_D = {size}, the models drawn miss the true place at "
-        f"the end of the horizon on average: {'; '.join(said)}."
+        f"the end of the horizon on average: {'; '.join(errors)}."
     )
 
 

@@ -1,4 +1,4 @@
-"""The page of a replay: recorded runs beside what a vessel does with the recorded orders."""
+"""The page of a replay: recorded runs, and the motion of a vessel with the recorded orders."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class ReplayContent(PageContent):
     def answer(self) -> list[Sentence]:
         """The error over all runs."""
         row = self.errors[self.errors["run"] == "all"].iloc[0]
-        said = f"Position is {number(float(row['position']))} m off, RMS over all rows, {_length(self.ahead)}."
-        return [Sentence(said, "errors")]
+        text = f"Position is {number(float(row['position']))} m off, RMS over all rows, {_length(self.ahead)}."
+        return [Sentence(text, "errors")]
 
 
 def write_replay(content: ReplayContent, file: Path) -> Path:

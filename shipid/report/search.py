@@ -195,17 +195,17 @@ def _yes_or_no(values: pd.Series[float]) -> bool:
 
 def _counts(frame: pd.DataFrame) -> str:
     stopped, diverged = (int(frame.state.eq(name).sum()) or "none" for name in ("stopped", "diverged"))
-    said = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
-    return f"{said}{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
+    text = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
+    return f"{text}{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
 
 
 def _tried(frame: pd.DataFrame, names: list[str]) -> str:
     """Return the range of each hyperparameter over the trials, as text."""
-    said = []
+    ranges = []
     for name in names:
         low, high = float(frame[name].min()), float(frame[name].max())
-        said.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{short(low)} to {short(high)}'}")
-    return f"Tried: {', '.join(said)}." if said else ""
+        ranges.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{short(low)} to {short(high)}'}")
+    return f"Tried: {', '.join(ranges)}." if ranges else ""
 
 
 def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:

@@ -79,7 +79,7 @@ def trained(content: ReportContent) -> pd.DataFrame:
 
 
 def thinned(points: Floats, tolerance: float) -> Indices:
-    """Find the points of a line, by index, that a pixel can tell apart (Ramer 1972; Douglas and Peucker 1973).
+    """Find the points of a line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class StructuresContent(PageContent):
 
     @property
     def answer(self) -> list[Sentence]:
-        """What was chosen, and what follows."""
+        """The structure chosen, and the sentences on it."""
         return [
             Sentence(f"{sentence[0].upper()}{sentence[1:]}.", "structures" if number == 0 else "")
             for number, sentence in enumerate(self.sentences)
@@ -131,8 +131,8 @@ def _valued(row: Row) -> Cell:
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if value != value:
         return text(None)
-    said = f"{value:.4g}" + (f" ({low:.4g} … {high:.4g})" if low == low and high == high else "")
-    return Cell(said.replace("-", "−"), value)
+    shown = f"{value:.4g}" + (f" ({low:.4g} … {high:.4g})" if low == low and high == high else "")
+    return Cell(shown.replace("-", "−"), value)
 
 
 def groups(content: StructuresContent) -> Table | None:

@@ -123,11 +123,11 @@ def kinds(content: ReportContent) -> Table | None:
     shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
     learned = frame[frame.source.eq("cooperative")]
     best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
-    said = [
+    parts = [
         f"{row['kind']}: {number(row['mean'])} m, at the end {number(row['end'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
-    takeaway = f"Least error with data: {'; '.join(said)}." if said else "No cell has a result."
+    takeaway = f"Least error with data: {'; '.join(parts)}." if parts else "No cell has a result."
     return _table("kinds", "Errors by kind of run", takeaway, shown, KINDS)
 
 
@@ -188,8 +188,8 @@ def _table(
             for name, (_, decimals) in present.items()
         ]
         if "status" in present and record["status"] != "ok":
-            said = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])
-            row[list(present).index("status")] = Cell(said, said.lower(), bad=True)
+            status = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])
+            row[list(present).index("status")] = Cell(status, status.lower(), bad=True)
         rows.append(row)
     headings = [heading for heading, _ in present.values()]
     return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)

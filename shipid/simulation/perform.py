@@ -62,7 +62,7 @@ def perform(
     ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step.
     """
     if not manoeuvres:
-        raise ShipidError("there is no manoeuvre to perform")
+        raise ShipidError("no manoeuvre is given: give at least one")
     between = step if interval is None else interval
     every = round(between / step)
     if every < 1 or abs(every * step - between) > 1e-9 * step * every:
@@ -241,6 +241,6 @@ def _orders(
     values = np.array(list(vessel.parameters.values()))
     parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
     state, hidden, inputs, environment = (part.reshape(records * samples, part.shape[-1]).T for part in parts)
-    found = orders_of(model, state, hidden, inputs, environment, values)
-    ordered = found.reshape(-1, records, samples).swapaxes(0, 1)
+    orders = orders_of(model, state, hidden, inputs, environment, values)
+    ordered = orders.reshape(-1, records, samples).swapaxes(0, 1)
     return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}

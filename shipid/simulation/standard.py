@@ -131,7 +131,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
     """
     if speed <= 0:
-        raise ShipidError(f"a speed of {speed:g} m/s is no approach: it must be positive", path="--speed")
+        raise ShipidError(f"{speed:g} m/s: the speed of the approach must be positive", path="--speed")
 
     def surplus(n: float) -> float:
         orders = controls.orders(np.full(1, n), np.zeros(1))
@@ -141,7 +141,9 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     while surplus(high) < 0:
         low, high = high, 2 * high
         if high > MOST_RPM * RPM:
-            raise ShipidError(f"no shaft speed gives {controls.vessel.name} {speed:g} m/s", path="--speed")
+            raise ShipidError(
+                f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed"
+            )
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if surplus(middle) < 0 else (low, middle)

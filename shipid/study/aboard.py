@@ -92,10 +92,10 @@ def play(
         raise DataError(f"{every:g}: must be above 0", path="--every")
     rows, paths, skipped = [], [], 0
     for run, piece in pieces(dataset):
-        found = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step, band)
-        rows += found[0]
-        paths += found[1]
-        skipped += found[2]
+        instants = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step, band)
+        rows += instants[0]
+        paths += instants[1]
+        skipped += instants[2]
     if not rows:
         past = predictor.past * step
         raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
@@ -112,7 +112,7 @@ def _along(
     """Predictions along one unbroken stretch; how many rows came before there was a past."""
     t = rows["t"].to_numpy()
     slack = clock_slack(t)
-    found: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     paths, skipped, due = [], 0, t[0]
     for i in range(len(t)):
         if t[i] < due - slack:
@@ -132,24 +132,24 @@ def _along(
         points.insert(0, "run", run)
         points.insert(1, "t", t[i])
         paths.append(points)
-        found.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
+        entries.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
         if band is not None:
-            found[-1]["reach"] = reach
-    if band is not None and found:
-        _adapt(predictor, found, paths, band)
-    return found, paths, skipped
+            entries[-1]["reach"] = reach
+    if band is not None and entries:
+        _adapt(predictor, entries, paths, band)
+    return entries, paths, skipped
 
 
-def _adapt(predictor: Predictor, found: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:
+def _adapt(predictor: Predictor, instants: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:
     """Give each instant the factor of its band, and scale the bands of the paths with it."""
     assert predictor.bands is not None
-    factors = np.ones(len(found))
+    factors = np.ones(len(instants))
     if band.rate is not None:
-        now = np.array([instant["t"] for instant in found])
-        reach = np.array([instant["reach"] for instant in found])
+        now = np.array([instant["t"] for instant in instants])
+        reach = np.array([instant["reach"] for instant in instants])
         ends = now + predictor.physics.horizon * predictor.physics.step
         factors = along_run(reach, ends, now, band, predictor.bands.table(band.kind))
-    for instant, points, factor in zip(found, paths, factors, strict=True):
+    for instant, points, factor in zip(instants, paths, factors, strict=True):
         instant["factor"] = float(factor)
         points[["band_along", "band_across"]] *= factor
 
@@ -212,8 +212,8 @@ def true_path(rows: pd.DataFrame, i: int, later: Array, path: str) -> Array:
         north, east = travelled(rows, np.append(rows["t"].to_numpy()[i], later))
         north, east = north[1:] - north[0], east[1:] - east[0]
     else:
-        found = sample(rows, later)
-        north, east = (found[name] - float(rows[name].iloc[i]) for name in ("north", "east"))
+        sampled = sample(rows, later)
+        north, east = (sampled[name] - float(rows[name].iloc[i]) for name in ("north", "east"))
     x, y = to_frame(north, east, 0.0, 0.0, float(rows["psi"].iloc[i]))
     return np.stack([x, y], axis=1)
 
@@ -226,7 +226,7 @@ def write(played: Played, file: Path) -> None:
 
 
 def summary(played: Played) -> list[str]:
-    """What an officer would have seen, as lines."""
+    """Summary of a replay, as lines."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     lines = [
@@ -309,14 +309,14 @@ def _moments(points: pd.DataFrame) -> Array:
 
 def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:
     """The longest times of alarm."""
-    found: list[tuple[float, str, float, float]] = []
+    spans: list[tuple[float, str, float, float]] = []
     for run, rows in instants.groupby("run", sort=False):
         t, outside = rows["t"].to_numpy(), rows["outside"].to_numpy(dtype=bool)
         edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
-        found += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    found.sort(key=lambda span: -span[0])
-    lines = [f"  {run}: {_between(first, last)}" for _, run, first, last in found[:most]]
-    return [*lines, f"  and {len(found) - most} shorter ones"] if len(found) > most else lines
+        spans += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    spans.sort(key=lambda span: -span[0])
+    lines = [f"  {run}: {_between(first, last)}" for _, run, first, last in spans[:most]]
+    return [*lines, f"  and {len(spans) - most} shorter ones"] if len(spans) > most else lines
 
 
 def _between(first: float, last: float) -> str:

@@ -68,7 +68,7 @@ class Sides:
 
 @dataclass(frozen=True)
 class Case:
-    """What the sentences of one study are made from: `rows` are `by_model` without families set aside."""
+    """Inputs of the sentences of one study: `rows` are `by_model` without families set aside."""
 
     results: Results
     rows: pd.DataFrame
@@ -106,11 +106,11 @@ class Case:
         """Interval of the H of a model; empty where there is none."""
         if model not in self.table.H:
             return ""
-        found = self.table.compare([[(1.0, model, self.place(amount))]])
-        return interval(float(found.low[0]), float(found.high[0]))
+        difference = self.table.compare([[(1.0, model, self.place(amount))]])
+        return interval(float(difference.low[0]), float(difference.high[0]))
 
     def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
-        """Who is better (above 0), who worse; by sign alone where there are too few test manoeuvres."""
+        """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
         if too_few(self.table.runs):
             above, below = differences.mean > 0, differences.mean <= 0
         else:
@@ -186,13 +186,13 @@ def _good_enough(case: Case) -> str:
         models = _any(len(case.at(case.largest)))
         return f"How good must the physics be? With {amounts} runs the test cannot tell {models} from no physics."
     for amount, sides in every.items():
-        found = break_even(case.table, case.fixed, case.place(amount))
+        limit = break_even(case.table, case.fixed, case.place(amount))
         if not sides.better and not sides.worse:
             parts.append(f"with {runs(amount)} the test cannot tell {_any(len(sides.open))} from no physics")
-        elif found is None:
+        elif limit is None:
             parts.append(f"with {runs(amount)} {_counted(sides, 'no physics')}")
         else:
-            parts.append(f"with {runs(amount)} {_limit(found)}")
+            parts.append(f"with {runs(amount)} {_limit(limit)}")
             limits = True
     begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
     return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
@@ -202,20 +202,20 @@ def _any(count: int) -> str:
     return "the physics model" if count == 1 else f"any of {count} physics models"
 
 
-def _limit(found: Estimate) -> str:
-    """Up to which error of its own physics pays, in words."""
-    least, most = found.limits
-    if found.above:
-        low = f" [at least {_length(found.low)}]" if np.isfinite(found.low) and found.low < most else ""
-        return f"physics pays even with an error of {metres(most)} of its own, the worst tried{low}"
-    if found.below:
-        high = f" [at most {_length(found.high)}]" if np.isfinite(found.high) and found.high > least else ""
-        return f"physics does not pay even with an error of {metres(least)} of its own, the best tried{high}"
+def _limit(estimate: Estimate) -> str:
+    """Up to which error A physics pays, in words."""
+    least, most = estimate.limits
+    if estimate.above:
+        low = f" [at least {_length(estimate.low)}]" if np.isfinite(estimate.low) and estimate.low < most else ""
+        return f"physics pays even with an error A of {metres(most)}, the worst tried{low}"
+    if estimate.below:
+        high = f" [at most {_length(estimate.high)}]" if np.isfinite(estimate.high) and estimate.high > least else ""
+        return f"physics does not pay even with an error A of {metres(least)}, the best tried{high}"
     bounds = ""
-    if np.isfinite(found.low):
-        low = f"under {_length(least)}" if found.low <= least else _length(found.low)
-        bounds = f" [{low}, {f'over {_length(most)}' if found.high >= most else _length(found.high)}]"
-    return f"physics pays if its own error A is below about {_length(found.value)} m{bounds}"
+    if np.isfinite(estimate.low):
+        low = f"under {_length(least)}" if estimate.low <= least else _length(estimate.low)
+        bounds = f" [{low}, {f'over {_length(most)}' if estimate.high >= most else _length(estimate.high)}]"
+    return f"physics pays if its own error A is below about {_length(estimate.value)} m{bounds}"
 
 
 def _length(value: float) -> str:
@@ -232,7 +232,7 @@ def _against_none(case: Case, amount: int) -> Sides:
 
 
 def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
-    """What the best model has with the fewest runs, and how many runs that takes without physics."""
+    """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
     fewest, largest, best = case.smallest, case.largest, case.best
     if fewest == largest:
         return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
@@ -242,34 +242,39 @@ def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
     begins = f"How many runs? With {runs(fewest)}, {best} (best in validation) has {case.H(best, fewest)} mean error"
     if best not in case.table.H or NO_MODEL not in case.table.H:
         return f"{begins}; without physics not every cell has a result, so its worth in runs is unknown."
-    found = runs_without_physics(case.table, best, case.place(fewest))
-    bounds = f" [{_count(found.low, found)}, {_count(found.high, found)}]" if np.isfinite(found.low) else ""
-    if found.above:
-        least = f" [at least {found.low:.0f}]" if np.isfinite(found.low) and not found.low >= found.limits[1] else ""
+    estimate = runs_without_physics(case.table, best, case.place(fewest))
+    bounds = (
+        f" [{_count(estimate.low, estimate)}, {_count(estimate.high, estimate)}]" if np.isfinite(estimate.low) else ""
+    )
+    if estimate.above:
+        least = (
+            f" [at least {estimate.low:.0f}]"
+            if np.isfinite(estimate.low) and not estimate.low >= estimate.limits[1]
+            else ""
+        )
         text = f"without physics {runs(largest)} are not enough for that{least}: they give {case.H(NO_MODEL, largest)}"
-    elif found.below:
+    elif estimate.below:
         text = f"without physics the same {runs(fewest)} do as well{bounds}, {case.H(NO_MODEL, fewest)}"
     else:
-        text = (
-            f"without physics the same error takes about {found.value:.0f} runs{bounds}, interpolated between amounts"
-        )
+        count = f"{estimate.value:.0f} runs{bounds}"
+        text = f"without physics the same error takes about {count}, interpolated between amounts"
     return f"{begins}; {text}."
 
 
-def _count(value: float, found: Estimate) -> str:
+def _count(value: float, estimate: Estimate) -> str:
     """A number of runs, which may be a bound."""
-    if value >= found.limits[1]:
+    if value >= estimate.limits[1]:
         return f"over {value:.0f}"
-    return f"{value:.0f} or fewer" if value <= found.limits[0] else f"{value:.0f}"
+    return f"{value:.0f} or fewer" if value <= estimate.limits[0] else f"{value:.0f}"
 
 
 def _headline(case: Case) -> str:
-    """What the model that validation prefers does at the largest amount of data."""
+    """Error of the model with the lowest validation loss at the largest amount of data."""
     rows = case.at(case.largest).set_index("model")
     alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
-    told = "" if case.smallest < case.largest else "best in validation; "
+    chosen = "" if case.smallest < case.largest else "best in validation; "
     text = (
-        f"With {runs(case.largest)}, {case.best} ({told}{metres(alone)} mean error on its own) "
+        f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error on its own) "
         f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
         f"below {metres(worst)}"
     )
@@ -279,17 +284,17 @@ def _headline(case: Case) -> str:
 
 def _caveats(results: Results) -> list[str]:
     """What limits every sentence that follows: cells that are missing, and cells without a result."""
-    found, cells = [], results.cells
+    sentences, cells = [], results.cells
     if not results.complete:
         missing = results.plan.cells - len(cells)
-        found.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.")
+        sentences.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.")
     failed = cells[cells["status"] != "ok"]
     if len(failed):
         why = "; ".join(
             f"{words(str(row.model))}: {row.sentence}" for row in failed.drop_duplicates("model").itertuples()
         )
-        found.append(f"{len(failed)} of {len(cells)} cells have no result ({why}).")
-    return found
+        sentences.append(f"{len(failed)} of {len(cells)} cells have no result ({why}).")
+    return sentences
 
 
 def _physics_or_none(case: Case, judged: bool) -> list[str]:
@@ -298,12 +303,12 @@ def _physics_or_none(case: Case, judged: bool) -> list[str]:
         where = runs(case.largest)
         return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
-    told = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
-    return [f"At {runs(amount)} {_counted(sides, 'no physics')}." for amount, sides in told.items()]
+    decided = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
+    return [f"At {runs(amount)} {_counted(sides, 'no physics')}." for amount, sides in decided.items()]
 
 
 def _counted(sides: Sides, rival: str) -> str:
-    """Who is better than a rival and who is worse, as one sentence."""
+    """Which models are better than a rival and which are worse, as one sentence."""
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
         return f"every physics model with a result does better than {rival}"
@@ -323,8 +328,8 @@ def _alone(case: Case) -> list[str]:
     if not models:
         return []
     place = case.place(case.largest)
-    own = case.table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in models])
-    sides = case.sides(models, own)
+    compared = case.table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in models])
+    sides = case.sides(models, compared)
     parts = []
     if sides.worse:
         parts.append(f"Compensation harms {named(sides.worse)}.")
@@ -388,7 +393,7 @@ def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
 
 def _how_to_read(case: Case) -> list[str]:
     """What "no physics" is, what identified models and known commands mean, and what the brackets are."""
-    plan, table, found = case.results.plan, case.table, []
+    plan, table, sentences = case.results.plan, case.table, []
     judged = next(way.method for way in plan.methods if way.name == plan.judged)
     mirrored = getattr(judged, "mirror", 0.0) > 0
     if NO_MODEL in table.H and mirrored:
@@ -400,28 +405,30 @@ def _how_to_read(case: Case) -> list[str]:
                 f"; without that it has {metres(first)} at {runs(case.smallest)} instead of {metres(mirrored_first)}"
             )
             text += f", and {metres(last)} at {runs(case.largest)}" if case.largest > case.smallest else ""
-        found.append(f"{text}.")
+        sentences.append(f"{text}.")
     top = case.at(case.largest)
     fitted = top[top["family"].isin(plan.identified)]
     if len(fitted) and not fitted["model"].eq(case.best).any():
         lowest = fitted.iloc[int(fitted["loss"].argmin())]
-        found.append(
+        sentences.append(
             "Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
         )
     if plan.study.prediction.commands == "known" and _may_react(case.results):
-        found.append(
-            "The orders of the next seconds were known. In a zigzag they tell when the heading will reach its limit, "
+        sentences.append(
+            "The orders of the next seconds were known. In a zigzag they reveal when the heading will reach its limit, "
             "so these errors show at best what knowing the plan can give: an upper bound of its worth."
         )
     if note := too_few(table.runs):
-        found.append(f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another.")
+        sentences.append(
+            f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another."
+        )
     else:
-        found.append(
+        sentences.append(
             f"Brackets are 95 % intervals over {manoeuvres(table.runs)} of one world; lists of names are corrected for "
             "their length (Holm)."
         )
-    return found
+    return sentences
 
 
 def _may_react(results: Results) -> bool:

@@ -75,7 +75,7 @@ def predict_log(
 
 @dataclass(frozen=True)
 class Band:
-    """What a band along a log is to be: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
+    """Settings of a band along a log: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
 
     level: float
     kind: str | None = None

@@ -67,7 +67,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     Columns: model, family, N_D, level, coverage, low, high (95 % interval, clustered by run), width [m] (mean radius
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
-    length, found = ship_length(results), []
+    length, rows = ship_length(results), []
     for level in sorted({*SHOWN, results.plan.study.bands.level}):
         held: dict[tuple[str, str, int], list[Array]] = {}
         sizes: dict[tuple[str, str, int], list[tuple[float, float]]] = {}
@@ -81,9 +81,9 @@ def coverage_frame(results: Results) -> pd.DataFrame:
             width, end = np.mean(sizes[model, family, N_D], axis=0)
             names = {"model": model, "family": family, "N_D": N_D, "level": level}
             row = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
-            found.append({**row, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
+            rows.append({**row, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
-    return pd.DataFrame(found, columns=columns)
+    return pd.DataFrame(rows, columns=columns)
 
 
 def groups_frame(results: Results) -> pd.DataFrame:
@@ -93,7 +93,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
-    level, test, found = results.plan.study.bands.level, results.test, []
+    level, test, rows = results.plan.study.bands.level, results.test, []
     largest = results.cells["N_D"].max()
     seed = results.cells["seed"].min()
     kinds = kinds_of_runs(results.dataset)
@@ -109,9 +109,9 @@ def groups_frame(results: Results) -> pd.DataFrame:
 
         def add(by: str, group: str, chosen: Array, inside: Array, wide: float, note: str = "") -> None:
             low, high = share_interval(inside, test.run[chosen])
-            told = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
+            entry = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
             runs = len(np.unique(test.run[chosen]))
-            found.append({**told, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
+            rows.append({**entry, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
 
         for name in np.unique(kind):
             chosen, known = kind == name, bands.kinds.get(str(name), 0)
@@ -127,7 +127,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
             wide = float(region.radius[step].mean())
             add("ahead", f"{(step + 1) * test.step:g} s", every, reach[step], wide)
     columns = ["model", "by", "group", "coverage", "low", "high", "width", "runs", "note"]
-    return pd.DataFrame(found, columns=columns)
+    return pd.DataFrame(rows, columns=columns)
 
 
 def answer(results: Results) -> list[tuple[str, str]]:
@@ -142,16 +142,16 @@ def answer(results: Results) -> list[tuple[str, str]]:
         return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
-    said = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
-    said += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
-    said += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
-    found = [(said, "coverage")]
+    sentence = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
+    sentence += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
+    sentence += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
+    sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
     few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
     if few:
         text = f"Too few runs calibrate a band of {level:.0%} for one kind of manoeuvre alone: {', '.join(few)}."
-        found.append((text, "coverage-groups"))
-    return found
+        sentences.append((text, "coverage-groups"))
+    return sentences
 
 
 def worst_frame(results: Results) -> pd.DataFrame:
@@ -159,7 +159,7 @@ def worst_frame(results: Results) -> pd.DataFrame:
 
     Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border)).
     """
-    level, test, found = results.plan.study.bands.level, results.test, []
+    level, test, rows = results.plan.study.bands.level, results.test, []
     largest, seed = results.cells["N_D"].max(), results.cells["seed"].min()
     kinds = kinds_of_runs(results.dataset)
     for row, region, errors in regions(results, level):
@@ -168,20 +168,20 @@ def worst_frame(results: Results) -> pd.DataFrame:
             for run in test.spans:
                 mine = test.run == run
                 inside = float((reach[mine] <= 1).mean())
-                told = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
-                found.append({**told, "reach": float(reach[mine].max())})
+                entry = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
+                rows.append({**entry, "reach": float(reach[mine].max())})
     columns = ["model", "run", "kind", "coverage", "reach"]
-    return pd.DataFrame(found, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])
+    return pd.DataFrame(rows, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])
 
 
 def refused_frame(results: Results) -> pd.DataFrame:
     """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
-    level, found = results.plan.study.bands.level, []
+    level, rows = results.plan.study.bands.level, []
     for row in results.rows:
         bands = results.bands.get(row["cell"])
         if row["status"] == "ok" and (bands is None or not bands.promises(level)):
-            found.append({"model": row["model"], "N_D": row["N_D"], "reason": results.no_band.get(row["cell"], "")})
-    return pd.DataFrame(found, columns=["model", "N_D", "reason"]).drop_duplicates(ignore_index=True)
+            rows.append({"model": row["model"], "N_D": row["N_D"], "reason": results.no_band.get(row["cell"], "")})
+    return pd.DataFrame(rows, columns=["model", "N_D", "reason"]).drop_duplicates(ignore_index=True)
 
 
 def ship_length(results: Results) -> float:

@@ -1,4 +1,4 @@
-"""What is wrong with a folder of results, if anything: for `shipid study check`."""
+"""Faults of a folder of results, for `shipid study check`."""
 
 from __future__ import annotations
 

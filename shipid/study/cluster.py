@@ -1,4 +1,4 @@
-"""Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is said in one line."""
+"""Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is reported in one line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed 
 KEPT = "what is finished is kept: go on with `shipid study resume`"
 LOOK = 2.0  # s between looks at the scheduler while nothing comes
 SILENT = 30.0  # s that a scheduler may take to answer
-PATIENCE = 20.0  # s without any worker until that is said
+PATIENCE = 20.0  # s without any worker until that is reported
 AHEAD = 3  # tasks for each thread of the workers: others are left to whoever comes
 
 Shared = TypeVar("Shared")
@@ -106,12 +106,12 @@ def _results(
                 continue
             key, task, _ = left.pop(future.key)
             try:
-                found = future.result(timeout=SILENT)
+                results = future.result(timeout=SILENT)
             except KilledWorker:
                 killed.append(key)
                 continue
-            yield task, found
-            del future, found  # a worker may forget them
+            yield task, results
+            del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
         raise gone() from None
     if killed:
@@ -152,7 +152,7 @@ class _Watch:
 
 @contextmanager
 def _without_logs(*names: str) -> Iterator[None]:
-    """Silence loggers and those below them, whose errors are said in one line."""
+    """Silence loggers and those below them, whose errors are reported in one line."""
     every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
     before = {logger: logger.level for logger in every}
     try:

@@ -1,4 +1,4 @@
-"""The same study in several worlds: finished folders that differ in their top-level seed alone, side by side."""
+"""One study in several worlds: comparison of finished folders that differ in their top-level seed alone."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
 
     low and high are Student's 95 % interval over worlds, not a number from fewer than two.
     """
-    found = [findings(results) for results in worlds]
+    by_world = [findings(results) for results in worlds]
     rows = []
-    for same in zip(*found, strict=True):
+    for same in zip(*by_world, strict=True):
         counts = Counter(one["verdict"] for one in same)
         verdicts = ", ".join(f"{count} {word}" for word, count in counts.most_common())
         names = dict.fromkeys(name for one in same for name in one["numbers"])

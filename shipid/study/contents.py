@@ -105,7 +105,7 @@ def _write_one(folder: Path) -> tuple[Path, bool]:
 
 
 def share_pages(folder: Path) -> Path:
-    """As `write_pages`, where several processes may end together: one writes, the others wait for it."""
+    """Write the pages where several processes may end together: one writes, the others wait for it."""
     report, parts = folder / REPORT, store.stored_plan(folder).parts
     places = [store.part_folder(folder, name) for name in parts] or [folder]
 

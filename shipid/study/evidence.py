@@ -186,7 +186,7 @@ def _ranks(values: Array) -> Array:
 def training_noise(H: Sequence[Array]) -> float:
     """Relative standard deviation [1] of H between trainings, from H by seed of several models at one amount of data.
 
-    One seed cannot tell: then it is `TRAINING`, what bundled studies have; more seeds take its place.
+    With one seed it is `TRAINING`, the value of bundled studies; more seeds replace it.
     """
     squares, freedom = WORTH * TRAINING**2, float(WORTH)
     for values in H:

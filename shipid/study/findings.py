@@ -3,7 +3,7 @@
 R1-R4 (method, section 5) are taken at the largest amount of data, from paired differences over test manoeuvres, as
 S1-S7 are: "shown" means a 95 % interval free of 0.
 
-R1 : both models have a lower H than their own A.
+R1 : both models have H below A.
 R2 : H of the inaccurate model is less than 10 % above A of the accurate one.
 R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap, with their signs, are above 0.
 R4 : at every step ahead pure data-driven has a larger error than every other predictor, physics alone included; refuted
@@ -38,7 +38,7 @@ from shipid.study.verdict import (
 
 Array = NDArray[np.float64]
 CLAIMS = {
-    "R1": "compensation beats its own physics model, accurate or not",
+    "R1": "compensated physics beats the physics alone, accurate or not",
     "R2": "the inaccurate model, compensated, is about as good as the accurate physics alone",
     "R3": "the gap between accurate and inaccurate physics shrinks after compensation",
     "R4": "pure data-driven prediction is worst over the whole horizon",
@@ -66,8 +66,8 @@ def findings(results: Results) -> list[Finding]:
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    found = _full_scale(results, claims) if claims.accurate is not None else []
-    return [*found, *(simulation_findings(results) if claims.moderate is not None else [])]
+    verdicts = _full_scale(results, claims) if claims.accurate is not None else []
+    return [*verdicts, *(simulation_findings(results) if claims.moderate is not None else [])]
 
 
 def _full_scale(results: Results, claims: Claims) -> list[Finding]:
@@ -78,7 +78,7 @@ def _full_scale(results: Results, claims: Claims) -> list[Finding]:
     if any(name not in table.H for name in (good, bad, NO_MODEL)):
         return undecided(CLAIMS, "a cell that it needs has failed or is missing")
     if any(name not in table.A for name in (good, bad)):
-        return undecided(CLAIMS, "the physics of a claim is identified anew in every cell: it has no A of its own")
+        return undecided(CLAIMS, "the physics of a claim is identified again in every cell, so it has no single A")
     return judged(Rivals(table, good, bad, _steps(results, table.amounts[-1])))
 
 
@@ -86,23 +86,23 @@ def judged(rivals: Rivals) -> list[Finding]:
     """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval."""
     table, good, bad = rivals.table, rivals.good, rivals.bad
     place = len(table.amounts) - 1
-    own = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
+    gains = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
     gap = [(1.0, bad, ALONE), (-1.0, good, ALONE)]
     about = table.compare([[(1 + ABOUT, good, ALONE), (-1.0, bad, place)], [(1.0, good, ALONE), (-1.0, bad, place)]])
     gaps = table.compare([[*gap, (sign, bad, place), (-sign, good, place)] for sign in (-1.0, 1.0)])
     before, after = (abs(table.mean(bad, at) - table.mean(good, at)) for at in (ALONE, place))
     narrower = gaps.mean[0] < gaps.mean[1]  # the one that counts: the gap of H has the sign of that of A, or not
-    share, worst, found = _worst(rivals)
+    share, worst, worst_of_all = _worst(rivals)
     verdicts: dict[str, Verdict] = {
-        "R1": verdict(every(own.above), some(own.below)),
+        "R1": verdict(every(gains.above), some(gains.below)),
         "R2": verdict(every(about.above[:1]), some(about.below[:1])),
         "R3": verdict(every(gaps.above), some(gaps.below)),
-        "R4": found,
+        "R4": worst_of_all,
     }
     alone, H = ({model: table.mean(model, at) for model in (good, bad)} for at in (ALONE, place))
     evidence = {
         "R1": "; ".join(
-            f"{model} {metres(alone[model])} -> {metres(H[model])}, {measured(own, k)} less"
+            f"{model} {metres(alone[model])} -> {metres(H[model])}, {measured(gains, k)} less"
             for k, model in enumerate((good, bad))
         ),
         "R2": f"inaccurate and compensated {metres(H[bad])}, accurate alone {metres(alone[good])}: "
@@ -149,8 +149,8 @@ def _worst(rivals: Rivals) -> tuple[float, str, Verdict]:
     each = contrasts(ahead, rivals.table.counts, training)
     whole = np.stack([(pure - error).mean(axis=0) for error in others])
     over = noise * np.array([np.hypot((pure @ weights).mean(), (error @ weights).mean()) for error in others])
-    found = verdict(every(each.above), some(contrasts(whole, rivals.table.counts, over).below))
-    return float(worst[names.index(NO_MODEL)] / worst.sum()), names[int(worst.argmax())], found
+    decided = verdict(every(each.above), some(contrasts(whole, rivals.table.counts, over).below))
+    return float(worst[names.index(NO_MODEL)] / worst.sum()), names[int(worst.argmax())], decided
 
 
 def by_step(path: Array, future: Array, run: NDArray[np.str_]) -> Array:

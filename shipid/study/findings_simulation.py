@@ -61,7 +61,7 @@ CLAIMS = {
     "S2": "H falls with N_D for every model",
     "S3": "H rises with A at fixed N_D, most steeply at small N_D",
     "S4": "some high models beat pure data-driven; the worst stay worse even at the largest N_D, and fluctuate",
-    "S5": "H_90 tells the same story as H",
+    "S5": "H_90 leads to the same findings as H",
     "S6": "moderate models with small N_D beat pure data-driven with a larger one, and more accurate physics alone",
     "S7": "paths of pure data-driven at small N_D are rough, those of cooperative models are not",
 }
@@ -97,14 +97,14 @@ class Grid:
 
 
 def simulation_findings(results: Results) -> list[Finding]:
-    """Verdicts on S1-S7; all undecided where the study cannot tell, with the reason."""
+    """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
     H, H_90 = read_grid(results, "H"), read_grid(results, "H_90")
     if isinstance(H, str) or isinstance(H_90, str):
         return undecided(CLAIMS, str(H))
-    found = [*judged(H, H_90), _S7(results, H)]
+    verdicts = [*judged(H, H_90), _S7(results, H)]
     few, left_out = too_few(H.table.runs), named(H.left_out)
     notes = [*([few] if few else []), *([f"left out for want of results: {left_out}"] if left_out else [])]
-    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in found]
+    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in verdicts]
 
 
 def judged(H: Grid, H_90: Grid) -> list[Finding]:
@@ -139,18 +139,18 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
     return Grid(table, sound[claims.moderate], sound[claims.high], left_out)
 
 
-def _finding(key: str, found: Verdict, evidence: str, **numbers: float) -> Finding:
-    return Finding(id=key, claim=CLAIMS[key], verdict=found, evidence=evidence, numbers=numbers)
+def _finding(key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:
+    return Finding(id=key, claim=CLAIMS[key], verdict=decided, evidence=evidence, numbers=numbers)
 
 
 def _without(key: str, what: str) -> Finding:
     return _finding(key, "undecided", f"no {what} model has a result in every cell")
 
 
-def _range(found: Contrasts) -> str:
+def _range(differences: Contrasts) -> str:
     """The least and the greatest of some differences, with their intervals."""
-    least, most = int(found.mean.argmin()), int(found.mean.argmax())
-    return measured(found, least) + (f" to {measured(found, most)}" if least != most else "")
+    least, most = int(differences.mean.argmin()), int(differences.mean.argmax())
+    return measured(differences, least) + (f" to {measured(differences, most)}" if least != most else "")
 
 
 def _S1(grid: Grid) -> Finding:
@@ -179,8 +179,8 @@ def _S1(grid: Grid) -> Finding:
     return _finding("S1", weakest((begins, keeps)), evidence, **numbers)
 
 
-def _sides(found: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
-    return [one.above for one in found], [one.below for one in found]
+def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
+    return [one.above for one in differences], [one.below for one in differences]
 
 
 def _slope(x: Array) -> Array:
@@ -223,22 +223,22 @@ def _S3(grid: Grid) -> Finding:
     each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
     last = len(grid.amounts) - 1
     flatter = [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]
-    found = table.compare([*each, flatter])
+    slopes = table.compare([*each, flatter])
     H = np.array([[table.mean(model, k) for model in models] for k in range(len(grid.amounts))])
     order = np.vstack([H, H[0] - H[last]])
     rises = [rank_correlation(A, values) for values in H]
     evidence = (
-        f"for twice the A, H rises by {measured(found, 0)} at N_D = {grid.amounts[0]} and by {measured(found, last)} "
-        f"at {grid.amounts[last]}, {measured(found, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
+        f"for twice the A, H rises by {measured(slopes, 0)} at N_D = {grid.amounts[0]} and by {measured(slopes, last)} "
+        f"at {grid.amounts[last]}, {measured(slopes, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
         f"{max(rises):.2f} over N_D ({len(A)} models)"
     )
     numbers = {
         "least rank correlation of H and A": min(rises),
-        f"rise for twice the A at N_D = {grid.amounts[0]} [m]": float(found.mean[0]),
-        f"rise for twice the A at N_D = {grid.amounts[last]} [m]": float(found.mean[last]),
+        f"rise for twice the A at N_D = {grid.amounts[0]} [m]": float(slopes.mean[0]),
+        f"rise for twice the A at N_D = {grid.amounts[last]} [m]": float(slopes.mean[last]),
     }
-    risen = np.maximum(found.above, by_chance(A, order))
-    fallen = np.maximum(found.below, by_chance(A, -order))
+    risen = np.maximum(slopes.above, by_chance(A, order))
+    fallen = np.maximum(slopes.below, by_chance(A, -order))
     return _finding("S3", verdict(every(risen), some(fallen)), evidence, **numbers)
 
 
@@ -251,11 +251,11 @@ def _S4(grid: Grid) -> Finding:
     better, worse = shown(lead.above), shown(lead.below)
     worst = [model for model, behind in zip(grid.high, worse, strict=True) if behind]
     orders = table.H[NO_MODEL].shape[1]
-    said = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
+    names = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
     evidence = (
         f"at N_D = {last}, {better.sum()} of {len(better)} high models beat pure data-driven "
         f"({grid.value(NO_MODEL, place)}), {len(worst)} {'is' if len(worst) == 1 else 'are'} worse"
-        f"{f' ({said})' if said else ''}"
+        f"{f' ({names})' if names else ''}"
     )
     numbers = {
         f"share of high models shown to lead at N_D = {last}": float(better.mean()),
@@ -309,9 +309,9 @@ def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Fin
     opposite = any({"confirmed", "refuted"} <= set(change) for change in changed)
     evidence = f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
     evidence += ", ".join(f"{key} is {other} instead of {one}" for key, one, other in changed) or "S1-S4 are the same"
-    found = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
+    decided = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
-    return _finding("S5", found if H.table.runs > 1 else "undecided", evidence, **numbers)
+    return _finding("S5", decided if H.table.runs > 1 else "undecided", evidence, **numbers)
 
 
 @dataclass(frozen=True)
@@ -336,7 +336,7 @@ def _S6(grid: Grid) -> Finding:
         ("pure data-driven with more runs", _more_data),
         ("more accurate physics alone", _better_physics),
     ]
-    parts, said, numbers = [], [], {}
+    parts, examples, numbers = [], [], {}
     for what, pairs_of in kinds:
         pairs = pairs_of(grid, small)
         if not pairs:
@@ -349,10 +349,10 @@ def _S6(grid: Grid) -> Finding:
         sure = [pair for pair, good in zip(pairs, shown(above), strict=True) if good]
         best = sorted(sure, key=lambda pair: -pair.saved)[:MOST_PAIRS]
         parts.append(verdict(bool(sure), every(below)))
-        said.append(f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}")
-        said[-1] += f": {', '.join(pair.text for pair in best)}" if best else ""
+        examples.append(f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}")
+        examples[-1] += f": {', '.join(pair.text for pair in best)}" if best else ""
         numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
-    return _finding("S6", weakest(parts), "; ".join(said), **numbers)
+    return _finding("S6", weakest(parts), "; ".join(examples), **numbers)
 
 
 def _more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
@@ -420,22 +420,22 @@ def _S7(results: Results, grid: Grid) -> Finding:
     }
     true, pure = by_run(results.test.future), np.mean(paths[NO_MODEL], axis=0)
     together = np.mean([values for model in grid.physics for values in paths[model]], axis=0)
-    found, numbers = rough(true, pure, together, counts.astype(float))
+    decided, numbers = rough(true, pure, together, counts.astype(float))
     evidence = (
         f"at N_D = {first}: pure data-driven {metres(numbers['roughness of pure data-driven [m]'])}, cooperative "
         f"{metres(numbers['roughness of cooperative models [m]'])} in the mean, true paths "
         f"{metres(numbers['roughness of true paths [m]'])} ({manoeuvres(len(runs))})"
     )
-    return _finding("S7", found, evidence, **numbers)
+    return _finding("S7", decided, evidence, **numbers)
 
 
 def rough(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
     """Verdict on S7 from the roughness (R,) [m] of true, pure data-driven and cooperative paths by test manoeuvre."""
-    found = contrasts(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
+    differences = contrasts(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
     share = counts / counts.sum()
     numbers = {
         "roughness of pure data-driven [m]": float(pure @ share),
         "roughness of cooperative models [m]": float(together @ share),
         "roughness of true paths [m]": float(true @ share),
     }
-    return verdict(every(found.above), some(found.below)), numbers
+    return verdict(every(differences.above), some(differences.below)), numbers

@@ -41,13 +41,13 @@ FAR = (0.15, 0.4, 2.5, 7.0)  # of what may be off by more: lags and rates
 FINER = (0.82, 0.93, 1.07, 1.22)
 SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
-SAID = 0.15  # of the error that all groups together must save, else nothing is said
+SAID = 0.15  # of the error that all groups together must save, else nothing is reported
 PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
 MODEST = 5.0  # factor
-OFF = 1.15  # a factor by which speed or turning may differ before it is said
+OFF = 1.15  # a factor by which speed or turning may differ before it is reported
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
 
@@ -135,13 +135,13 @@ class Look:
         seen = f"{'; '.join(self.facts)}; {errors}" if self.facts else errors
         if not self.changes:
             if self.alone < self.constant:
-                return f"{self.vessel.name} and the log agree as far as one number tells: {seen}"
+                return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
             return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
         first, *others = self.changes
-        told = f"{_shown(self.vessel, first)} would explain most of it ({first.error:.3g} m)"
+        explained = f"{_shown(self.vessel, first)} would explain most of it ({first.error:.3g} m)"
         more = f", then {', '.join(_shown(self.vessel, one) for one in others)}" if others else ""
         left = f" ({self.corrected:.3g} m)" if others else ""
-        return f"{self.vessel.name}: {seen}: {told}{more}{left}"
+        return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
 
     def patch(self, base: str) -> str:
         """The changes as a patch document (TOML) on a vessel that is called `base` there; empty without changes."""
@@ -214,7 +214,7 @@ class _Trial:
     known: dict[Gear, Instants] = field(default_factory=dict)
 
     def instants(self, gear: Gear = ()) -> Instants:
-        """What the vessel with changed actuators knows at every window: planned commands, and where they are."""
+        """Instants for the vessel with changed actuators: planned commands, and positions of the actuators."""
         if gear not in self.known:
             hidden = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
             self.known[gear] = self.windows.instants(known=True, hidden=hidden)
@@ -236,8 +236,8 @@ class _Trial:
                 for path, value in rows[place].items():
                     parameters[number, names.index(path)] = value
             physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
-            found = physics.distances(self.instants(gear), self.windows.future, parameters)
-            mean = np.where(found.diverged, np.inf, found.total / self.windows.horizon)
+            distances = physics.distances(self.instants(gear), self.windows.future, parameters)
+            mean = np.where(distances.diverged, np.inf, distances.total / self.windows.horizon)
             capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9) * 10)
             for number, place in enumerate(places):
                 result[place] = float(capped[number].mean())
@@ -259,10 +259,10 @@ def _explained(trial: _Trial, alone: float) -> list[Change]:
             for factor in (FAR if group.high > MODEST else FACTORS)
             if group.low <= factor <= group.high
         ]
-        found = _least(trial, groups, [{**factors, group: factor} for group, factor in options])
-        if found is None or found[1] > (1 - WORTH) * best:
+        least = _least(trial, groups, [{**factors, group: factor} for group, factor in options])
+        if least is None or least[1] > (1 - WORTH) * best:
             break
-        chosen, best = _refined(trial, groups, *found)
+        chosen, best = _refined(trial, groups, *least)
         factors = chosen
         errors.append(best)
     for _ in range(SWEEPS if len(factors) > 1 else 0):
@@ -286,9 +286,9 @@ def _refined(
             for change in FINER
             if group.low <= (moved := factors[group] * change) <= group.high
         ]
-        found = _least(trial, groups, near)
-        if found is not None and found[1] < error:
-            factors, error = found
+        least = _least(trial, groups, near)
+        if least is not None and least[1] < error:
+            factors, error = least
     return factors, error
 
 

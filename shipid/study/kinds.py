@@ -1,4 +1,4 @@
-"""What kind of run a stretch is, by its orders and its motion."""
+"""The kind of a run, from its orders and its motion."""
 
 from __future__ import annotations
 

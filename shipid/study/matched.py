@@ -1,8 +1,8 @@
-"""Any two or more runs side by side, cell by cell: the same family, member, method, N_D and seed.
+"""Two or more runs compared cell by cell: the same family, member, method, N_D and seed.
 
 Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
-manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else each run has manoeuvres of
-its own, and they are resampled apart.
+manoeuvre and judged over manoeuvres (paired and clustered, `shipid.study.evidence`); else the manoeuvres of
+each run are resampled separately.
 """
 
 from __future__ import annotations
@@ -85,10 +85,10 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
             notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
     frames, called = [], [dict[str, str]()]
     for name, results in zip(names[1:], runs[1:], strict=True):
-        frame, matched, said = _beside(runs[0], results, pairs or {})
+        frame, matched, sentences = _beside(runs[0], results, pairs or {})
         frames.append(frame.assign(folder=name))
         called.append(matched)
-        notes += [f"{name}: {words}" for words in said]
+        notes += [f"{name}: {words}" for words in sentences]
     sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
     documents = document_differences([results.plan for results in runs], sessions, called)
     documents.columns = pd.Index(["path", *names])
@@ -107,7 +107,7 @@ def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
 
 
 def _names(folders: Sequence[Path]) -> tuple[str, ...]:
-    """The last parts of folders that tell them apart, as few as do."""
+    """The shortest last parts of folders that make their names different."""
     parts = [folder.resolve().parts for folder in folders]
     for count in range(1, max(map(len, parts)) + 1):
         short = ["/".join(part[-count:]) for part in parts]
@@ -140,7 +140,7 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
     one = _side(first, groups, "first", here)
     two = _side(other, groups, "other", there)
     training = np.hypot(one.training, two.training)
-    found = (
+    rows = (
         contrasts(two.errors - one.errors, one.counts, training)
         if paired
         else contrasts_apart(two.errors, two.counts, one.errors, one.counts, training)
@@ -155,8 +155,8 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
             "cells": [len(part) for part in groups],
             "first": one.errors @ (one.counts / one.counts.sum()),
             "other": two.errors @ (two.counts / two.counts.sum()),
-            **{"difference": found.mean, "low": found.low, "high": found.high},
-            "verdict": _verdicts(found),
+            **{"difference": rows.mean, "low": rows.low, "high": rows.high},
+            "verdict": _verdicts(rows),
             "paired": paired,
             **{f"coverage_{side}": [part[f"coverage_{side}"].mean() for part in groups] for side in ("first", "other")},
         }
@@ -196,8 +196,8 @@ def _counterparts(here: pd.Series, there: pd.Series, pairs: Mapping[str, str]) -
 
 def _spans(results: Results) -> str:
     cells = results.cells
-    said = {key: ", ".join(map(str, dict.fromkeys(cells[key]))) for key in ("family", "method", "N_D", "seed")}
-    return "; ".join(f"{key} {words}" for key, words in said.items())
+    names = {key: ", ".join(map(str, dict.fromkeys(cells[key]))) for key in ("family", "method", "N_D", "seed")}
+    return "; ".join(f"{key} {words}" for key, words in names.items())
 
 
 def _label(part: pd.DataFrame, key: str) -> str:
@@ -213,11 +213,11 @@ def _windows(first: Results, other: Results) -> tuple[Index, Index, bool, list[s
     if len(here) and (_same_recording(first.test, other.test, here, there) or _same_draws(first.plan, other.plan)):
         common = manoeuvres(len(set(first.test.run[here])))
         all_of = len(here) == len(first.test) == len(other.test)
-        said = f"paired over {common}" + ("" if all_of else f", on the {len(here)} windows that both have")
-        return here, there, True, [said]
+        text = f"paired over {common}" + ("" if all_of else f", on the {len(here)} windows that both have")
+        return here, there, True, [text]
     counts = [len(set(results.test.run)) for results in (first, other)]
-    said = f"other test manoeuvres ({counts[1]}, the first has {counts[0]}): not paired, so the intervals are wide"
-    return np.arange(len(first.test)), np.arange(len(other.test)), False, [said]
+    text = f"other test manoeuvres ({counts[1]}, the first has {counts[0]}): not paired, so the intervals are wide"
+    return np.arange(len(first.test)), np.arange(len(other.test)), False, [text]
 
 
 def _moments(test: Windows) -> list[tuple[str, float]]:
@@ -273,9 +273,9 @@ def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: 
     return _Side(errors, counts.astype(float), training)
 
 
-def _verdicts(found: Contrasts) -> list[str]:
-    """What is shown of each difference, corrected for their number in each direction."""
-    if not np.isfinite(found.below).all():
-        return [""] * len(found)
-    lower, higher = shown(found.below), shown(found.above)
+def _verdicts(compared: Contrasts) -> list[str]:
+    """Verdict on each difference, corrected for their number in each direction."""
+    if not np.isfinite(compared.below).all():
+        return [""] * len(compared)
+    lower, higher = shown(compared.below), shown(compared.above)
     return ["lower" if low else "higher" if high else "" for low, high in zip(lower, higher, strict=True)]

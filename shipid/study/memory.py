@@ -1,4 +1,4 @@
-"""What the past tells: the observer along test runs, and what memory and observer bought, paired over test runs."""
+"""What the past shows: the observer along test runs, and what memory and observer bought, paired over test runs."""
 
 from __future__ import annotations
 
@@ -50,30 +50,30 @@ def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
 
     Methods are compared with others of their kind alone: between kinds, memory is not all that differs.
     """
-    found = []
+    rows = []
     for one in foundations:
-        found += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
+        rows += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
     for observed, original in _observed(foundations):
         if observed.identify is None:
             label = f"observer: {ALONE}"
-            found.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
+            rows.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
         for way in ways:
             if observed.name in way.foundations and original.name in way.foundations:
                 label = f"observer: {way.name}"
-                found.append(Pair("observer", label, (original.name, way.name), (observed.name, way.name)))
-        found += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(ways, original, observed)]
+                rows.append(Pair("observer", label, (original.name, way.name), (observed.name, way.name)))
+        rows += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(ways, original, observed)]
     order: dict[Added, int] = {"memory": 0, "observer": 1, "both": 2}
-    return sorted(found, key=lambda pair: order[pair.added])
+    return sorted(rows, key=lambda pair: order[pair.added])
 
 
 def taken(way: Way, foundation: Foundation) -> frozenset[str]:
     """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
     memory = getattr(way.method, "memory", NOTHING)
-    found = {"history"} if memory.history or memory.turned else set()
-    found |= {"error"} if memory.error and foundation.base is not None else set()
-    if not found and not memory.past and way.method.past > 0:
-        found = {"past"}
-    return frozenset(found | ({"observer"} if memory.observer and foundation.observer is not None else set()))
+    kinds = {"history"} if memory.history or memory.turned else set()
+    kinds |= {"error"} if memory.error and foundation.base is not None else set()
+    if not kinds and not memory.past and way.method.past > 0:
+        kinds = {"past"}
+    return frozenset(kinds | ({"observer"} if memory.observer and foundation.observer is not None else set()))
 
 
 def _rivals(ways: Sequence[Way], original: Foundation, observed: Foundation) -> Iterator[tuple[Way, Way]]:
@@ -245,15 +245,15 @@ def observer_frame(results: Results) -> pd.DataFrame:
 
 def orders_frame(results: Results) -> pd.DataFrame:
     """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
-    found = []
+    frames = []
     for run, rows in results.dataset.frame.groupby("run", sort=False):
         if run in shown_runs(results):
             values = rows[results.dataset.commands].to_numpy(dtype=float)
             steps = np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9
             moved = steps.any(axis=1)
             begins = moved & ~np.concatenate([[False], moved[:-1]])
-            found += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
-    return pd.DataFrame(found, columns=["run", "t"])
+            frames += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
+    return pd.DataFrame(frames, columns=["run", "t"])
 
 
 def _exemplar(results: Results) -> tuple[str, Predictor] | None:

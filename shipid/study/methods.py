@@ -94,19 +94,19 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
             sums[place] = sums.get(place, 0.0) + mine[key]["sums"][run] - theirs[key]["sums"][run]
             counts[place] = counts.get(place, 0) + count
     blank = dict.fromkeys(("difference", "low", "high", "least", "greatest", "world_low", "world_high"), np.nan)
-    found = {**blank, "pairs": len(keys), "runs": len(sums), "better": 0, "worlds": 0}
+    row = {**blank, "pairs": len(keys), "runs": len(sums), "better": 0, "worlds": 0}
     if not keys:
-        return found
+        return row
     values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
     low, high = paired_interval(values, weights)
     worlds = list(dict.fromkeys(world for world, _ in sums))
     means = np.array([_mean(sums, counts, world) for world in worlds])
-    found |= {"difference": float(values.sum() / weights.sum()), "low": low, "high": high, "worlds": len(worlds)}
-    found |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
+    row |= {"difference": float(values.sum() / weights.sum()), "low": low, "high": high, "worlds": len(worlds)}
+    row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
     if len(worlds) >= LEAST:
         wide = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(worlds) - 1) * means.std(ddof=1) / len(worlds) ** 0.5)
-        found |= {"world_low": float(means.mean()) - wide, "world_high": float(means.mean()) + wide}
-    return found
+        row |= {"world_low": float(means.mean()) - wide, "world_high": float(means.mean()) + wide}
+    return row
 
 
 def _mean(sums: Mapping[tuple[str, str], float], counts: Mapping[tuple[str, str], int], world: str) -> float:

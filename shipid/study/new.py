@@ -97,16 +97,16 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     twice = next((name for name in vessels if list(vessels).count(name) > 1), None)
     if twice is not None:
         raise ShipidError(f"{twice!r} is named twice: name each vessel once", path="--vessel")
-    found = {_named(name, out): load_vessel(name) for name in vessels}
-    if not found:
+    loaded = {_named(name, out): load_vessel(name) for name in vessels}
+    if not loaded:
         raise ShipidError("name a vessel: a bundled name (see `shipid vessel list`) or a path", path="--vessel")
     if data is None:
-        return _simulated(found, out)
+        return _simulated(loaded, out)
     dataset = read_dataset(data)
     columns = {str(name): dataset.frame[name].to_numpy() for name in dataset.frame}
-    for vessel in found.values():
+    for vessel in loaded.values():
         check_columns(vessel, columns, str(data))
-    return _recorded(found, dataset, data, out)
+    return _recorded(loaded, dataset, data, out)
 
 
 def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:
@@ -193,14 +193,14 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
 
 def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
     """A warning for each vessel whose patch says that it was identified from runs that are to test it."""
-    found = []
+    blocks = []
     for name, vessel in vessels.items():
         known = documents.read(vessel.file).get("provenance", {}).get("runs", [])
         seen = [run for run in tests if run in known]
         if seen:
             words = f"{name} was identified from {', '.join(seen)}, which now test{'s' * (len(seen) == 1)} it"
-            found.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
-    return found
+            blocks.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
+    return blocks
 
 
 def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:
@@ -269,9 +269,9 @@ def _question(vessels: Mapping[str, Vessel], dataset: Dataset, seen: Survey, hor
     kinds = ", ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in counts.most_common())
     low, high = seen.runs["duration"].min(), seen.runs["duration"].max()
     slow, fast = seen.runs["speed"].min(), seen.runs["speed"].max()
-    said = f"{len(seen.runs)} runs ({kinds}) of {low:.0f} to {high:.0f} s at {slow:.2g} to {fast:.2g} m/s"
+    text = f"{len(seen.runs)} runs ({kinds}) of {low:.0f} to {high:.0f} s at {slow:.2g} to {fast:.2g} m/s"
     wind = "" if "V_w" in dataset.frame else ", wind not measured"
-    yield Choice("description", f"{said}, {len(dataset.frame)} rows{wind}", "what the log holds")
+    yield Choice("description", f"{text}, {len(dataset.frame)} rows{wind}", "what the log holds")
 
 
 def _measured(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
@@ -374,26 +374,26 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
 def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[Any]:
     """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2."""
     taken = {NO_MODEL, "inaccurate"}
-    found: list[Any] = []
+    families: list[Any] = []
     for named, vessel in vessels.items():
         name = re.sub(r"[^A-Za-z0-9_.+-]", "-", vessel.key)
         name = name if name[:1].isalpha() else f"ship-{name}"
         while name in taken:
             name += "-own"
         taken.add(name)
-        found.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
+        families.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
         look = looks.get(named)
         if look is not None and look.changes:
             groups = ", ".join(f"{change.group.name} x {change.factor:.3g}" for change in look.changes)
             words = f"{vessel.name} with {groups}: from all runs that do not test, whatever N_D"
             corrected = {"name": f"{name}{CORRECTED}", "description": words, "base": named}
-            found.append({**corrected, "perturb": [{"set": look.values}]})
+            families.append({**corrected, "perturb": [{"set": look.values}]})
     named, vessel = next(iter(vessels.items()))
     blocks = _inaccurate(vessel)
-    words = f"{found[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
+    words = f"{families[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
     if blocks:
-        found.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
-    return found
+        families.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
+    return families
 
 
 def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:
@@ -523,12 +523,12 @@ def _degraded(named: str, vessel: Vessel) -> list[Any]:
     return [
         {
             "name": "nominal",
-            "description": "the truth's own numbers: the floor that steps and held orders leave",
+            "description": "the numbers of the truth: the error that steps and held orders leave",
             "base": named,
         },
         {
             "name": "moderate",
-            "description": "each hull coefficient times a factor of its own in 0.4-1.6",
+            "description": "each hull coefficient times a separate factor in 0.4-1.6",
             "base": named,
             "members": MEMBERS["moderate"],
             "seed": 1,
@@ -554,9 +554,7 @@ def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warn
     """The study as TOML, each reason above its value."""
     document = tomlkit.document()
     document.add(
-        tomlkit.comment(
-            "Written by `shipid study new`: the reasons stand above the values; change what you know better."
-        )
+        tomlkit.comment("Written by `shipid study new`. Above each value is its reason. Change what you know better.")
     )
     for line in (line for warning in warnings for line in textwrap.wrap(f"WRONG? {warning}", 110)):
         document.add(tomlkit.comment(line))

@@ -148,7 +148,7 @@ class Claims(Strict):
     def _pairs(self) -> Claims:
         for one, other in (("accurate", "inaccurate"), ("moderate", "high")):
             if (getattr(self, one) is None) != (getattr(self, other) is None):
-                raise ValueError(f"`{one}` and `{other}` go together")
+                raise ValueError(f"give both `{one}` and `{other}`, or neither")
         return self
 
     @property
@@ -173,14 +173,14 @@ class Published(Strict):
     def _sensible(self) -> Published:
         for key, limits in self.envelope.items():
             if key not in published_keys():
-                raise ValueError(f"envelope.{key} is no input: {choices(key, published_keys())}")
+                raise ValueError(f"envelope.{key} is no input of a study: {choices(key, published_keys())}")
             if len(limits) != 3 or limits != sorted(limits):
-                raise ValueError(f"envelope.{key}: give [min, mean, max], found {limits}")
+                raise ValueError(f"envelope.{key}: give [min, mean, max], not {limits}")
         return self
 
 
 class Condition(Strict):
-    """`[[condition]]`: what is different in one part of a study; its other parts stand beside it."""
+    """`[[condition]]`: the changes of one part of a study that has several parts."""
 
     name: Annotated[str, Field(pattern=NAME)]
     set: dict[str, Any] = Field(default={}, description="dotted path -> value")
@@ -336,8 +336,8 @@ class Plan:
     vessels : every vessel that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from.
     changes : what `--set` changed, already in the document.
-    parts : name -> a study of its own, for every repetition in every condition; empty where there is neither. Then they
-        are what is run.
+    parts : name -> a complete study for every repetition in every condition; empty where there is neither. If there
+        are parts, they are run in place of this study.
     """
 
     name: str
@@ -379,7 +379,7 @@ class Plan:
 
     @property
     def digest_in_any_world(self) -> str:
-        """The same digest without the top-level seed: equal for repetitions of one study."""
+        """Digest without the top-level seed: equal for repetitions of one study."""
         return self._digest({key: value for key, value in self.document.items() if key != "seed"})
 
     def _digest(self, document: Document) -> str:
@@ -471,7 +471,7 @@ class Plan:
         return sorted((tuple(sorted(pairs, key=order.__getitem__)) for _, pairs in groups), key=lambda g: order[g[0]])
 
     def cut(self, columns: int) -> Cut:
-        """What decides how much memory the windows take, for a dataset of so many columns."""
+        """The numbers that decide the memory of the windows, for a dataset of so many columns."""
         prediction = self.study.prediction
         rolled = len(self.foundations)
         return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
@@ -573,9 +573,9 @@ def _built(
             check_truth(study.truth, truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
-    found = _sources(study.data, file) if sources is None and study.data is not None else sources
+    digests = _sources(study.data, file) if sources is None and study.data is not None else sources
     plan = Plan(
-        file.stem, str(file), document, study, foundations, methods, batches, truth, known, found or {}, changes or {}
+        file.stem, str(file), document, study, foundations, methods, batches, truth, known, digests or {}, changes or {}
     )
     _check_names(plan)
     _check_memory(plan)
@@ -593,7 +593,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             raise DocumentError(f"two conditions are called {name!r}", file=file, path=f"condition.{place}.name")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
-    found: dict[str, Part] = {}
+    parts: dict[str, Part] = {}
     for place, condition in enumerate(conditions or [None]):
         for number, turn in enumerate(turns, start=1):
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
@@ -602,10 +602,10 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
             part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
             whole: dict[str, Any] = {"repeat": {}, "condition": []}
-            found[name] = Part(
+            parts[name] = Part(
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
             )
-    return found
+    return parts
 
 
 def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
@@ -617,7 +617,7 @@ def _changed(document: Document, changes: Mapping[str, Any], where: str, file: P
         try:
             document = documents.replace(document, {path: value})
         except (ValueError, IndexError, TypeError, AttributeError):
-            raise DocumentError("reaches no key of this study", file=file, path=f"{where}.{path}") from None
+            raise DocumentError("is no key of this study", file=file, path=f"{where}.{path}") from None
     return document
 
 
@@ -663,11 +663,11 @@ def mapping_of(data: Data, file: Path) -> str | None:
 def _sources(data: Data, file: Path) -> dict[str, str]:
     """Digests of what the runs come from; a missing file is reported when it is read."""
     mapping = mapping_of(data, file)
-    found = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
+    digests = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
     for key, name in (("log", data.log), ("dataset", data.dataset)):
         if name is not None and beside(file.parent, name).is_file():
-            found[key] = sha256_of(beside(file.parent, name))
-    return found
+            digests[key] = sha256_of(beside(file.parent, name))
+    return digests
 
 
 def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
@@ -695,7 +695,7 @@ def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=f"truth.set.{error.path}") from None
     except (ValueError, IndexError, TypeError, AttributeError):
-        message = f"a path runs through a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
+        message = f"a path goes below a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
         raise DocumentError(message, file=file, path="truth.set") from None
 
 
@@ -742,7 +742,7 @@ def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
 
 def _family_of_its_own(name: str, block: str) -> str:
     return (
-        "an identified or observed family is a family of its own: take the block out of this one and add "
+        "an identified or observed family must be a separate family: remove the block here and add "
         f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
     )
 
@@ -750,7 +750,7 @@ def _family_of_its_own(name: str, block: str) -> str:
 def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
     """Every member of every family; an identified family has the members of the family that it extends."""
     families = resolve(study.family, file)
-    found: list[Foundation] = []
+    foundations: list[Foundation] = []
     for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
         if family.name == NO_MODEL:
@@ -759,7 +759,9 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
         words = family.description or ""
         if family.identify is None and family.observer is None:
-            found += [Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)]
+            foundations += [
+                Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)
+            ]
             continue
         root = _root(study.family, index, file)
         parent = families[root]
@@ -769,12 +771,14 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
         described = words or ", ".join(filter(None, (parent.description, *ways)))
         for variant in members(parent, vessel, file):
             name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
-            found.append(Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer))
-    names = [foundation.name for foundation in found]
+            foundations.append(
+                Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
+            )
+    names = [foundation.name for foundation in foundations]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise DocumentError(f"two foundations would be called {twice!r}: rename a family", file=file, path="family")
-    return (*found, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+        raise DocumentError(f"two models would have the name {twice!r}: rename a family", file=file, path="family")
+    return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
 
 
 def _root(families: Sequence[Family], index: int, file: Path) -> int:
@@ -883,8 +887,10 @@ def _check_claims(study: Study, models: Sequence[Foundation], file: Path) -> Non
     rivals = (("accurate", "inaccurate"), ("moderate", "high"), ("moderate", "nominal"), ("high", "nominal"))
     for one, other in rivals:
         if one in roles and roles[one] == roles.get(other):
-            raise DocumentError(f"the same family as claims.{one}", file=file, path=f"claims.{other}")
+            raise DocumentError(
+                f"the same family as claims.{one}: name two different families", file=file, path=f"claims.{other}"
+            )
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
-        message = f"{nominal.name!r} is perturbed: the nominal row is the base as it is"
+        message = f"{nominal.name!r} is perturbed: the nominal model must be the base as it is"
         raise DocumentError(message, file=file, path="claims.nominal")

@@ -290,8 +290,8 @@ def kinds_of_runs(dataset: Dataset) -> dict[str, str]:
         if run not in longest or np.ptp(rows["t"]) > np.ptp(longest[run]["t"]):
             longest[run] = rows
     declared: Mapping[str, str] = dataset.metadata.get("manoeuvres", {})
-    found = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
-    return {run: kind for run, kind in found if kind}
+    kinds = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
+    return {run: kind for run, kind in kinds if kind}
 
 
 def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
@@ -316,7 +316,7 @@ def path_of(plan: Plan) -> Literal["position", "velocity"]:
 
 
 def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estimates:
-    """What the observer of a foundation knows at every row of the runs."""
+    """Estimates of the observer of a foundation at every row of the runs."""
     assert foundation.vessel is not None
     return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer)
 
@@ -324,7 +324,7 @@ def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estima
 def instants_of(
     plan: Plan, vessel: Vessel | None, dataset: Dataset, windows: Windows, estimates: Estimates | None = None
 ) -> Instants:
-    """What a prediction of a study knows at each window, with the states of the actuators and of the observer."""
+    """Instants of a study at each window, with the states of the actuators and of the observer."""
     hidden = None if vessel is None else window_memory(vessel, dataset, windows)
     known = plan.study.prediction.commands == "known"
     return windows.instants(known=known, hidden=hidden, estimates=at_instants(dataset, windows, estimates))
@@ -383,7 +383,7 @@ def paths_of(
 
 
 def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) -> Foundation:
-    """The same member with the next counter; DocumentError where nothing can be drawn, or not any more."""
+    """The member drawn again with the next counter; DocumentError where nothing can be drawn, or no more."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1

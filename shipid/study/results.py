@@ -158,7 +158,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
 
 
 def _observed(predictor: Predictor, dataset: Dataset, known: dict[str, Estimates]) -> Estimates | None:
-    """What the observer of a predictor knows along the runs; `known` keeps it for predictors of one vessel."""
+    """Estimates of the observer of a predictor along the runs; `known` caches them for predictors of one vessel."""
     if predictor.vessel is None or predictor.physics.observer is None:
         return None
     key = f"{predictor.vessel.digest} {predictor.physics.observer.model_dump_json()}"
@@ -313,7 +313,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     )
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
-    found, naive, cells = [], constant_motion(test), _shown_cells(results)
+    rows, naive, cells = [], constant_motion(test), _shown_cells(results)
     level, edges = results.plan.study.bands.level, {}
     for row in cells:
         bands_of_cell = results.bands.get(row["cell"])
@@ -338,7 +338,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                 if row["seed"] == seed and row["cell"] in edges
             }
             origin = np.zeros((1, 2))
-            found.append(
+            rows.append(
                 {
                     "run": run,
                     "t": float(test.t[index]),
@@ -350,7 +350,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
                     "bands": bands,
                 }
             )
-    return found
+    return rows
 
 
 def border(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
@@ -429,8 +429,8 @@ def repairs_frame(results: Results) -> pd.DataFrame:
 
 def naive_summary(results: Results) -> dict[str, float]:
     """Mean, p90 and rms [m] of constant u, v, r on the test windows."""
-    found = summary(results.naive)
-    return {"mean": found["mean"], "p90": found["p90"], "rms": found["rms"]}
+    errors = summary(results.naive)
+    return {"mean": errors["mean"], "p90": errors["p90"], "rms": errors["rms"]}
 
 
 def reproducing_command(results: Results) -> str:
@@ -459,7 +459,7 @@ def judged_cells(results: Results) -> pd.DataFrame:
 
 
 def provenance_words(results: Results) -> dict[str, str]:
-    """What the results stand on, as label -> text."""
+    """What the results are based on, as label -> text."""
     record, study = results.provenance, results.plan.study
     machine = record.get("machine", {})
     words = {

@@ -38,10 +38,10 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
     runs = [run for run in dataset.runs if run in cut]
     chosen: set[str] = set()
     for pattern in patterns:
-        found = documents.match(pattern, runs)
-        if not found:
+        matching = documents.match(pattern, runs)
+        if not matching:
             raise DocumentError(f"{pattern!r} matches no run: {choices(pattern, runs)}", path="--tests")
-        chosen.update(found)
+        chosen.update(matching)
     if len(chosen) < 2:
         message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
         raise DocumentError(message, path="--tests")
@@ -122,7 +122,7 @@ def _computed(
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
-    """Where the turns of an interrupted rotation to a file are kept: a folder of its own for all that decides them."""
+    """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and version."""
     decides = [plan.digest, dataset.digest, device, __version__]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 

@@ -101,35 +101,35 @@ class Compared:
 
     @property
     def sentences(self) -> list[str]:
-        """What was chosen and why, and what follows."""
+        """The structure chosen, the reason, and notes."""
         rows = {str(row["structure"]): row for row in _records(self.table)}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
-        said = [
+        notes = [
             f"{self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the fit has "
             f"not seen: {rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
-            said.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
+            notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
         elif others:
-            said.append(f"not shown to be worse: {', '.join(others)}")
+            notes.append(f"not shown to be worse: {', '.join(others)}")
         elif len(rows) > 1:
-            said.append("all others are shown to be worse")
+            notes.append("all others are shown to be worse")
         wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
-            said.append(
+            notes.append(
                 "structures differ by more than the interval within one in "
                 f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
                 f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
             )
-        said += [*self.beyond, *self.uneven]
+        notes += [*self.beyond, *self.uneven]
         if len(self.programme):
             first = self.programme.iloc[0]
-            said.append(
+            notes.append(
                 f"to run next: {first['manoeuvre']}, in which the structures are {first['apart']:.2g} standard "
                 "deviations of the residuals apart"
             )
-        return said
+        return notes
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
@@ -146,9 +146,9 @@ def _length(ahead: float) -> str:
     return f"{ahead:g} s" if ahead else "whole runs"
 
 
-def write_chosen(found: Compared, file: Path) -> Path:
+def write_chosen(compared: Compared, file: Path) -> Path:
     """Write the vessel with the chosen structure; it is read again to be sure. An existing file is kept."""
-    written = write_new(found.document(), file, "vessel")
+    written = write_new(compared.document(), file, "vessel")
     load_vessel(str(written.resolve()))
     return written
 
@@ -188,18 +188,20 @@ def compare_structures(
         raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
     fitted, tested = pick_runs(dataset, runs, held_out)
     if folds < 2:
-        raise ShipidError(f"{folds} is too few: two folds or more hold runs out", path="folds")
+        raise ShipidError(f"{folds}: give two folds or more", path="folds")
     if len(fitted) < 2:
-        raise DataError("only one run: it cannot be held out of its own fit; give two or more", path="runs")
+        raise DataError(
+            "only one run: give two or more, because each run is predicted by a fit to the others", path="runs"
+        )
     length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
     check_length(settings, length)
-    tell = say or (lambda _: None)
+    report = say or (lambda _: None)
     parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]
     errors, fits, notes, series = list[pd.DataFrame](), dict[str, Fitted](), dict[str, str](), dict[str, Any]()
     counts: dict[str, int] = {}
     for name in names:
         try:
-            frames, whole, seen = _judged(vessel, name, dataset, settings, parts, fitted, tested, length, tell)
+            frames, whole, seen = _judged(vessel, name, dataset, settings, parts, fitted, tested, length, report)
         except ShipidError as error:
             if isinstance(error, DataError):
                 raise
@@ -217,11 +219,11 @@ def compare_structures(
         )
     chosen = str(table["structure"].iloc[0])
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
-    tell("standard manoeuvres")
+    report("standard manoeuvres")
     reach = reach_of(vessel, dataset, fitted)
     manoeuvres, far = _manoeuvres(fits, chosen, reach, equal, level)
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
-    tell("manoeuvres to run next")
+    report("manoeuvres to run next")
     return Compared(
         vessel=vessel,
         runs=fitted,
@@ -251,13 +253,13 @@ def _judged(
     fitted: Sequence[str],
     tested: Sequence[str],
     ahead: float,
-    tell: Said,
+    report: Said,
 ) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 
     def fit(runs: Sequence[str]) -> tuple[Vessel, Solution]:
         """A fit to some runs; the others decide nothing in it, neither its start nor its priors."""
-        tell(f"{name}: {len(runs)} of {len(fitted)} runs")
+        report(f"{name}: {len(runs)} of {len(fitted)} runs")
         other = exchange(vessel, name, dataset, runs, settings)
         solution = identify(other.vessel, dataset, runs, other.settings)
         if solution.status != "ok":
@@ -268,9 +270,9 @@ def _judged(
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        found = free_runs({name: fit(rest)[0]}, dataset, part, settings, ahead)
-        frames.append(found.errors[found.errors["run"] != ALL])
-        series.append(found.series)
+        replayed = free_runs({name: fit(rest)[0]}, dataset, part, settings, ahead)
+        frames.append(replayed.errors[replayed.errors["run"] != ALL])
+        series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
         test: FreeRuns = free_runs({name: whole}, dataset, tested, settings, ahead)
@@ -304,8 +306,10 @@ def _table(
     intervals: dict[str, tuple[float, float]] = {}
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
-        found = contrasts(apart, np.ones(len(fitted)))
-        intervals = dict(zip(sound[1:], zip(found.low.tolist(), found.high.tolist(), strict=True), strict=True))
+        differences = contrasts(apart, np.ones(len(fitted)))
+        intervals = dict(
+            zip(sound[1:], zip(differences.low.tolist(), differences.high.tolist(), strict=True), strict=True)
+        )
     rows: list[dict[str, Any]] = []
     for name in known:
         low, high = intervals.get(name, (np.nan, np.nan))
@@ -380,7 +384,7 @@ def _manoeuvres(
         if name == chosen:
             far += [beyond(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
         if level is None or name not in equal:
-            found = [
+            frames = [
                 {"manoeuvre": title, "measure": measure, "value": value}
                 for title, one in done.items()
                 for measure, value in _values(one).items()
@@ -388,18 +392,18 @@ def _manoeuvres(
         else:
             known = {fit.vessel.digest: done}
             measures = [(title, _measure(title, known)) for title in done]
-            found = _records(bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level))
+            frames = _records(bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level))
         missing = [_title(*trial) for trial in TRIALS if _title(*trial) not in done]
         rows += [{"manoeuvre": title, "measure": "", "structure": name, "note": "diverges"} for title in missing]
-        rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in found]
+        rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
 
 
 def _values(one: Measured) -> dict[str, float]:
     """The measures that are compared."""
-    found = {row["measure"]: float(row["value"]) for row in one.measures}
-    return {name: found[name] for name in MEASURES[one.standard.kind] if name in found}
+    measures = {row["measure"]: float(row["value"]) for row in one.measures}
+    return {name: measures[name] for name in MEASURES[one.standard.kind] if name in measures}
 
 
 def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
@@ -480,8 +484,8 @@ def _programme(
             for a, b in pairs
         ]
         result.append((one.title, one.hours, float(np.sqrt(np.max(squares)))))
-    found = pd.DataFrame(result, columns=columns).sort_values("apart", ascending=False, ignore_index=True)
-    return found.head(FIRST)
+    ranked = pd.DataFrame(result, columns=columns).sort_values("apart", ascending=False, ignore_index=True)
+    return ranked.head(FIRST)
 
 
 def _logs(vessel: Vessel, choice: Sequence[Candidate], step: float, interval: float) -> list[dict[str, Array]]:
@@ -495,29 +499,29 @@ def _logs(vessel: Vessel, choice: Sequence[Candidate], step: float, interval: fl
     return [{name: rows[name].to_numpy() for name in "uvr"} for _, rows in log.groupby("run", sort=False)]
 
 
-def structures_content(found: Compared, dataset: str | Path, command: str = "") -> StructuresContent:
+def structures_content(compared: Compared, dataset: str | Path, command: str = "") -> StructuresContent:
     """Assemble the page; `command` is the command line that reproduces it."""
     return StructuresContent(
-        title=f"{found.vessel.name}: structures of the hull",
-        name=found.vessel.key,
-        sentences=found.sentences,
-        table=found.table,
-        errors=found.errors,
-        manoeuvres=found.manoeuvres,
-        spread=found.spread,
-        groups=found.groups,
-        programme=found.programme,
-        chosen=found.chosen,
-        cautions={name: fit.caution for name, fit in found.fits.items()},
-        ahead=found.ahead,
-        level=found.level,
+        title=f"{compared.vessel.name}: structures of the hull",
+        name=compared.vessel.key,
+        sentences=compared.sentences,
+        table=compared.table,
+        errors=compared.errors,
+        manoeuvres=compared.manoeuvres,
+        spread=compared.spread,
+        groups=compared.groups,
+        programme=compared.programme,
+        chosen=compared.chosen,
+        cautions={name: fit.caution for name, fit in compared.fits.items()},
+        ahead=compared.ahead,
+        level=compared.level,
         provenance={
-            "Vessel": f"{found.vessel.name}, digest {found.vessel.digest}",
-            "Dataset": f"{dataset}, digest {found.digest}",
-            "Runs": ", ".join(found.runs),
-            "Held out of all": ", ".join(found.test) or "none",
+            "Vessel": f"{compared.vessel.name}, digest {compared.vessel.digest}",
+            "Dataset": f"{dataset}, digest {compared.digest}",
+            "Runs": ", ".join(compared.runs),
+            "Held out of all": ", ".join(compared.test) or "none",
             "shipid": __version__,
         },
         command=command,
-        study_document=found.document(),
+        study_document=compared.document(),
     )

@@ -1,4 +1,4 @@
-"""What a dataset holds, run by run, and which of its runs are typical: what a study of it is chosen from."""
+"""Summary of a dataset, run by run, and its typical runs: the choices of a new study use it."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def survey(dataset: Dataset) -> Survey:
     failed = checks[~checks["ok"].astype(bool)]
     straying = set(failed.loc[failed["check"] == "path", "run"])
     unsound = set(failed.loc[failed["check"] != "path", "run"])
-    found = {}
+    runs = {}
     for run, parts in stretches.items():
         longest = _longest(parts)
         t = longest["t"].to_numpy()
         angles = longest[[name for name in dataset.commands if steers(name)]]
-        found[run] = {
+        runs[run] = {
             "duration": float(t[-1] - t[0]),
             "kind": kinds[run],
             "speed": float(np.hypot(longest["u"], longest["v"]).mean()),
@@ -64,7 +64,7 @@ def survey(dataset: Dataset) -> Survey:
         }
     steps = np.concatenate([np.diff(part["t"]) for parts in stretches.values() for part in parts])
     step = float(np.median(steps)) if len(steps) else 1.0
-    return Survey(pd.DataFrame(list(found.values()), index=list(found)), step, _factor(dataset))
+    return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset))
 
 
 def kinds_of(dataset: Dataset) -> dict[str, str]:
@@ -121,14 +121,14 @@ def separation(dataset: Dataset, lag: float) -> float:
 
 def helm_sense(dataset: Dataset) -> dict[str, float]:
     """Correlation of every angle command that moves with the yaw acceleration that follows: > 0 turns to starboard."""
-    found: dict[str, float] = {}
+    senses: dict[str, float] = {}
     for name in filter(steers, dataset.commands):
         pairs = [(rows[name].to_numpy()[:-1], np.diff(rows["r"])) for _, rows in pieces(dataset)]
         angle, change = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
         size = float(np.linalg.norm(angle) * np.linalg.norm(change))
         if size > 0:
-            found[name] = float(angle @ change) / size
-    return found
+            senses[name] = float(angle @ change) / size
+    return senses
 
 
 def typical_runs(runs: pd.DataFrame) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a finding is, when it counts as shown, and how its numbers are said."""
+"""Findings: when one counts as shown, and how its numbers are written."""
 
 from __future__ import annotations
 
@@ -67,9 +67,11 @@ def interval(low: float, high: float) -> str:
     return f" [{low:.{decimals}f}, {high:.{decimals}f}]" if np.isfinite([low, high]).all() else ""
 
 
-def measured(found: Contrasts, index: int) -> str:
+def measured(differences: Contrasts, index: int) -> str:
     """Return a difference with its 95 % interval."""
-    return metres(float(found.mean[index])) + interval(float(found.low[index]), float(found.high[index]))
+    return metres(float(differences.mean[index])) + interval(
+        float(differences.low[index]), float(differences.high[index])
+    )
 
 
 def manoeuvres(count: int) -> str:

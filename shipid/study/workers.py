@@ -59,16 +59,16 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
                 doing[connection] = task
         while doing:
             for ready in cast("list[Connection]", wait(list(doing))):
-                found, done = ready.recv(), doing.pop(ready)
-                if isinstance(found, Exception):
-                    raise found
+                result, done = ready.recv(), doing.pop(ready)
+                if isinstance(result, Exception):
+                    raise result
                 for task in islice(left, 1):
                     ready.send(task)
                     doing[ready] = task
-                yield done, found
+                yield done, result
     except (EOFError, ConnectionError):
         raise ShipidError(
-            "a worker was killed, perhaps for want of memory; what is finished is kept: go on with fewer --workers"
+            "a worker was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
         ) from None
     finally:
         workers.close()
@@ -92,14 +92,14 @@ def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
     tasks: SimpleQueue[Any] = SimpleQueue()
     threading.Thread(target=_listen, args=(connection, tasks), daemon=True).start()
     while True:
-        found = None
+        result = None
         task = tasks.get()
         try:
-            found = work(task)
+            result = work(task)
         except Exception as error:
             error.add_note("".join(traceback.format_exception(error)))
-            found = error
-        connection.send(found)
+            result = error
+        connection.send(result)
 
 
 def _listen(connection: Connection, tasks: SimpleQueue[Any]) -> None:

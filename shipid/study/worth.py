@@ -114,13 +114,13 @@ def runs_without_physics(table: ErrorTable, model: str, place: int, rival: str =
 def _runs(amounts: Array, values: Array) -> Array:
     """Amounts (B,) at which curves reach a level; values (B, amounts and level)."""
     curves, level = np.log(np.minimum.accumulate(values[:, :-1], axis=1)), np.log(values[:, -1])
-    found = np.full(len(values), amounts[-1])
+    needed = np.full(len(values), amounts[-1])
     for row, (curve, goal) in enumerate(zip(curves, level, strict=True)):
         enough = np.flatnonzero(curve <= goal)
         if len(enough) and enough[0] == 0:
-            found[row] = amounts[0]
+            needed[row] = amounts[0]
         elif len(enough):
             k = enough[0]
             share = (curve[k - 1] - goal) / (curve[k - 1] - curve[k])
-            found[row] = np.exp(np.log(amounts[k - 1]) + share * np.log(amounts[k] / amounts[k - 1]))
-    return found
+            needed[row] = np.exp(np.log(amounts[k - 1]) + share * np.log(amounts[k] / amounts[k - 1]))
+    return needed

@@ -151,7 +151,7 @@ def sources(vessel: Vessel) -> dict[str, str]:
 
 
 def _source(document: Document, path: str) -> str:
-    """What a document says of where a block comes from: nothing where it does not hold the block."""
+    """The source that a document gives for a block; empty if the document does not contain the block."""
     try:
         block = documents.get(document, path)
     except KeyError:
@@ -175,7 +175,7 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
     try:
         frame = pd.read_csv(source, comment="#")
     except OSError:
-        raise DocumentError(f"{source}: no such file, looked for beside the vessel", file=file, path=path) from None
+        raise DocumentError(f"{source}: no such file in the folder of the vessel", file=file, path=path) from None
     except ValueError:
         raise DocumentError(f"{source}: not a CSV table with a header", file=file, path=path) from None
     missing = next((name for name in columns if name not in frame), None)
@@ -244,7 +244,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
     for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]
         if name in paths:
-            message = f"{paths[name]} has the same last name, by which commands go: choose another"
+            message = f"{paths[name]} ends in the same name, and commands are named by it: choose another"
             raise DocumentError(message, file=file, path=path)
         paths[name] = path
         _check_lengths(path, block, file)
@@ -306,7 +306,7 @@ def _check_sense(vessel: Vessel) -> None:
     if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
         share = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
         if not LEAST_BLOCK < share < MOST_BLOCK:
-            message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which no ship is: is the unit kg?"
+            message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
 
 

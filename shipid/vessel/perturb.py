@@ -73,7 +73,7 @@ def _times(number: float, factor: float | tuple[float, float], u: float) -> floa
 
 def _rises(value: Any) -> Any:
     if isinstance(value, tuple) and value[0] > value[1]:
-        raise ValueError(f"the range {list(value)} runs backwards: give [low, high]")
+        raise ValueError(f"the range {list(value)} has low above high: give [low, high]")
     return value
 
 
@@ -117,10 +117,12 @@ class Perturbation(BaseModel):
     def _one_meaning(self) -> Perturbation:
         selecting = [key for key, rule in RULES.items() if rule.places is None]
         if bool(self.parameters) != any(key in self.given for key in selecting):
-            raise ValueError(f"`parameters` and {_either(selecting)} go together: which ones, and by how much")
+            raise ValueError(
+                f"`parameters` and {_either(selecting)} are needed together: which numbers, and by how much"
+            )
         if not (self.parameters or any(self.given.values())):
             others = ", or ".join(f"`{key}`" for key in RULES if key not in selecting)
-            raise ValueError(f"says nothing: give `parameters` with {_either(selecting)}, or {others}")
+            raise ValueError(f"has no rule: give `parameters` with {_either(selecting)}, or {others}")
         return self
 
     @classmethod
@@ -131,8 +133,8 @@ class Perturbation(BaseModel):
     @property
     def given(self) -> dict[str, Any]:
         """Key of each rule that the block uses -> its argument, in the order of `RULES`."""
-        said = self.model_extra or {}
-        return {key: said[key] for key in RULES if said.get(key) is not None}
+        extra = self.model_extra or {}
+        return {key: extra[key] for key in RULES if extra.get(key) is not None}
 
     @property
     def drawn(self) -> bool:
@@ -326,7 +328,7 @@ def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float
     try:
         base.with_values(values)
     except DocumentError as error:
-        message = f"member {member + 1} would be no vessel: {error.path}: {error.message}"
+        message = f"member {member + 1} would not be a valid vessel: {error.path}: {error.message}"
         raise DocumentError(message, file=file, path=f"family.{family.name}") from None
 
 

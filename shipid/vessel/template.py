@@ -2,7 +2,7 @@
 
 What is known of screw, rudder and steering gear is taken as it is; the rest is guessed for the size, so that the thrust
 at the service shaft speed equals the resistance at the design speed. Times of a model are those of the ship over the
-square root of the scale (Froude). The result is a normal vessel document; better values may replace its own.
+square root of the scale (Froude). The result is a normal vessel document: better values may replace the guesses.
 """
 
 from __future__ import annotations
@@ -176,15 +176,15 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
 
 
 def _remarks(given: Particulars) -> Iterator[str]:
-    """What the guess took for granted, where that matters most."""
+    """The most important assumptions of the guess, one sentence each."""
     if given.scale is None and given.reduction != 1.0:
         yield (
-            f"{given.length:g} m is taken for a model at a scale of {given.reduction:.3g}: --scale says it, "
-            "and sets how fast rudder or azimuth turns"
+            f"{given.length:g} m counts as a model at a scale of {given.reduction:.3g}: give the scale by --scale; "
+            "it sets how fast rudder or azimuth turns"
         )
     if given.rpm is None:
-        unknown = "its shaft speed" if given.propeller_diameter else "its diameter and shaft speed"
-        yield f"of the screw {unknown} is a guess: --rpm is that at {given.service:.3g} m/s"
+        unknown = "The shaft speed is a guess" if given.propeller_diameter else "Diameter and shaft speed are guesses"
+        yield f"{unknown}: give the shaft speed at {given.service:.3g} m/s by --rpm"
 
 
 def _check(given: Particulars) -> None:
@@ -518,7 +518,7 @@ def azimuth(given: Particulars, side: int) -> Values:
 
 
 def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, float, str, str]:
-    """Diameter [m] and k_T of a unit whose thrust at the given shaft speed is the resistance, and how they were found.
+    """Diameter [m] and k_T of a unit whose thrust at the given shaft speed is the resistance, and their derivation.
 
     A diameter that is not given follows from the shaft speed first, then k_T.
     """
@@ -636,7 +636,7 @@ def _shaft(vessel: Vessel, speed: float) -> float:
     while acceleration((speed, 0.0, 0.0), high)[0] < 0 and high < 1e3:
         low, high = high, 2 * high
     if high >= 1e3:
-        raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: ask for less")
+        raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if acceleration((speed, 0.0, 0.0), middle)[0] < 0 else (low, middle)

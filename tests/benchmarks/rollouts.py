@@ -1,5 +1,6 @@
-"""Rollout throughput of set A in float64: native, eager, and CasADi's own threaded map.
+"""Rollout throughput of set A in float64: native, eager, CasADi with threads, and NumPy by hand.
 
+CasADi and NumPy are used as a user would who has one ship: its numbers are written into the equations.
 All deliver the final states; `native_paths` delivers the states after every step, `native_family` the positions.
 """
 
@@ -13,14 +14,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.engine.casadi import casadi_scan
 from shipid.engine.rollout import rollout
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
+from tests.benchmarks.by_numpy import Fleet
 from tests.benchmarks.timing import best_of
 
 SAMPLES, STEPS, FAMILY = 6016, 30, 16
-JIT = {"jit": True, "compiler": "shell", "jit_options": {"compiler": "gcc", "flags": ["-O3", "-march=native"]}}
+FLAGS = {"O2": ["-O2"], "O3": ["-O3", "-march=native"], "Ofast": ["-Ofast", "-march=native"]}  # of generated C
 
 
 def run() -> dict[str, Any]:
@@ -42,24 +43,30 @@ def run() -> dict[str, Any]:
         begun = time.perf_counter()
         reference = lowered("native")
         compile_seconds = time.perf_counter() - begun
+    arrays = [np.stack(list(part.values())) for part in (start, commands, environment)]
+    fleet = Fleet(vessel)
     ways = {
-        "casadi_vm": _casadi(start, commands, environment, {}),
-        "casadi_jit": _casadi(start, commands, environment, JIT),
+        "casadi_vm": _casadi(*arrays, {}),
+        **{f"casadi_{name}": _casadi(*arrays, _jit(flags)) for name, flags in FLAGS.items()},
+        "numpy": lambda: fleet.roll_out(*arrays, 1.0, STEPS),
         "eager": lambda: lowered("torch"),
         "native": lambda: lowered("native"),
         "native_paths": lambda: lowered("native", every=1),
         "native_family": lambda: lowered("native", family, ("north", "east"), every=1),
     }
-    assert np.allclose(ways["casadi_vm"](), reference.states[-1, 0].T, rtol=1e-9, atol=1e-9)
+    for rival in ("casadi_vm", "casadi_O3", "numpy"):
+        assert np.allclose(ways[rival](), reference.states[-1, 0].T, rtol=1e-9, atol=1e-9)
     seconds = best_of(ways, rounds=9)
-    work = {name: SAMPLES * STEPS * (FAMILY if name == "native_family" else 1) / 1e6 for name in ways}
-    speed = {name: work[name] / seconds[name] for name in ways}
+    seconds["casadi_jit"] = min(seconds.pop(f"casadi_{name}") for name in FLAGS)
+    work = {name: SAMPLES * STEPS * (FAMILY if name == "native_family" else 1) / 1e6 for name in seconds}
+    speed = {name: work[name] / seconds[name] for name in seconds}
     return {
         **{f"{name} [million steps/s]": round(value, 2) for name, value in speed.items()},
-        "native / casadi_vm": round(speed["native"] / speed["casadi_vm"], 1),
-        "native / casadi_jit": round(speed["native"] / speed["casadi_jit"], 1),
-        "native_family / casadi_vm": round(speed["native_family"] / speed["casadi_vm"], 1),
-        "native_family / casadi_jit": round(speed["native_family"] / speed["casadi_jit"], 1),
+        **{
+            f"{ours} / {rival}": round(speed[ours] / speed[rival], 1)
+            for ours in ("native", "native_family")
+            for rival in ("casadi_vm", "casadi_jit", "numpy")
+        },
         "compile [s]": round(compile_seconds, 1),
     }
 
@@ -79,20 +86,19 @@ def inputs(num_samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarra
     return start, commands, {"V_w": draw(0, 6), "beta_w": draw(0, 2 * np.pi)}
 
 
-def _casadi(start: Any, commands: Any, environment: Any, options: dict[str, Any]) -> Any:
-    """CasADi's own way: mapaccum over steps, map over samples on two threads; generated C if the options say so."""
+def _jit(flags: list[str]) -> dict[str, Any]:
+    return {"jit": True, "compiler": "shell", "jit_options": {"compiler": "gcc", "flags": flags}}
+
+
+def _casadi(state: np.ndarray, commands: np.ndarray, environment: np.ndarray, options: dict[str, Any]) -> Any:
+    """As a user of CasADi writes it for one ship: numbers in the equations, mapaccum over steps, two threads."""
     vessel = load_vessel("gunnerus-28.9")
     model = dynamics(vessel)
-    scan = casadi_scan(model, 1.0, STEPS, "euler", 1)
-    x, c, e = ca.MX.sym("x", 6), ca.MX.sym("c", 4), ca.MX.sym("e", 2)
-    p = ca.MX.sym("p", len(model.parameters))
-    path = scan(ca.vertcat(x, 0), ca.repmat(c, 1, STEPS), ca.repmat(e, 1, STEPS), ca.MX.zeros(3, STEPS), p)
-    one = ca.Function("one", [x, c, e, p], [path[:6, -1]], options)
-    mapped = one.map(SAMPLES // 2).map(2, "thread")
-    arrays = [
-        np.stack([start[name] for name in model.state]),
-        np.stack([commands[name] for name in model.commands]),
-        np.stack([environment[name] for name in model.environment]),
-        np.tile(np.array(list(vessel.parameters.values()))[:, None], (1, SAMPLES)),
-    ]
-    return lambda: np.array(mapped(*arrays))
+    x, c, e = ca.SX.sym("x", 6), ca.SX.sym("c", 4), ca.SX.sym("e", 2)
+    rates = model.rates(x, ca.SX(0, 1), c, e, ca.SX(list(vessel.parameters.values())), ca.SX.zeros(3))
+    one = ca.Function("step", [x, c, e], [x + rates])
+    start, held, wind = ca.MX.sym("x", 6), ca.MX.sym("c", 4), ca.MX.sym("e", 2)
+    path = one.mapaccum(STEPS)(start, ca.repmat(held, 1, STEPS), ca.repmat(wind, 1, STEPS))
+    last = ca.Function("last", [start, held, wind], [path[:, -1]], options)
+    mapped = last.map(SAMPLES // 2).map(2, "thread")
+    return lambda: np.array(mapped(state, commands, environment))

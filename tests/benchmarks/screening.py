@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+from shipid.engine.engines import REPEATED
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain
 from shipid.study.screen import families, joined, screen
@@ -25,8 +26,10 @@ def run(members: int = MEMBERS) -> dict[str, Any]:
     plan = read_plan(STUDY)
     wanted = families(plan, FAMILY)
     few, begun, few_busy, _ = _timed(plan, wanted, members // 10)
+    _, _, few_single, _ = _timed(plan, wanted, members // 10, "single")
     few_memory = _memory()
     many, _, busy, frame = _timed(plan, wanted, members)
+    _, _, busy_single, _ = _timed(plan, wanted, members, "single")
     more = members - members // 10
     each = (many - few) / more
     return {
@@ -35,17 +38,18 @@ def run(members: int = MEMBERS) -> dict[str, Any]:
         f"{members} members [s]": round(many, 2),
         "each further member [ms]": round(1e3 * each, 2),
         "each further member, of all threads [ms]": round(1e3 * (busy - few_busy) / more, 2),
+        "single / double precision, each further member": round((busy_single - few_single) / (busy - few_busy), 2),
         f"{ALL} members, from these [s]": round(many + each * (ALL - members), 1),
         f"memory at {members // 10} / {members} members [MB]": f"{few_memory:.0f} / {_memory():.0f}",
         "A, median [m]": round(float(frame["A"].median()), 3),
     }
 
 
-def _timed(plan: Any, wanted: Any, members: int) -> tuple[float, float, float, pd.DataFrame]:
+def _timed(plan: Any, wanted: Any, members: int, engine: str = REPEATED) -> tuple[float, float, float, pd.DataFrame]:
     """Wall time of all blocks and of the first, time that all threads were busy, and the rows."""
     start, busy = time.perf_counter(), time.process_time()
     blocks, begun = [], 0.0
-    for block in screen(plan, obtain(plan), wanted, members):
+    for block in screen(plan, obtain(plan), wanted, members, engine=engine):
         begun = begun or time.perf_counter() - start
         blocks.append(block)
     return time.perf_counter() - start, begun, time.process_time() - busy, joined(blocks)

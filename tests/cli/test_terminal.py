@@ -60,7 +60,7 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == [
         "2 of 2 cells to do",
-        "... a[b]-N0004-s0: trial 1/50, best so far 0.5 m rms (2 searches go on)",
+        "... a[b]-N0004-s0: trial 1/50, best so far 0.5 m rms (2 searches are running)",
     ]
     screen = io.StringIO()
     made = rich.console.Console

@@ -69,7 +69,7 @@ def compiled() -> bytes:
     assert command is not None
     with TemporaryDirectory() as folder:
         library = Path(folder) / "model.so"
-        assert build(native._command(command, Target(1, (), "")), SOURCE, library) is None
+        assert build(native._command(command, Target(1)), SOURCE, library) is None
         return library.read_bytes()
 
 

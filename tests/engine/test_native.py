@@ -15,8 +15,9 @@ import pytest
 
 from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
-from shipid.engine.native import Target, compiler, run_native, target
+from shipid.engine.native import compiler, run_native, target
 from shipid.engine.rollout import distances, rollout
+from shipid.engine.vectors import Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
@@ -53,7 +54,7 @@ def own_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step of 1 s from rates that are the operations; with vector functions, and without."""
     if wanted != "here":
-        monkeypatch.setattr(native, "target", lambda: Target(2, (), ""))
+        monkeypatch.setattr(native, "target", lambda *_: Target(2))
     x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
     values, model = operations(x[0], x[1], p[0] / 4e5), dynamics(SHIP)
     sizes = [("memory", 0), ("commands", 4), ("environment", 2)]
@@ -113,7 +114,7 @@ def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inp
 
 @pytest.mark.usefixtures("own_cache")
 def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
-    monkeypatch.setattr(native, "target", lambda: replace(target(), flags=("-mno-such-processor",)))
+    monkeypatch.setattr(native, "target", lambda *_: replace(target(), flags=("-mno-such-processor",)))
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
     assert "\n" not in str(caught.value)
@@ -176,6 +177,25 @@ def test_distances_are_those_of_the_paths(count: int, num_variants: int, draw_in
         np.testing.assert_allclose(found.total, [own.sum(axis=0) for own in expected], rtol=1e-12)
         np.testing.assert_array_equal(found.tally, [tally(own) for own in expected])
         assert not found.diverged.any()
+
+
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "esso-190k"])
+def test_single_precision_follows_double(name: str, draw_inputs: Callable[..., Any]) -> None:
+    """Paths from the origin to a part in ten thousand, distances to a part in a hundred thousand."""
+    vessel = load_vessel(name)
+    given = {**draw_inputs(vessel, 37), "step": 1.0}
+    given["start"] = {**given["start"], "north": np.zeros(37), "east": np.zeros(37)}
+    double, single = (rollout(vessel, **given, num_steps=20, engine=engine) for engine in ("native", "single"))
+    path = double.states[:, 0, :, :2]
+    far = np.abs(path).max()
+    assert single.states.dtype == float
+    assert np.abs(single.states[:, 0, :, :2] - path).max() < 1e-4 * far
+    goal = path[1:] + 0.1 * far
+    exact, near = (distances(vessel, **given, goal=goal, engine=engine) for engine in ("native", "single"))
+    np.testing.assert_allclose(near.total, exact.total, rtol=1e-4)
+    np.testing.assert_allclose(near.total.sum(), exact.total.sum(), rtol=1e-5)
+    assert near.tally.sum() == exact.tally.sum() == 20 * 37
+    assert np.array_equal(near.diverged, exact.diverged)
 
 
 def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any]) -> None:

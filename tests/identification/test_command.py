@@ -67,7 +67,7 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
 MISTAKES = {
     "unknown path": (["--parameters", "hull.derivatives.N_urr"], "selects nothing: did you mean"),
     "nothing to identify": ([], "identify.parameters: missing"),
-    "all fixed": (["--parameters", ONE, "--fixed", "hull.*"], "nothing is left"),
+    "all fixed": (["--parameters", ONE, "--fixed", "hull.*"], "is also fixed"),
     "tied to what is fixed": (["--parameters", ONE, "--together", f"{ONE},inertia.m"], "tied but not free"),
     "unknown run": (["--parameters", ONE, "--runs", "M011"], "is no run: did you mean"),
     "no test run": (["--parameters", ONE, "--test", "ZZ*"], "'ZZ*' is no run: valid: M01"),
@@ -79,7 +79,7 @@ MISTAKES = {
     "endless free run": (["--parameters", ONE, "--ahead", "inf"], "must hold two steps"),
     "prior without width": (["--parameters", ONE, "--prior", "hull.*"], "--prior: 'hull.*': write paths=0.3"),
     "prior of no number": (["--parameters", ONE, "--prior", "hull.*=wide"], "write paths=0.3"),
-    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "runs backwards"),
+    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "low above high"),
     "unknown nuisance": (["--parameters", ONE, "--nuisance", "currents"], "did you mean 'current'?"),
     "unknown key": (["--parameters", ONE, "--set", "horizn=3"], "unknown key: did you mean 'horizon'?"),
     "profile of what is not free": (["--parameters", ONE, "--profile", "inertia.m"], "is not free in the fit"),

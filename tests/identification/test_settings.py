@@ -18,8 +18,8 @@ MASS, YAW = "inertia.m", "hull.derivatives.N_ur"
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"weights": {"speed": 0.1}}, "weights.speed is none"),
-        ({"nuisance": ["wind"]}, "nuisance.wind is none"),
+        ({"weights": {"speed": 0.1}}, "weights.speed is no valid name"),
+        ({"nuisance": ["wind"]}, "nuisance.wind is no valid name"),
         ({"bounds": {MASS: (2.0, 1.0)}}, "give \\[low, high\\]"),
         ({"horizon": 1.5}, "must hold two steps of 1 s"),
     ],
@@ -64,7 +64,7 @@ def test_tied_paths_share_one_factor() -> None:
 def test_overrides_belong_to_one_run() -> None:
     settings = Identify(parameters=[YAW], runs={"a": {"inertia": {"m": 7e5}, "environment": {"V_w": 3}}})
     assert overrides(settings, ["a", "b"], SHIP, ["V_w"]) == {"a": {MASS: 7e5, "environment.V_w": 3.0}, "b": {}}
-    with pytest.raises(DocumentError, match="begins with no run of the data"):
+    with pytest.raises(DocumentError, match="does not begin with the name of a run"):
         overrides(settings, ["b"], SHIP, ["V_w"])
-    with pytest.raises(DocumentError, match="nothing to set"):
+    with pytest.raises(DocumentError, match="cannot be set for a run"):
         overrides(settings, ["a"], SHIP, [])

@@ -63,7 +63,7 @@ AGAINST_LOG = {
     "segment_outside_log": ("segment.1", "is not in the log, 0 to 20 s"),
     "wrong_names": ("format.names", "2 names for the 8 columns"),
     "other_file": ("source.sha256", "fetch that file"),
-    "skips_everything": ("format.skip_rows", "nothing is left after 100 skipped lines"),
+    "skips_everything": ("format.skip_rows", "no line is left after 100 skipped lines"),
 }
 
 

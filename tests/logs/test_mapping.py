@@ -89,7 +89,7 @@ def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
             "estimate",
             "nothing to estimate",
         ),
-        ("[origin]\nlatitude = 63.0\nlongitude = 10.0\n", None, "origin", "belongs to latitude and longitude"),
+        ("[origin]\nlatitude = 63.0\nlongitude = 10.0\n", None, "origin", "is used with latitude and longitude only"),
         ('[[repair]]\nkind = "polish"\n', None, "repair.0", "unknown kind 'polish'"),
         ('[repair]\nkind = "scale"\n', None, "repair", r"write \[\[repair\]\]"),
         ('[[segment]]\nrun = "a"\nstart = 5.0\nend = 2.0\n', None, "segment.0", "must lie before"),

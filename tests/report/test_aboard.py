@@ -26,7 +26,7 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
     track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
     said = ["10 predictions in 1 run, 5 s ahead; 0 rows before there was a past", "alarm: at 4 of 10 instants"]
     return AboardContent(
-        title="played", name="cell", said=[*said, "latency: 10 ms"], instants=instants, points=points, track=track
+        title="played", name="cell", lines=[*said, "latency: 10 ms"], instants=instants, points=points, track=track
     )
 
 

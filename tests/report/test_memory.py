@@ -58,14 +58,14 @@ def little(past: ReportContent) -> ReportContent:
 
 def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent) -> None:
     past, text = little, render(little)
-    assert "What the past tells" in text
+    assert "What the past shows" in text
     assert NASTY not in text
     section = next(one for one in drawn(SECTIONS, past) if one.id == "the-past")
     assert [item.id for item in section.items] == list(SECTIONS["the-past"].anchors)
 
 
 def test_a_study_without_a_past_has_no_such_section(little: ReportContent) -> None:
-    assert "What the past tells" not in render(replace(little, frames={}))
+    assert "What the past shows" not in render(replace(little, frames={}))
 
 
 def test_an_observer_alone_is_shown(past: ReportContent) -> None:

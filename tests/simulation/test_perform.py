@@ -174,7 +174,7 @@ def test_variants_keep_to_their_own_numbers() -> None:
 @pytest.mark.parametrize(
     ("manoeuvres", "how", "said"),
     [
-        ([], {}, "there is no manoeuvre"),
+        ([], {}, "no manoeuvre is given"),
         ([CIRCLE], {"interval": 0.25}, "interval 0.25 s must be a multiple of step 0.1 s"),
         ([CIRCLE], {"interval": 0.01}, "must be a multiple"),
         ([CIRCLE.model_copy(update={"name": "a"})] * 2, {}, "two runs are named 'a'"),

@@ -120,10 +120,10 @@ def test_how_good_physics_must_be(made: Any) -> None:
     assert "; with 30 runs the test cannot tell any of 5 physics models from no physics." in said
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics pays even with an error of 16.0 m of its own, the worst tried; with 30" in said
+    assert "With 10 runs physics pays even with an error A of 16.0 m, the worst tried; with 30" in said
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
     said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics does not pay even with an error of 1.00 m of its own, the best tried" in said
+    assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in said
 
 
 def test_what_cannot_be_told_is_said_once(made: Any) -> None:

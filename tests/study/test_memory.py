@@ -1,4 +1,4 @@
-"""What the past tells: pairs, intervals over test runs, and the frames of a small study with memory and observer."""
+"""What the past shows: pairs, intervals over test runs, and the frames of a small study with memory and observer."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ BROKEN = {
     "extends-a-patch": ("extends", "extend a vessel"),
     "extends-and-base": ("extends", "valid: base, base_digest"),
     "waves-without-table": ("waves.first_order.table", "missing"),
-    "waves-table-missing": ("waves.first_order.table", "gone.csv: no such file, looked for beside the vessel"),
+    "waves-table-missing": ("waves.first_order.table", "gone.csv: no such file in the folder of the vessel"),
     "waves-table-empty": ("waves.first_order.table", "words.csv: not a CSV table with a header"),
     "waves-table-without-a-column": ("waves.first_order.table", "has no column 'K_imag'"),
     "waves-with-columns-missing": ("waves.drift.table", "has no column 'X_drift'"),

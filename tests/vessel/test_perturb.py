@@ -206,7 +206,7 @@ def test_setting_an_unknown_path_is_refused(base: Vessel) -> None:
 
 @pytest.mark.parametrize("block", [{"remove": ["inertia.m"]}, {"parameters": ["inertia.I_z"], "factor": -1.0}])
 def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, Any]) -> None:
-    with pytest.raises(DocumentError, match="would be no vessel: inertia") as caught:
+    with pytest.raises(DocumentError, match="would not be a valid vessel: inertia") as caught:
         draw(family(block), 0, base, file="study.toml")
     assert caught.value.file == "study.toml"
 
@@ -214,10 +214,10 @@ def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, An
 @pytest.mark.parametrize(
     ("block", "remedy"),
     [
-        ({"parameters": ["inertia.m"]}, "go together"),
-        ({"factor": 1.1}, "go together"),
-        ({}, "says nothing"),
-        ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "runs backwards"),
+        ({"parameters": ["inertia.m"]}, "are needed together"),
+        ({"factor": 1.1}, "are needed together"),
+        ({}, "has no rule"),
+        ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "low above high"),
         ({"parameters": ["inertia.m"], "factor": (0.5, float("nan"))}, "finite"),
         ({"parameters": ["inertia.m"], "factor": 1.1, "factors": 2}, "Extra inputs"),
     ],

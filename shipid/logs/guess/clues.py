@@ -69,7 +69,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Question:
-    """What the log cannot decide and a person must answer: the columns of the dataset concerned, and the question."""
+    """A question that the log cannot decide: columns of the dataset concerned, and its text for a person."""
 
     about: tuple[str, ...]
     sentence: str
@@ -78,7 +78,7 @@ class Question:
 def unit_said(name: str, si: str) -> str | None:
     """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
 
-    A unit stands in brackets, or is the last part of a name or its last two.
+    A unit is in brackets, or it is the last part or the last two parts of a name.
     """
     inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
     bare = re.sub(r"[\[(].*", "", name).strip()

@@ -84,7 +84,7 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     )
     state.taken.update(numbering)
     if len(state.chosen.first) < 5:
-        raise DataError(f"{len(sniffed.t)} rows: too few for a guess", file=source.path)
+        raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
     choose_pose(state, source.path)
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
         choose_yaw_rate(state, 0.05)

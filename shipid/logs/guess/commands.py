@@ -135,8 +135,8 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
     """Return unit, confidence, reason and further keys of a shaft speed.
 
-    The way of the ship in one turn of the shaft, against the radius of her turns, tells revolutions per second from
-    those per minute; nothing tells per cent from either.
+    The distance of the ship in one turn of the shaft, relative to the radius of her turns, separates revolutions per
+    second from revolutions per minute. Nothing separates per cent from either.
     """
     values = state.columns[name]
     top = float(np.abs(values).max())

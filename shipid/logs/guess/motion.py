@@ -99,8 +99,8 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
 def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
     """Return the hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn.
 
-    The position may be of another point than the velocities, which looks like a sway speed. Where the track cannot
-    tell, v r < 0 decides: a ship drifts out of her turn. If they contradict, it is asked.
+    The position may be of another point than the velocities, which looks like a sway speed. Where the track is
+    no evidence, v r < 0 decides: a ship drifts out of her turn. If the two contradict, the draft asks.
     """
     assert state.psi is not None
     if best.frame == "earth":
@@ -332,15 +332,15 @@ def _rates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, s
 
     change : of the heading over the windows [rad], (W,). The distance from the unit is relative.
     """
-    found = []
+    rates = []
     for name in names:
         fit = evidence.fit(change, state.chosen.change(evidence.integral(state.t, state.columns[name])))
         scale = max(abs(fit.scale), 1e-12)
         unit, factor = min(UNITS["rad/s"].items(), key=lambda entry: abs(np.log(scale / entry[1])))
         off = abs(scale / factor - 1)
         if fit.left < 0.5 and off < 0.35:
-            found.append((fit, name, unit, off))
-    return sorted(found, key=lambda entry: entry[0].left)
+            rates.append((fit, name, unit, off))
+    return sorted(rates, key=lambda entry: entry[0].left)
 
 
 def _rate_by_name(state: State) -> None:

@@ -151,22 +151,20 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
     angles = list(rated) if rated and state.numbered else free
     wide = [(a, b, False, 0.3) for i, a in enumerate(places) for b in places[i + 1 :]]
     wide += [(a, b, True, 0.3) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
-    found = _best(
-        state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None
-    )
-    if found is None or (found.misfit > POOR and places is not free):
+    best = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
+    if best is None or (best.misfit > POOR and places is not free):
         wide = [(a, b, False, 0.3) for i, a in enumerate(free) for b in free[i + 1 :]]
-        found = _best(state, wide, free, 150)
-    if found is not None and state.numbered:
-        rivals = [name for name in angles if name not in (found.north, found.east, found.heading)]
-        other = _best(state, [(found.north, found.east, found.on_globe, 0.3)], rivals, 150)
-        close = other is not None and other.misfit < 2 * found.misfit + 0.02
-        if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(found.heading, 1.0) + 1e-3:
+        best = _best(state, wide, free, 150)
+    if best is not None and state.numbered:
+        rivals = [name for name in angles if name not in (best.north, best.east, best.heading)]
+        other = _best(state, [(best.north, best.east, best.on_globe, 0.3)], rivals, 150)
+        close = other is not None and other.misfit < 2 * best.misfit + 0.02
+        if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(best.heading, 1.0) + 1e-3:
             state.ask(
                 ("psi", "u", "v", "speed", "course"),
-                f"is {found.heading!r} the heading and {other.heading!r} the course, or the other way?",
+                f"is {best.heading!r} the heading and {other.heading!r} the course, or the other way?",
             )
-    return found
+    return best
 
 
 def _may_be_globe(state: State, north: str, east: str) -> bool:

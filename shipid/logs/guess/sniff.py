@@ -213,9 +213,9 @@ def _distinct(names: list[str]) -> list[str]:
 
 def _is_units(row: list[str]) -> bool:
     """Whether the cells of a line are units."""
-    said = [cell.lower() for cell in row if cell]
-    fitting = sum(bool(_UNIT.match(cell)) for cell in said)
-    return len(said) >= 2 and fitting >= 0.7 * len(said)
+    words = [cell.lower() for cell in row if cell]
+    fitting = sum(bool(_UNIT.match(cell)) for cell in words)
+    return len(words) >= 2 and fitting >= 0.7 * len(words)
 
 
 def cells(line: str, separator: str) -> list[str]:
@@ -225,10 +225,10 @@ def cells(line: str, separator: str) -> list[str]:
 
 def _number_share(row: list[str], decimal: str) -> float:
     """Return the share of cells that are numbers; empty cells are not counted."""
-    said = [
+    cells = [
         cell.replace(",", ".") if decimal == "," else cell for cell in row if cell.lower() not in _WORDS_FOR_NOTHING
     ]
-    return sum(map(_is_number, said)) / len(said) if said else 0.0
+    return sum(map(_is_number, cells)) / len(cells) if cells else 0.0
 
 
 def _is_number(cell: str) -> bool:
@@ -250,8 +250,8 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
             column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")
         values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
         values[np.isinf(values)] = np.nan
-        said = table.iloc[:, index].dropna().astype(str).str.strip()
-        if np.isnan(values).all() and said.ne("").any():
+        texts = table.iloc[:, index].dropna().astype(str).str.strip()
+        if np.isnan(values).all() and texts.ne("").any():
             words.append(name)
         elif name and name not in columns:
             columns[name] = values
@@ -267,11 +267,11 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     for name in sorted(texts, key=lambda name: not _is_clock(name)):
         column = _called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
-        beside = _dates(table, texts) if len(of_day) and of_day.all() else None
-        if beside is not None:
-            with_date = seconds(dated(_called(table, beside), column))
+        dates = _dates(table, texts) if len(of_day) and of_day.all() else None
+        if dates is not None:
+            with_date = seconds(dated(_called(table, dates), column))
             if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
-                return {"from": name, "unit": "date", "date": beside}, with_date
+                return {"from": name, "unit": "date", "date": dates}, with_date
         since = seconds(column) if _is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         if not np.isfinite(since).all():
             called += [name] if _is_clock(name) else []
@@ -296,8 +296,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     if rising:
         factor, unit = _unit_of_clock(rising[0], finite[rising[0]])
         return {"from": rising[0], "unit": unit}, np.asarray(factor * finite[rising[0]], dtype=np.float64)
-    said = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
-    raise DataError(f"no column can be the clock: {said}", file=file)
+    fault = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
+    raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
 def _called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
@@ -308,8 +308,8 @@ def _called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
 def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
     """Return the first of these columns that holds a date in every row, without a time."""
     for name in names:
-        said = _called(table, name).astype(str).str.strip()
-        if said.str.fullmatch(r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}").all():
+        cells = _called(table, name).astype(str).str.strip()
+        if cells.str.fullmatch(r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}").all():
             return name
     return None
 
@@ -320,9 +320,9 @@ def _is_clock(name: str) -> bool:
 
 
 def _looks_dated(column: pd.Series[Any]) -> bool:
-    said = column.dropna().astype(str).head(20)
-    dated = said.str.fullmatch(TIME_OF_DAY + r"|\d{4}-\d\d-\d\d[T ].*|\d\d\.\d\d\.\d{4} .*|\d{4}/\d\d/\d\d .*")
-    return bool(len(said) and dated.all())
+    texts = column.dropna().astype(str).head(20)
+    dated = texts.str.fullmatch(TIME_OF_DAY + r"|\d{4}-\d\d-\d\d[T ].*|\d\d\.\d\d\.\d{4} .*|\d{4}/\d\d/\d\d .*")
+    return bool(len(texts) and dated.all())
 
 
 def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:

@@ -76,11 +76,11 @@ def _pattern(path: Path) -> tuple[Path, str | None]:
         return Path(folder or ("/" if slash else ".")), text[len(folder) + len(slash) :]
     if not path.is_dir():
         return path, None
-    found = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
-    if not found:
+    files = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
+    if not files:
         raise DataError(f"cannot be read: a folder without a log ({', '.join(ENDINGS)})", file=path)
-    ending = Counter(file.suffix for file in found).most_common(1)[0][0]
-    flat = all(file.parent == path for file in found if file.suffix == ending)
+    ending = Counter(file.suffix for file in files).most_common(1)[0][0]
+    flat = all(file.parent == path for file in files if file.suffix == ending)
     return path, f"*{ending}" if flat else f"**/*{ending}"
 
 

@@ -160,7 +160,7 @@ LEAST = 0.45  # share of a name that a phrase explains, before the name counts a
 
 
 def parts_of(name: str) -> tuple[str, ...]:
-    """Return the parts of a name in lower case, without what stands in brackets; accents and Greek are spelt out."""
+    """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", name)
     text = unicodedata.normalize("NFKD", "".join(_LETTERS.get(letter, letter) for letter in bare))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
@@ -234,18 +234,18 @@ def fits(name: str) -> dict[str, float]:
     while len(parts) > 1 and parts[-1] in UNIT_PARTS:
         parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]
-    found: dict[str, float] = {}
+    meanings: dict[str, float] = {}
     for meaning, phrases in _phrases().items():
         best = max((_covered(phrase, parts, content, aside) for phrase in phrases), default=0.0)
         row = SIGNALS.get(meaning)
         if order and row is not None and row.role != "command":
             best = 0.0
         if best >= LEAST:
-            found[meaning] = best
+            meanings[meaning] = best
     for meaning, row in SIGNALS.items():
-        if row.names and meaning not in found and not order and re.fullmatch(row.names, "_".join(parts)):
-            found[meaning] = 0.9
-    return found
+        if row.names and meaning not in meanings and not order and re.fullmatch(row.names, "_".join(parts)):
+            meanings[meaning] = 0.9
+    return meanings
 
 
 def _covered(phrase: tuple[str, ...], parts: list[str], content: list[str], aside: set[str]) -> float:
