@@ -178,7 +178,7 @@ def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
     ("block", "path", "said"),
     [
         ({"parameters": ["hull.derivatives.Q_q"]}, "family.fitted.identify.parameters", "selects nothing"),
-        ({"parameters": PATHS, "fixed": PATHS}, "family.fitted.identify.fixed", "nothing is left"),
+        ({"parameters": PATHS, "fixed": PATHS}, "family.fitted.identify.fixed", "none is left"),
         ({"parameters": PATHS, "weight": {}}, "family.fitted.identify.weight", "weights"),
         ({}, "family.fitted.identify.parameters", "missing"),
     ],
