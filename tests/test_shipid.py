@@ -117,8 +117,8 @@ def test_cells_of_the_documentation_are_read(tiny_run: Path, tmp_path: Path, mon
     monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {}
     text = blocks("python.md")[2]
-    assert '"results/quick-69699190"' in text
-    exec(text.replace('"results/quick-69699190"', repr(str(tiny_run))), space)
+    assert '"results/quick-fa97027d"' in text
+    exec(text.replace('"results/quick-fa97027d"', repr(str(tiny_run))), space)
     assert len(space["cells"]) == 8
 
 
@@ -150,7 +150,7 @@ def test_results_of_the_how_to_become_a_table_and_a_figure(
     tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    exec(blocks("howto.md")[1].replace('"results/quick-69699190"', repr(str(tiny_run))), {})
+    exec(blocks("howto.md")[1].replace('"results/quick-fa97027d"', repr(str(tiny_run))), {})
     assert Path("gain.html").is_file()
 
 

@@ -1,4 +1,4 @@
-"""A tuned cell of the study `quick`: all foundations of a batch together, on one thread."""
+"""A tuned cell of the study `calm`: all foundations of a batch together, on one thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shipid.study.run import run_batch
 
 def run() -> dict[str, Any]:
     """Seconds per cell of each batch, and the mean H over the foundations with physics [m]."""
-    plan = read_plan("quick")
+    plan = read_plan("calm")
     start = time.perf_counter()
     prepared = prepare(plan, obtain(plan))
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}

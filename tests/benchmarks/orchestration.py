@@ -48,7 +48,7 @@ def run() -> dict[str, Any]:
 
 def overhead() -> dict[str, Any]:
     """A study of 1-second cells by `run_study` with live progress, over its preparation and cells on bare processes."""
-    plan = read_plan("quick", KNOWN)
+    plan = read_plan("calm", KNOWN)
     prepared = prepare(plan, obtain(plan))  # compiled once, so that neither way compiles
     preparing = best_of({"prepare": lambda: prepare(plan, obtain(plan))}, rounds=3)["prepare"]
     with _processes(2, plan, prepared) as pool:
@@ -104,7 +104,7 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
 
 def gain() -> dict[str, Any]:
     """Gain of a whole study, truly tuned, from a second worker, over that of a matrix product in two processes."""
-    plan = read_plan("quick", REAL)
+    plan = read_plan("calm", REAL)
     prepare(plan, obtain(plan))
     product = _product_gain()
     one, two = (_study(plan, count)[0] for count in WORKERS)

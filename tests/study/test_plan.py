@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
+from shipid.hybrid.features import Memory
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
@@ -16,15 +18,16 @@ from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 
+ROOT = Path(__file__).parents[2]
+
 
 @pytest.mark.parametrize(
     ("name", "foundations", "alone", "batches"),
     [
-        ("quick", 3 + 2 + 1, 0, 3),
+        ("calm", 3 + 2 + 1, 0, 3),
         ("full-scale", 4 + 1 + 1, 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 0, 10),
         ("simulation-small", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),
-        ("zigzags", 1 + 2 + 1, 0, 3),
     ],
 )
 def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches: int) -> None:
@@ -42,9 +45,42 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
 
 
 def test_every_bundled_study_is_tested() -> None:
-    worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "zigzags"}
-    of_methods = {"methods", "methods-full-scale", "paper-recipe"}
+    worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "calm", "zigzags"}
+    of_methods = {"methods", "methods-full-scale", "paper-recipe", "paper-small"}
     assert set(bundled("studies")) == {"quick", "full-scale", *worlds, *of_methods}
+
+
+@pytest.mark.parametrize("name", ["quick", "full-scale", "zigzags", "constant-orders", "changing-orders"])
+def test_the_default_looks_back_and_loses_no_window_of_a_simulation(name: str) -> None:
+    plan = read_plan(name)
+    judged = next(way.method for way in plan.methods if way.name == plan.judged)
+    assert isinstance(judged, PathDrawn)
+    assert judged.choose
+    assert {"history", "turned", "error"} <= judged.memory.model_fields_set
+    assert plan.past == judged.past == 20.0
+    assert plan.study.truth is None or plan.study.truth.run_up == plan.past
+
+
+def test_the_line_of_the_page_takes_the_memory_alone_away() -> None:
+    line = next(one for one in (ROOT / "docs" / "memory.md").read_text("utf-8").splitlines() if "run quick" in one)
+    changes = tomllib.loads(line.partition("--set '")[2].partition("'")[0])
+    drawn, memory = (plan.methods[0].method for plan in (read_plan("quick", changes), read_plan("quick")))
+    assert memory.model_copy(update={"choose": False, "memory": Memory()}) == drawn
+    assert read_plan("quick", changes).past == read_plan("quick").past
+
+
+def test_the_chain_of_the_paper_is_bundled_small() -> None:
+    """Families of +-60 and +-40 % of symbolic physics, networks trained by PyTorch, trials proposed by TPE."""
+    plan = read_plan("paper-small")
+    (way,) = plan.methods
+    assert isinstance(way.method, PathTrained)
+    assert way.method.memory == Memory()
+    blocks = {family.name: [block.factor for block in family.perturb] for family in plan.study.family}
+    assert blocks == {"nominal": [], "moderate": [(0.4, 1.6)], "high": [(0.6, 1.4)] * 3}
+    full = read_plan("paper-recipe").study
+    assert plan.study.family == full.family
+    assert full.truth is not None
+    assert plan.study.truth == full.truth.model_copy(update={"manoeuvres": 50})
 
 
 def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
@@ -74,11 +110,11 @@ def test_worlds_of_memory_have_every_member_with_and_without_an_observer(name: s
 
 
 def test_the_first_instant_comes_after_the_run_up() -> None:
-    plan = read_plan("zigzags", {"truth.run_up": 12.0})
-    assert plan.past == 12
+    plan = read_plan("zigzags", {"truth.run_up": 32.0})
+    assert plan.past == 32
     windows = all_windows(plan, obtain(plan))
-    assert (windows.t.min(), windows.t.max()) == (12.0, 12.0 + 59.0)
-    assert set(windows.spans.values()) == {(0.0, 12.0 + 59.0 + 15.0)}
+    assert (windows.t.min(), windows.t.max()) == (32.0, 32.0 + 59.0)
+    assert set(windows.spans.values()) == {(0.0, 32.0 + 59.0 + 15.0)}
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
