@@ -72,7 +72,8 @@ def without_workers() -> Iterator[None]:
 
     def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
         for unit in units:
-            yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
+            *_, holder, place = rest
+            yield unit, run._claimed(plan, prepared, unit, "cpu", place / store.JOURNALS, holder)
 
     with patch.object(run, "_compute", compute):
         yield
