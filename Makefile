@@ -11,9 +11,10 @@ export OMP_NUM_THREADS ?= 2
 study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
 	$(BIN)/shipid study run quick
 
-# Tests run in processes of one thread each; `make test WORKERS=4` takes more of them.
+# Tests run in processes of one thread each; `make test WORKERS=4` takes more of them. Compiled files are kept:
+# else every process compiles the package and the tests anew.
 WORKERS ?= 2
-PYTEST  := OMP_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
+PYTEST  := OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 test: $(STAMP)           ## all tests but the slow ones
 	$(PYTEST) -m "not slow"

@@ -156,6 +156,38 @@ def parts(path: str) -> list[str]:
     return [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|([^."]+)', path)]
 
 
+def place_of(entries: list[Any], part: str) -> int:
+    """Place of an entry of a list, by its number or by its name; ValueError where none has the name."""
+    if part.isdecimal():
+        return int(part)
+    return [_name_of(entry) for entry in entries].index(part)
+
+
+def _name_of(entry: Any) -> str | None:
+    """The name of an entry of a list; None where it has none by which it can be found."""
+    name = entry.get("name") if isinstance(entry, Mapping) else None
+    return name if isinstance(name, str) and name and '"' not in name and not name.isdecimal() else None
+
+
+def by_name(document: Any, path: str) -> str:
+    """The path with the names of entries of lists in place of their numbers, where one entry alone has the name.
+
+    `family.1.perturb.0` of a study whose second family is called wrong is `family.wrong.perturb.0`.
+    """
+    shown, value = [], document
+    for part in parts(path):
+        if isinstance(value, list):
+            names = [_name_of(entry) for entry in value]
+            number = int(part) if part.isdecimal() and int(part) < len(value) else None
+            name = None if number is None else names[number]
+            shown.append(name if name is not None and names.count(name) == 1 else part)
+            value = None if number is None else value[number]
+        else:
+            shown.append(part)
+            value = value.get(part) if isinstance(value, Mapping) else None
+    return ".".join(f'"{part}"' if "." in part else part for part in shown)
+
+
 def get(document: Any, path: str) -> Any:
     """Value at a dotted path; KeyError names the part that is missing."""
     value = document
@@ -170,20 +202,23 @@ def get(document: Any, path: str) -> Any:
 
 
 def replace(document: Any, changes: Mapping[str, Any]) -> Any:
-    """A new document with the values at the given dotted paths replaced or added; other parts are shared."""
+    """A new document with the values at the given dotted paths replaced or added; other parts are shared.
+
+    Entries of a list are addressed by number or by name.
+    """
     result = copy.copy(document)
     copied = {id(result)}
     for path, value in changes.items():
         *parents, last = parts(path)
         node = result
         for part in parents:
-            key: Any = int(part) if isinstance(node, list) else part
+            key: Any = place_of(node, part) if isinstance(node, list) else part
             below = node[key] if isinstance(node, list) else node.setdefault(key, {})
             if id(below) not in copied:
                 node[key] = below = copy.copy(below)
                 copied.add(id(below))
             node = below
-        node[int(last) if isinstance(node, list) else last] = value
+        node[place_of(node, last) if isinstance(node, list) else last] = value
     return result
 
 

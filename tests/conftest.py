@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import typer.testing
 from hypothesis import settings
 
+from shipid.data.dataset import Dataset
 from shipid.document import bundled
+from shipid.logs.importing import import_log, read_mapping
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 torch.set_num_threads(1)  # the machine is shared
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+typer.testing._get_command = typer.main.get_command = cache(typer.main.get_command)  # 0.1 s each time otherwise
 
 LAG = {
     "n": {"kind": "first_order", "T": 1.0, "rate": 0.17},
@@ -76,6 +81,15 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("no folder with recorded data: set SHIPID_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def hsva(shared_data: Path) -> Dataset:
+    """The published zigzags of a model of KVLCC2, as their bundled mapping reads them; not to be changed."""
+    folder = shared_data / "kvlcc2_hsva"
+    if not folder.is_dir():
+        pytest.skip(f"no {folder.name} in the folder of recorded data")
+    return import_log(read_mapping("kvlcc2-hsva"), folder)
 
 
 @pytest.fixture(scope="session", params=list(variety()))
@@ -143,3 +157,14 @@ def pytest_configure() -> None:
     """A job in the background of a shell ignores Ctrl-C; tests that raise it need the handler of Python."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What there is before the first test is never garbage: it is not searched again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()

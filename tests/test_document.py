@@ -36,6 +36,28 @@ def test_replace_leaves_the_original_alone() -> None:
     assert NESTED == {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
 
+def test_entries_of_a_list_are_found_by_name() -> None:
+    """Where one entry alone has the name; a number, or a name with dots, is written so that it is read back."""
+    families = [{"name": "high"}, {"name": "a.b", "perturb": [{"factor": [1, 2]}]}, {"name": "7"}, {"members": 3}]
+    study = {"family": families}
+    for path, shown in (
+        ("family.0.perturb", "family.high.perturb"),
+        ("family.1.perturb.0.factor.1", 'family."a.b".perturb.0.factor.1'),
+        ("family.2.name", "family.2.name"),
+        ("family.3.members", "family.3.members"),
+        ("family.9.members", "family.9.members"),
+        ("grid.N_D.0", "grid.N_D.0"),
+    ):
+        assert documents.by_name(study, path) == shown
+    twice = {"family": [{"name": "a"}, {"name": "a"}]}
+    assert documents.by_name(twice, "family.1.name") == "family.1.name"
+    changed = documents.replace(study, {"family.high.members": 2, 'family."a.b".perturb.0.factor': 3})
+    assert changed["family"][0] == {"name": "high", "members": 2}
+    assert changed["family"][1]["perturb"] == [{"factor": 3}]
+    with pytest.raises(ValueError, match="nobody"):
+        documents.replace(study, {"family.nobody.members": 2})
+
+
 @pytest.mark.parametrize(
     ("pattern", "found"),
     [

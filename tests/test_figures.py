@@ -13,7 +13,7 @@ import pytest
 from shipid import figures
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
-from shipid.report.standalone import FIGURES
+from shipid.report.standalone import FIGURES, _colours
 from shipid.study.contents import report_content
 from shipid.study.results import read_results
 from tests.report import test_checks, test_identification, test_manoeuvre
@@ -34,11 +34,19 @@ def test_every_figure_of_the_report_has_a_function() -> None:
     assert set(figures.__all__) == {*FIGURES, "prediction"}
 
 
+def test_every_colour_of_dark_is_one_of_light() -> None:
+    """So a figure that can be drawn in dark can be drawn in light."""
+    light, dark = (_colours(dark) for dark in (False, True))
+    assert dark.keys() <= light.keys()
+    assert not any("var(" in light[name] for name in dark)
+    assert light["--ink"] != dark["--ink"]
+
+
 @pytest.mark.parametrize("name", figures.__all__)
-@pytest.mark.parametrize("dark", [False, True])
-def test_a_plain_plotly_figure(name: str, dark: bool, content: ReportContent) -> None:
+def test_a_plain_plotly_figure(name: str, content: ReportContent) -> None:
     """It has data, a title, units at its axes, and no name of a colour that only the page knows."""
-    made = getattr(figures, name)(OTHERS[name]() if name in OTHERS else content, dark=dark)
+    made = getattr(figures, name)(OTHERS[name]() if name in OTHERS else content, dark=True)
+    assert made.layout.paper_bgcolor == _colours(True)["--page"]
     assert isinstance(made, go.Figure)
     assert len(made.data) > 0
     assert made.layout.title.text

@@ -273,7 +273,7 @@ def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
 def test_without_the_rule_a_study_names_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"unknown key: .*factor") as caught:
         shifted(tmp_path, {"shift": 0.5})
-    assert caught.value.path == "family.0.perturb.0.shift"
+    assert caught.value.path == "family.wrong.perturb.0.shift"
 
 
 def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,4 +289,4 @@ def test_a_rule_refuses_a_value_at_its_own_key(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
     with pytest.raises(DocumentError) as caught:
         shifted(tmp_path, {"shift": "far"})
-    assert str(caught.value.path).startswith("family.0.perturb.0.shift")
+    assert str(caught.value.path).startswith("family.wrong.perturb.0.shift")

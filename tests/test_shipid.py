@@ -19,7 +19,7 @@ import pytest
 import shipid
 from shipid.document import bundled_folder
 from shipid.errors import ShipidError
-from tests.study.tiny import TINY
+from tests.study.tiny import TINY, without_workers
 
 ROOT = Path(__file__).parents[1]
 
@@ -107,7 +107,8 @@ def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest
     study = blocks("python.md")[1]
     assert '"quick"' in study
     space: dict[str, Any] = {"__name__": "__main__", "shipid": shipid}
-    exec(study.replace('"quick"', repr(str(TINY))).replace("[10]", "[4]"), space)
+    with without_workers():
+        exec(study.replace('"quick"', repr(str(TINY))).replace("[10]", "[4]"), space)
     assert set(space["results"].cells["N_D"]) == {4}
     assert Path("results/mine/report.html").is_file()
     assert Path("gain.html").is_file()

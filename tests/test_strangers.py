@@ -27,6 +27,7 @@ def test_a_seed_makes_one_ship(ship: Stranger) -> None:
     assert len(ship.dataset.runs) == 4
 
 
+@pytest.mark.slow
 def test_its_first_guess_is_judged_by_its_log(ship: Stranger) -> None:
     """What people know is enough for a vessel that takes the log's commands, and a wrong one is never passed over."""
     known = ship.known

@@ -104,7 +104,8 @@ def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) 
     answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)
     notes = [f"note: {note}" for note in guessed.sniffed.notes]
     answer.say("\n".join(notes), notes=guessed.sniffed.notes)
-    answer.say(f"not used: {', '.join(map(repr, guessed.unused))}" if guessed.unused else "", unused=guessed.unused)
+    unused = [{"not used": name, "because": why} for name, why in guessed.unused.items()]
+    answer.rows("unused", unused, table(["not used", "because"], guessed.unused.items()) if unused else None)
     questions = [question.sentence for question in guessed.questions]
     answer.say("\n".join(f"? {question}" for question in questions), questions=questions)
     answer.say(f"draft -> {file}: read it before you import with it", file=file)

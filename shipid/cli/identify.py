@@ -69,7 +69,10 @@ def identify(
             "between, or all"
         ),
     ] = None,
-    folds: Annotated[int, typer.Option(help="of --structures: parts of the runs, each held out in turn")] = 3,
+    folds: Annotated[
+        int | None,
+        typer.Option(help="of --structures: parts of the runs, each held out in turn", show_default="3"),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -89,6 +92,8 @@ def identify(
     from shipid.identification.outcome import check, read_settings, run_identification, write_patch
     from shipid.vessel.load import load_vessel
 
+    if structures is None and folds is not None:
+        raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
     file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     check_new(file, "vessel" if structures else "patch")
     if html is not None and html.suffix != ".html":
@@ -114,7 +119,8 @@ def identify(
     with answering(as_json) as answer:
         _look(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            how = {"runs": runs or (), "held_out": test or (), "ahead": ahead, "folds": folds}
+            how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
+            how |= {} if folds is None else {"folds": folds}
             _compare(ship, log, declared, structures, how, band, file, html, dataset, answer)
             return
         try:

@@ -15,19 +15,59 @@ from shipid.errors import DocumentError, ShipidError
 
 
 def simulate(
-    study: Annotated[
+    name: Annotated[
         str,
         typer.Argument(
-            help="bundled name or path of a study with a \\[truth]", autocompletion=bundled_or_file("studies")
+            metavar="STUDY|VESSEL",
+            help="bundled name or path of a study with a \\[truth]; with --manoeuvres of a vessel",
+            autocompletion=bundled_or_file("studies"),
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Parquet file to write; default: <study>.parquet in this folder")
+        Path | None,
+        typer.Option(help="Parquet file to write, of a vessel also CSV; default: <study>.parquet, <vessel>.csv"),
+    ] = None,
+    manoeuvres: Annotated[
+        str | None,
+        typer.Option(
+            help="runs of a vessel: bundled study or TOML file with a \\[truth], or with \\[\\[manoeuvre]] blocks"
+        ),
     ] = None,
     changes: Changes = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the truth of a study into a dataset, and show its envelope beside the published one."""
+    """Simulate the truth of a study, or a vessel with manoeuvres drawn or given, into a log."""
+    if manoeuvres is None:
+        _simulate_truth(name, out, changes, as_json)
+    elif changes:
+        raise ShipidError("changes a study: write the document of manoeuvres as it is meant", path="--set")
+    else:
+        _simulate_vessel(name, manoeuvres, out or Path(f"{stem(name)}.csv"), as_json)
+
+
+def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
+    """A log of a vessel: manoeuvres by a document."""
+    from shipid.data.dataset import Dataset, write_dataset
+    from shipid.files import check_table, write_table
+    from shipid.simulation.scripted import simulated
+    from shipid.vessel.load import load_vessel
+
+    check_table(out)
+    ship = load_vessel(vessel)
+    dataset = Dataset(
+        simulated(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
+    )
+    if out.suffix == ".parquet":
+        write_dataset(dataset, out)
+    else:
+        write_table(out, dataset.frame)
+    with answering(as_json) as answer:
+        counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
+        answer.say(f"{ship.name}: {counts['runs']} runs, {counts['rows']} rows -> {out}", file=out, **counts)
+
+
+def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
+    """The dataset of a study, and its envelope beside the published one."""
     from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope, envelope_table
     from shipid.study.plan import read_plan

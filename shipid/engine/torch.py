@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import torch._inductor
-from torch.fx.experimental.proxy_tensor import make_fx
 
 from shipid.engine.adjoint import Adjoint, Loss, checked_loss
 from shipid.engine.integrate import Batch, Job, Method, integrate
@@ -119,7 +117,10 @@ def _compiled(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> C
     """
     key = (function, tuple(tuple(tensor.shape) for tensor in inputs), inputs[0].device)
     if key not in kernels:
-        kernels[key] = torch._inductor.compile(make_fx(function)(*inputs), list(inputs))
+        from torch._inductor import compile as kernel_of  # two seconds, which an eager rollout need not wait
+        from torch.fx.experimental.proxy_tensor import make_fx
+
+        kernels[key] = kernel_of(make_fx(function)(*inputs), list(inputs))
     return kernels[key]
 
 

@@ -1,16 +1,17 @@
 """Journals of searches: the trials of a unit of work in a file, which Optuna and its dashboard open.
 
-There is one Optuna study for each cell. A process that works on a unit is alone in its journal; `merge` makes one file
-of those of a run. A trial is written when it has ended, in one line: a search has no trial that
-is half done, and the order of the lines is the order of the trials. A line that a killed process left behind half
-written is cut off by the next one that writes.
+There is one Optuna study for each cell. A process that works on a unit is alone in its journal: before it writes it
+looks whether it still is, and of trials that two have written all the same each number counts once. `merge` makes one
+file of those of a run. A trial is written when it has ended, in one line: a search has no trial that is half done, and
+the order of the lines is the order of the trials. A line that a killed process left behind half written is cut off by
+the next one that writes.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import nan
 from pathlib import Path
@@ -28,7 +29,7 @@ from shipid.files import whole
 from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
-FIXED = "fixed"  # attribute of a trial: settings that are not searched
+FIXED, NUMBER = "fixed", "number"  # attributes of a trial: settings that are not searched, its place in the search
 
 
 class Journal:
@@ -37,11 +38,12 @@ class Journal:
     Parameters
     ----------
     file : the journal; made where there is none. ResultError where it is not one.
+    check : called before each write; what it raises, where this process may not write any more, ends the search.
     """
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, check: Callable[[], object] = lambda: None) -> None:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
-        self._file = _Lines(str(file))
+        self._file = _Lines(str(file), check)
         try:
             self._storage = JournalStorage(self._file)
         except (ValueError, KeyError, TypeError, AttributeError):
@@ -52,8 +54,13 @@ class Journal:
     def rows(self, cell: str) -> list[Row]:
         """Return the trials of a search that ended, in order."""
         trials = self._study(cell).trials if cell in self._known else []
-        mine = [trial for trial in trials if FIXED in trial.user_attrs]  # none that someone else has put in
-        return [_row(number, trial) for number, trial in enumerate(mine)]
+        found: list[Row] = []
+        for trial in trials:
+            if FIXED not in trial.user_attrs:  # someone else has put it in
+                continue
+            if trial.user_attrs.get(NUMBER, len(found)) == len(found):
+                found.append(_row(len(found), trial))
+        return found
 
     def count(self, cell: str) -> int | None:
         """Return how many trials a search by budget was found to have."""
@@ -76,7 +83,7 @@ class Journal:
         if cell in self._known:
             return optuna.load_study(study_name=cell, storage=self._storage)
         self._known.add(cell)
-        return optuna.create_study(study_name=cell, storage=self._storage, direction="minimize")
+        return optuna.create_study(study_name=cell, storage=self._storage, direction="minimize", load_if_exists=True)
 
 
 def distributions(space: Space) -> dict[str, BaseDistribution]:
@@ -102,7 +109,7 @@ def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
         value=row["value"] if complete else None,
         params=searched,
         distributions={name: _holding(where[name], value) for name, value in searched.items()},
-        user_attrs={"seconds": row["seconds"], "epochs": row["epochs"], FIXED: fixed},
+        user_attrs={"seconds": row["seconds"], "epochs": row["epochs"], FIXED: fixed, NUMBER: row["number"]},
     )
 
 
@@ -157,15 +164,16 @@ def _moved(log: dict[str, Any], studies: int, trials: int) -> dict[str, Any]:
 class _Lines(JournalFileBackend):
     """The file of a journal: what a killed process left half written is cut off by the next one that writes."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, check: Callable[[], object]) -> None:
         super().__init__(file)
-        self._path = file
+        self._path, self._check = file, check
         self._stream: IO[bytes] | None = None
 
     @contextmanager
     def together(self) -> Iterator[None]:
         """Write the entries of this block with the file locked once; the disk is waited for at the end."""
         with open(self._path, "r+b") as stream, _alone(stream, self._path):
+            self._check()
             end = _last_whole(stream)
             stream.truncate(end)
             stream.seek(end)

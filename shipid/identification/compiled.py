@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.engine.integrate import cores, integrate
-from shipid.engine.native import C, Target, compiled, head, target
+from shipid.engine.native import C, compiled, target
 from shipid.engine.printing import Printed, print_function
+from shipid.engine.vectors import Target, head
 from shipid.identification.sensitivities import Layout, Variation, variation
 
 Array = NDArray[np.float64]

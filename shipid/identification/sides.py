@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.special import stdtr
 
 from shipid.data.dataset import Dataset
 from shipid.identification.free_run import MEASURED
@@ -27,14 +28,15 @@ LEVELS = (2.5, 7.5, 12.5, 17.5, 22.5, 27.5, 32.5)  # deg, between levels of helm
 TURNING = 0.1  # of the greatest yaw rate: slower rows turn to no side
 WORSE, LEAST = 2.0, 0.05  # a side is worse from this ratio of errors on, and from this error of the turning on
 FEWEST = 20  # rows that make a group
-SURE = 2.0  # standard errors of the difference of the sides
-COLUMNS = ("group", "side", "rows", "u", "v", "r", "turning", "error")
+LEVEL = 0.05  # chance that any of the tests made finds a difference where there is none
+COLUMNS = ("group", "side", "rows", "u", "v", "r", "r_error", "turning", "error", "pieces")
 
 
 def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
-    u, v [m/s], r [rad/s]. turning, error : relative error of the change of heading [1], its standard error.
+    u, v [m/s], r, its standard error r_error [rad/s]. turning, error : relative error of the change of heading [1], its
+    standard error. pieces : free runs with rows of the group, of which both are.
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
             "side": side,
             "rows": int(mask.sum()),
             **{name: float(np.sqrt((values[mask] ** 2).mean())) for name, values in away.items()},
-            **(_turned(away["r"][mask], r[mask], pieces[mask]) if side else {"turning": np.nan, "error": np.nan}),
+            **(_turned(away["r"][mask], r[mask], pieces[mask]) if side else {}),
         }
         for group, side, mask in _groups(seen, r, helm, speed)
         if mask.sum() >= FEWEST
@@ -62,12 +64,26 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
 
 
 def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
-    """Relative error of the change of heading, with its standard error from the pieces, which are independent."""
+    """Relative error of the change of heading, and standard errors from the pieces, which are independent."""
     _, place = np.unique(pieces, return_inverse=True)
-    a, b = np.bincount(place, away), np.bincount(place, r)
+    of_row = (away, r, away**2, np.ones_like(r))
+    missed, turned, squares, rows = (np.bincount(place, values).astype(float) for values in of_row)
+    share, error = _ratio(missed, turned)
+    square, more = _ratio(squares, rows)
+    rms = float(np.sqrt(square))
+    return {
+        "turning": share,
+        "error": error,
+        "r_error": more / (2 * rms) if rms > 0 else 0.0,
+        "pieces": int(place.max()) + 1,
+    }
+
+
+def _ratio(a: Array, b: Array) -> tuple[float, float]:
+    """Ratio of two sums over pieces, and its standard error; infinite from one piece."""
     share, count = float(a.sum() / b.sum()), len(a)
     error = float(np.sqrt(count / (count - 1) * ((a - share * b) ** 2).sum()) / abs(b.sum())) if count > 1 else np.inf
-    return {"turning": share, "error": error}
+    return share, error
 
 
 def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array:
@@ -106,18 +122,24 @@ def _groups(
 
 
 def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
-    """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate."""
+    """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate.
+
+    Each is shown by a t test over the pieces; the level is divided by the number of tests (Bonferroni).
+    """
     sentences = []
     rows = [row for row in groups.to_dict("records") if row["side"]]
-    for group in dict.fromkeys(row["group"] for row in rows):
-        of = [row for row in rows if row["group"] == group]
-        if len(of) < len(("starboard", "port")):
-            continue
+    by = {
+        group: [row for row in rows if row["group"] == group] for group in dict.fromkeys(row["group"] for row in rows)
+    }
+    both = {group: of for group, of in by.items() if len(of) == len(("starboard", "port"))}
+    level = LEVEL / max(2 * len(both), 1)
+    for group, of in both.items():
         where = "" if group == "all" else f" at {group}"
+        freedom = min(row["pieces"] for row in of) - 1
         better, worse = sorted(of, key=lambda row: abs(float(row["turning"])))
         apart = abs(worse["turning"]) - abs(better["turning"])
-        sure = apart > SURE * float(np.hypot(worse["error"], better["error"]))
-        if sure and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
+        chance = _chance(apart, float(np.hypot(worse["error"], better["error"])), freedom)
+        if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             sentences.append(
                 f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
                 f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
@@ -125,12 +147,20 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
             )
             continue
         better, worse = sorted(of, key=lambda row: float(row["r"]))
-        if np.isfinite([worse["error"], better["error"]]).all() and worse["r"] > WORSE * better["r"]:
+        chance = _chance(worse["r"] - better["r"], float(np.hypot(worse["r_error"], better["r_error"])), freedom)
+        if chance <= level and worse["r"] > WORSE * better["r"]:
             sentences.append(
                 f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
                 f"as to {better['side']}"
             )
     return tuple(sentences)
+
+
+def _chance(apart: float, error: float, freedom: int) -> float:
+    """Two-sided p-value of a difference with so many degrees of freedom; 1 where nothing is known of its error."""
+    if freedom < 1 or not np.isfinite(error):
+        return 1.0
+    return float(2 * stdtr(freedom, -apart / error)) if error > 0 else float(apart <= 0)
 
 
 def shown(groups: pd.DataFrame) -> list[list[str]]:

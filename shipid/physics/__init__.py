@@ -25,9 +25,10 @@ class Term:
         the width of each component argument.
     states : for a term with additional states, a function from its block to their names; `function` and `rates` take
         them as the signal `state`.
-    rates : d(state)/dt from signals; integrated with the motion. Its parameters are parameters of `function`.
-    gives : signal -> function of signals and parameters of `function`. A term whose block says that it is `behind` this
-        one receives that signal.
+    rates : d(state)/dt from signals; integrated with the motion.
+    gives : signal -> function of signals. A term whose block says that it is `behind` this one receives that signal.
+
+    The parameters of a block are those of `function`, `gives` and `rates` together; each takes those that it declares.
     """
 
     function: Callable[..., Any]

@@ -92,7 +92,6 @@ def propeller(
     J_max: Annotated[SX | float, "-"] = 1.5,
     k_astern: Annotated[SX | float, "-"] = 1.0,
     k_drag: Annotated[SX | float, "-"] = 0.0,
-    k_suction: Annotated[SX | float, "-"] = 0.0,  # noqa: ARG001 - of the wash
     t_P: Annotated[SX, "-"],
     w_P0: Annotated[SX, "-"],
     C_1: Annotated[SX, "-"],
@@ -278,11 +277,6 @@ def quadratic(
     w_P0: Annotated[SX | float, "-"] = 0.0,
     Y_T: Annotated[SX | float, "-"] = 0.0,
     N_T: Annotated[SX | float, "m"] = 0.0,
-    D_p: Annotated[SX | float, "m"] = 0.0,  # noqa: ARG001 - this and the next are of the wash
-    c_uu: Annotated[SX | float, "-"] = 0.0,  # noqa: ARG001
-    c_un: Annotated[SX | float, "m"] = 0.0,  # noqa: ARG001
-    c_nn: Annotated[SX | float, "m^2"] = 0.0,  # noqa: ARG001
-    rho: Annotated[SX, "kg m^-3", POSITIVE],  # noqa: ARG001
 ) -> SX:
     """Wrench (6) of a screw with a quadratic law of thrust T: X = (1 - t_P) T, Y = Y_T T, N = N_T T - y X.
 

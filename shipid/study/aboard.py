@@ -17,6 +17,7 @@ from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
+from shipid.logs.guess.draft import moment as date
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.observer import observe
@@ -25,6 +26,7 @@ from shipid.study.apply import Band, along_run
 from shipid.study.prepare import states_along
 
 Array = np.ndarray
+DATED = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
 TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
@@ -313,5 +315,12 @@ def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:
         edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
         spans += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     spans.sort(key=lambda span: -span[0])
-    lines = [f"  {run}: from {first:.1f} to {last:.1f} s" for _, run, first, last in spans[:most]]
+    lines = [f"  {run}: {_between(first, last)}" for _, run, first, last in spans[:most]]
     return [*lines, f"  and {len(spans) - most} shorter ones"] if len(spans) > most else lines
+
+
+def _between(first: float, last: float) -> str:
+    """Two moments as the log has them: dates in UTC, or seconds on its clock."""
+    if first < DATED:
+        return f"from {first:.1f} to {last:.1f} s"
+    return f"from {date(first, 'date')} to {date(last, 'date')} UTC"

@@ -2,7 +2,7 @@
 
 A claim is a file that says who works: host, owner, process and since when. All claims of a process are links to one
 file, whose time is renewed while the process lives. A claim that is no longer renewed, or whose process is gone, is
-taken over. If two processes do work on the same unit, because one was only held up, they write the same numbers.
+taken over. A process that was only held up, and so has lost a claim, sees that before it writes anything more.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from shipid.errors import ShipidError
 from shipid.files import is_alive, make_folder
 
 FOLDER = "claims"
@@ -28,6 +30,34 @@ RENEWED, LATE = 10.0, 60.0  # s: how often a claim is renewed, and after how lon
 WAIT, LONGEST_WAIT = 1.0, 15.0  # s between looks at what others finish: it grows
 SHORT_WAIT = 0.05  # s, for what takes others a moment
 MISSED = 8  # claims that are refused until the folder is listed anew
+
+
+class TakenOver(ShipidError):
+    """A claim that this process has lost: it was held up for so long that another one works on the unit."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A process with claims in a folder, known to its workers by the words of its claims."""
+
+    folder: Path
+    words: str
+
+    def check(self, unit: str) -> None:
+        """Raise TakenOver unless the claim on a unit is this process's."""
+        try:
+            words = (self.folder / FOLDER / unit).read_text(encoding="utf-8", errors="replace")
+        except FileNotFoundError:
+            raise TakenOver("no longer claimed: another process has taken it over and ended", path=unit) from None
+        except OSError:  # a file server that is slow to answer: as long as it says nothing else
+            return
+        if words == self.words:
+            return
+        with suppress(ValueError, KeyError, TypeError):
+            other = json.loads(words)
+            who = f"process {other['process']} on {other['host']}"
+            raise TakenOver(f"{who} has taken it over, since this one was held up: left to it", path=unit)
+        raise TakenOver("another process has taken it over, since this one was held up: left to it", path=unit)
 
 
 class Claims:
@@ -45,7 +75,8 @@ class Claims:
         self._lock, self._stop = threading.RLock(), threading.Event()
         since = datetime.now(UTC).isoformat(timespec="seconds")
         owner = {"host": socket.gethostname(), "owner": _user(), "process": os.getpid(), "since": since}
-        self._words = json.dumps({**owner, "system": _system()}) + "\n"
+        self._words = json.dumps({**owner, "system": _system(), "key": self._me.name}) + "\n"
+        self.holder = Holder(folder.absolute(), self._words)
 
     def __enter__(self) -> Claims:
         self._sign_in()
@@ -121,7 +152,7 @@ class Claims:
         return True
 
     def once(self, name: str, is_done: Callable[[], bool], do: Callable[[], object]) -> None:
-        """Do what is not done yet, unless another process does it: then wait for it."""
+        """Do what is not done yet, unless another process does it, or has taken it over: then wait for it."""
         wait = SHORT_WAIT
         while not is_done():
             if self.take(name):
@@ -129,6 +160,8 @@ class Claims:
                     if not is_done():
                         do()
                     return
+                except TakenOver:
+                    pass
                 finally:
                     self.give_back(name)
             wait = pause(wait)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
@@ -22,6 +23,7 @@ KEPT = "what is finished is kept: go on with `shipid study resume`"
 LOOK = 2.0  # s between looks at the scheduler while nothing comes
 SILENT = 30.0  # s that a scheduler may take to answer
 PATIENCE = 20.0  # s without any worker until that is reported
+AHEAD = 3  # tasks for each thread of the workers: others are left to whoever comes
 
 Shared = TypeVar("Shared")
 Task = TypeVar("Task")
@@ -30,7 +32,11 @@ log = logging.getLogger(__name__)
 
 
 def on_dask(
-    scheduler: str, work: Callable[[Shared, Task], Result], shared: Shared, tasks: Mapping[str, Task], name: str
+    scheduler: str,
+    work: Callable[[Shared, Task], Result],
+    shared: Shared,
+    tasks: Iterable[tuple[str, Task]],
+    name: str,
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks and what `work(shared, task)` makes of them, in the order in which they finish.
 
@@ -39,7 +45,8 @@ def on_dask(
     Parameters
     ----------
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
-    shared : sent once to each worker. tasks : by a key. name : of the whole work, so that no other has its keys.
+    shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
+        whole work, so that no other has its keys.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def _results(
     scheduler: str,
     work: Callable[[Shared, Task], Result],
     shared: Shared,
-    tasks: Mapping[str, Task],
+    tasks: Iterable[tuple[str, Task]],
     name: str,
 ) -> Iterator[tuple[Task, Result]]:
     from dask.distributed import CancelledError, KilledWorker
@@ -83,25 +90,27 @@ def _results(
     killed: list[str] = []
     try:
         given = client.submit(_given, shared, key=f"shipid-{name}-shared", pure=False)  # made again if its worker dies
-        left = {}
-        for key, task in tasks.items():
-            future = client.submit(work, given, task, key=f"shipid-{name}-{key}", pure=False)
-            left[future.key] = (key, future)
-            future.add_done_callback(ended.put)
-        watch = _Watch(client)
-        while left:
+        left: dict[str, tuple[str, Task, Any]] = {}
+        waiting, watch = iter(tasks), _Watch(client)
+        while True:
+            watch.look()
+            for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
+                future = client.submit(work, given, task, key=f"shipid-{name}-{key}", pure=False)
+                left[future.key] = (key, task, future)
+                future.add_done_callback(ended.put)
+            if not left:
+                break
             try:
                 future = ended.get(timeout=LOOK)
             except Empty:
-                watch.look()
                 continue
-            key, _ = left.pop(future.key)
+            key, task, _ = left.pop(future.key)
             try:
                 results = future.result(timeout=SILENT)
             except KilledWorker:
                 killed.append(key)
                 continue
-            yield tasks[key], results
+            yield task, results
             del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
         raise gone() from None
@@ -116,15 +125,24 @@ def _given(shared: Shared) -> Shared:
 
 
 class _Watch:
-    """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while."""
+    """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while.
+
+    threads : of all workers at the last look; at least 1, so that there is something to wait for.
+    """
 
     def __init__(self, client: Any) -> None:
         self._client, self._alone, self._said = client, time.monotonic(), False
+        self._looked, self.threads = float("-inf"), 1
 
     def look(self) -> None:
+        """Look, if the last look is some time ago."""
+        if time.monotonic() - self._looked < LOOK:
+            return
         if self._client.status not in ("running", "connecting"):
             raise OSError("closed")
         workers = self._client.sync(self._client.scheduler.identity, callback_timeout=SILENT)["workers"]
+        self._looked = time.monotonic()
+        self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
         if workers:
             self._alone, self._said = time.monotonic(), False
         elif not self._said and time.monotonic() - self._alone > PATIENCE:

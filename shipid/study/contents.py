@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 
 from shipid.errors import ResultError
-from shipid.files import write_table, write_text
+from shipid.files import temporary_folder, write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent
@@ -19,7 +20,6 @@ from shipid.study.claims import Claims
 from shipid.study.findings import findings
 from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
-from shipid.study.store import write_results
 
 log = logging.getLogger(__name__)
 
@@ -75,17 +75,33 @@ def write_pages(folder: Path) -> Path:
 
     Raises ResultError if the folder holds no run or cannot be written.
     """
+    store.stored_plan(folder)
+    with Claims(folder) as claims, claims.alone(PAGES):
+        return _write(folder)
+
+
+def _write(folder: Path) -> Path:
+    """Write the pages, alone; those of an unfinished run are as old as the results that were read for them."""
     plan = store.stored_plan(folder)
-    if plan.parts:
-        return _write_parts(plan, folder)
-    results = read_results(folder)
-    write_results(folder, results.cells)
+    with temporary_folder(folder) as place:
+        read = place.stat().st_mtime_ns
+    report, whole = _write_parts(plan, folder) if plan.parts else _write_one(folder)
+    if not whole:
+        os.utime(report, ns=(read, read))
+    return report
+
+
+def _write_one(folder: Path) -> tuple[Path, bool]:
+    """The pages of one run, and whether all of its cells are in them."""
+    with Claims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
+        results = read_results(folder)
+        store.write_results(folder, results.cells, whole=results.complete)
     content = report_content(results)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
     report = write_report(content, folder / REPORT)
     log.debug("report written: %s", report)
-    return report
+    return report, results.complete
 
 
 def share_pages(folder: Path) -> Path:
@@ -101,14 +117,15 @@ def share_pages(folder: Path) -> Path:
             return False
 
     with Claims(folder) as claims:
-        claims.once(PAGES, is_done, lambda: write_pages(folder))
+        claims.once(PAGES, is_done, lambda: _write(folder))
     return report
 
 
-def _write_parts(plan: Plan, folder: Path) -> Path:
-    """Write the pages of all parts that have results, and the page that compares methods over them."""
+def _write_parts(plan: Plan, folder: Path) -> tuple[Path, bool]:
+    """The pages of all parts that have results and one that compares methods over them, and whether all is in it."""
     cells: list[pd.DataFrame] = []
     notes: dict[str, str] = {}
+    whole: list[bool] = []
     for name, part in plan.parts.items():
         mine = store.part_folder(folder, name)
         if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
@@ -116,6 +133,7 @@ def _write_parts(plan: Plan, folder: Path) -> Path:
             continue
         write_pages(mine)
         results = read_results(mine)
+        whole.append(results.complete)
         cells.append(methods.method_cells(results, part.condition, name))
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
@@ -131,4 +149,4 @@ def _write_parts(plan: Plan, folder: Path) -> Path:
         command=plan.command,
     )
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
-    return write_comparison(content, folder / REPORT)
+    return write_comparison(content, folder / REPORT), len(whole) == len(plan.parts) and all(whole)

@@ -513,13 +513,13 @@ def _beyond(document: Document, path: str) -> str:
     keys = documents.parts(path)
     value: Any = document
     for place, key in enumerate(keys):
-        if isinstance(value, list) and int(key) >= len(value):
+        if isinstance(value, list) and documents.place_of(value, key) >= len(value):
             name = ".".join(keys[:place])
             last = f", {name}.0 to {name}.{len(value) - 1}" if len(value) > 1 else f", {name}.0" if value else ""
             return (
                 f"there is no {name}.{key}: {name} has {len(value)} {'entry' if len(value) == 1 else 'entries'}{last}"
             )
-        value = value[int(key)] if isinstance(value, list) else value[key]
+        value = value[documents.place_of(value, key)] if isinstance(value, list) else value[key]
     raise KeyError(path)
 
 
@@ -531,6 +531,26 @@ def build_plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
+    try:
+        return _built(document, file, vessels, sources, changes)
+    except DocumentError as error:
+        raise _named(error, document) from None
+
+
+def _named(error: DocumentError, document: Document) -> DocumentError:
+    """The error with paths by which a person finds the block: families and methods by name."""
+    path = error.path and documents.by_name(document, error.path)
+    others = [_named(other, document) for other in error.others if isinstance(other, DocumentError)]
+    return type(error)(error.message, file=error.file, path=path, others=others)
+
+
+def _built(
+    document: Document,
+    file: Path,
+    vessels: Mapping[str, Vessel] | None,
+    sources: Mapping[str, str] | None,
+    changes: Mapping[str, Any] | None,
+) -> Plan:
     documents.check_values(document, file)
     _check_version(document, file)
     study = documents.parse(Study, document, file).in_its_world()

@@ -56,12 +56,15 @@ def check_ranges(document: Document, file: Path | str) -> None:
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
         pattern = next((pattern for pattern in RANGES if documents.match(pattern, [path])), None)
-        if pattern is None or any(documents.match(str(one), [path]) for one in meant):
+        if pattern is None:
+            continue
+        named = documents.by_name(document, path)
+        if any(documents.match(str(one), [path, named]) for one in meant):
             continue
         least, most, unit = RANGES[pattern]
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
-            remedy = f'if it is meant, write {UNUSUAL} = ["{path}"] at the top of the study'
+            remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", file=file, path=path)
 
 

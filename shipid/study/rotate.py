@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, sweep, write_table
+from shipid.study.claims import Claims
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
 from shipid.study.plan import NO_MODEL, Batch, Plan
@@ -57,45 +59,66 @@ def rotate(
     Parameters
     ----------
     kept : folder for what is finished, seed by seed, and for the trials of searches; made where it is not there. The
-        same call with the same folder goes on after an interruption, and yields the same digits. None: nothing is kept.
+        same call with the same folder goes on after an interruption, and yields the same digits; two at a time compute
+        each seed once. None: nothing is kept.
     """
-    if kept is not None:
-        make_folder(kept)
-        sweep(kept)
-    for test in tests:
-        split = plan.study.split.model_copy(update={"test": [test]})
-        least = plan.study.model_copy(update={"split": split, "grid": plan.study.grid.model_copy(update={"N_D": [2]})})
-        rest, _, _ = partition(replace(plan, study=least, batches=()), dataset)
-        amount = len(rest.spans)
-        study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
-        batches = tuple(Batch(amount, seed) for seed in sorted(set(study.grid.seeds)))
-        turn = replace(plan, study=study, batches=batches)
-        done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in batches}
-        if any(done.get(batch) is None for batch in batches):
-            yield _computed(turn, dataset, test, device, kept, done)
-        else:
-            yield pd.concat([done[batch] for batch in batches])
+    with nullcontext() if kept is None else _sharing(kept) as claims:
+        for test in tests:
+            split = plan.study.split.model_copy(update={"test": [test]})
+            few = plan.study.grid.model_copy(update={"N_D": [2]})
+            least = plan.study.model_copy(update={"split": split, "grid": few})
+            rest, _, _ = partition(replace(plan, study=least, batches=()), dataset)
+            amount = len(rest.spans)
+            study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
+            batches = tuple(Batch(amount, seed) for seed in sorted(set(study.grid.seeds)))
+            turn = replace(plan, study=study, batches=batches)
+            done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in batches}
+            if any(done.get(batch) is None for batch in batches):
+                yield _computed(turn, dataset, test, device, kept, claims)
+            else:
+                yield pd.concat([done[batch] for batch in batches])
+
+
+@contextmanager
+def _sharing(kept: Path) -> Iterator[Claims]:
+    """The claims of this process in a folder of kept turns."""
+    make_folder(kept)
+    sweep(kept)
+    with Claims(kept) as claims:
+        yield claims
 
 
 def _computed(
-    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, done: Mapping[Batch, pd.DataFrame | None]
+    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: Claims | None
 ) -> pd.DataFrame:
-    """Cells of a turn; those of its batches that are not done are computed, and kept."""
-    trials = None if kept is None else kept / documents.digest(test)
-    if trials is not None:
-        trials.mkdir(parents=True, exist_ok=True)
+    """Cells of a turn; those of its batches that nobody has computed are, and kept."""
     prepared = prepare(turn, dataset, device)
     floor = float(prepared.naive.mean())
-    frames = []
+
+    def computed(batch: Batch, *journal: Any) -> pd.DataFrame:
+        rows = [row for row, _ in run_unit(turn, prepared, turn.whole(batch), device, *journal)]
+        return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
+
+    if kept is None or claims is None:
+        return pd.concat([computed(batch) for batch in turn.batches])
+    trials = kept / documents.digest(test)
+    make_folder(trials)
+    frames: dict[Batch, pd.DataFrame | None] = {}
     for batch in turn.batches:
-        frame = done.get(batch)
-        if frame is None:
-            rows = [row for row, _ in run_unit(turn, prepared, turn.whole(batch), device, trials)]
-            frame = pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
-            if kept is not None:
-                write_table(_file(kept, test, batch), frame)
-        frames.append(frame)
-    return pd.concat(frames)
+        file = _file(kept, test, batch)
+        check = partial(claims.holder.check, file.stem)
+
+        def is_done(batch: Batch = batch, file: Path = file) -> bool:
+            frames[batch] = _read(file)
+            return frames[batch] is not None
+
+        def keep(batch: Batch = batch, file: Path = file, check: Callable[[], None] = check) -> None:
+            frames[batch] = frame = computed(batch, trials, check)
+            check()
+            write_table(file, frame)
+
+        claims.once(file.stem, is_done, keep)
+    return pd.concat([frames[batch] for batch in turn.batches])
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
@@ -105,7 +128,10 @@ def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -
 
 
 def forget(kept: Path) -> None:
-    """Remove the folder of kept turns: its table is written."""
+    """Remove the folder of kept turns, whose table is written; the last one of several processes does."""
+    with Claims(kept) as claims:
+        if claims.others():
+            return
     shutil.rmtree(kept, ignore_errors=True)
     with suppress(OSError):  # of another rotation to the same file
         kept.parent.rmdir()

@@ -28,7 +28,7 @@ from shipid.hybrid.training import check_device, use_threads, vectors
 from shipid.metrics import position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
-from shipid.study.claims import WAIT, Claims, pause
+from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, apart, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
@@ -49,8 +49,9 @@ PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow",
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
+MENDING, MENDED = "mending", "mended"  # claims: on the look at all files, and of the process that has looked
 Results = list[tuple[dict[str, Any], Predictor | None]]
-Computed = Iterator[tuple[Unit, Results]]
+Computed = Iterator[tuple[Unit, Results | str]]
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
@@ -100,9 +101,8 @@ def run_study(
     if scheduler is None:
         import_for_workers()
     with Claims(folder) as claims:
-        if not claims.others():  # else the first of them has looked
-            for words in seals.mend(folder):
-                yield Event("note", words)
+        for words in _mended(folder, claims):
+            yield Event("note", words)
         for words in _other_session(folder, claims, device):
             yield Event("note", words)
         if not seals.is_sealed(folder, DATA):
@@ -119,7 +119,7 @@ def run_study(
         make_folder(folder / store.JOURNALS)
 
         def compute(units: Iterable[Unit]) -> Computed:
-            return _compute(plan, prepared, units, workers, scheduler, device, folder)
+            return _compute(plan, prepared, units, workers, scheduler, device, claims.holder, folder)
 
         cells = 0
         for event in _shared(plan, folder, claims, compute, leave):
@@ -127,7 +127,7 @@ def run_study(
             yield event
         if cells == plan.cells:
             finish = partial(_finish, plan, folder, claims, prepared, device, begun)
-            claims.once(store.RESULTS, partial(seals.is_sealed, folder, store.RESULTS), finish)
+            claims.once(store.RESULTS, partial(_is_finished, folder), finish)
     yield Event("end", text=str(folder), done=cells, total=plan.cells)
 
 
@@ -176,7 +176,19 @@ def _finish(plan: Plan, folder: Path, claims: Claims, prepared: Prepared, device
         record["machine"] = {**machine(), "device": device}
         record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
         write_json(folder / store.PROVENANCE, record)
-    store.write_results(folder, store.read_rows(folder, plan))
+    rows = store.read_rows(folder, plan)
+    store.write_results(folder, rows, whole=len(rows) == plan.cells)
+
+
+def _is_finished(folder: Path) -> bool:
+    """Whether the tables hold all cells, and the provenance what the end of a run says."""
+    return seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in read_json(folder / store.PROVENANCE)
+
+
+def _mended(folder: Path, claims: Claims) -> list[str]:
+    """Take away damaged files, so that they are computed again; one process looks, others wait until it has."""
+    with claims.alone(MENDING):
+        return list(seals.mend(folder)) if claims.take(MENDED) else []
 
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
@@ -218,7 +230,12 @@ def _shared(
     cells = _cells(units[key] for key in known)
     yield Event("start", done=cells, total=plan.cells)
     wait = WAIT
-    while left := [key for key in units if key not in known]:
+    while True:
+        if known >= units.keys():  # unless another process has just mended some of them
+            known = {unit.key for unit in store.finished(folder, plan.units)}
+            cells = _cells(units[key] for key in known)
+        if not (left := [key for key in units if key not in known]):
+            return
         before = len(known)
         free = claims.free(
             left,
@@ -226,8 +243,16 @@ def _shared(
             lambda key: store.is_finished(folder, units[key]),
         )
         for unit, results in compute(units[key] for key in free):
-            store.write_unit(folder, unit, results)
-            claims.give_back(unit.key)
+            try:
+                claims.holder.check(unit.key)
+                if isinstance(results, str):
+                    raise TakenOver(results)
+                store.write_unit(folder, unit, results)
+            except TakenOver as lost:
+                yield Event("note", str(lost))
+                continue
+            finally:
+                claims.give_back(unit.key)
             known.add(unit.key)
             for row, _ in results:
                 cells += 1
@@ -236,7 +261,7 @@ def _shared(
         if cells < _cells(units[key] for key in known):
             cells = _cells(units[key] for key in known)
             yield Event("others", done=cells, total=plan.cells)
-        if leave:
+        if leave and not known >= units.keys():
             return
         wait = pause(wait) if len(known) == before else WAIT
 
@@ -248,15 +273,22 @@ def run_batch(
     return run_unit(plan, prepared, plan.whole(batch), device)
 
 
-def run_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path | None = None) -> Results:
+def run_unit(
+    plan: Plan,
+    prepared: Prepared,
+    unit: Unit,
+    device: str,
+    trials: Path | None = None,
+    check: Callable[[], object] = lambda: None,
+) -> Results:
     """All cells of one unit of work: (row of results, predictor) each. Pure: the same on every worker.
 
     trials : the folder of the journals in which searches go on; on a machine that does not see it, they are kept in
-        memory.
+        memory. check : called before each write to a journal; what it raises ends the search.
     """
     use_threads(1)
     check_device(device)
-    journal = Journal(trials / f"{unit.key}.log") if trials is not None and trials.is_dir() else None
+    journal = Journal(trials / f"{unit.key}.log", check) if trials is not None and trials.is_dir() else None
     batch = unit.batch
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
@@ -477,19 +509,21 @@ def _compute(
     workers: int | None,
     scheduler: str | None,
     device: str,
+    holder: Holder,
     folder: Path,
 ) -> Computed:
     """Units and their results in the order in which they finish."""
     trials = (folder / store.JOURNALS).absolute()
     if scheduler is None:
-        work = partial(run_unit, plan, prepared, device=device, trials=trials)
+        work = partial(_claimed, plan, prepared, device=device, trials=trials, holder=holder)
         yield from on_workers(work, units, workers or os.cpu_count() or 1)
         return
     from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
 
-    shared = plan, prepared, device, trials
+    shared = plan, prepared, device, trials, holder
     noted: list[Mapping[str, Any]] = []
-    for unit, (session, results) in on_dask(scheduler, _there, shared, {unit.key: unit for unit in units}, plan.digest):
+    named = ((unit.key, unit) for unit in units)
+    for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest):
         if session not in noted:
             noted.append(session)
             with Claims(folder) as claims, claims.alone(SESSIONS):
@@ -497,7 +531,15 @@ def _compute(
         yield unit, results
 
 
-def _there(shared: tuple[Plan, Prepared, str, Path], unit: Unit) -> tuple[dict[str, Any], Results]:
+def _there(shared: tuple[Plan, Prepared, str, Path, Holder], unit: Unit) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
-    plan, prepared, device, trials = shared
-    return session_on(device), run_unit(plan, prepared, unit, device, trials)
+    plan, prepared, device, trials, holder = shared
+    return session_on(device), _claimed(plan, prepared, unit, device, trials, holder)
+
+
+def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:
+    """A unit whose claim is looked at before each write; a sentence in place of results where it is lost."""
+    try:
+        return run_unit(plan, prepared, unit, device, trials, partial(holder.check, unit.key))
+    except TakenOver as lost:
+        return str(lost)

@@ -95,7 +95,9 @@ def mend(folder: Path) -> Iterator[str]:
 
     Raises ResultError, before anything is removed, for a file that can be read and is not what was written.
     """
-    found = faults(folder)
+    if found := faults(folder):
+        again = faults(folder)  # another process may just have written some of these files
+        found = [fault for fault in found if fault in again]
     for fault in found:
         if fault.kind == "edited":
             raise wrong(folder, fault)

@@ -232,8 +232,11 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
 
 
-def write_results(folder: Path, rows: pd.DataFrame) -> Path:
-    """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial."""
+def write_results(folder: Path, rows: pd.DataFrame, whole: bool = True) -> Path:
+    """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial.
+
+    whole : whether all cells are there; only then the tables have a seal, which says that a run has ended.
+    """
     seals.remove(folder, RESULTS)
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
@@ -245,7 +248,8 @@ def write_results(folder: Path, rows: pd.DataFrame) -> Path:
         from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
 
         merge(journals, folder / TRIALS)
-    seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
+    if whole:
+        seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"
 
 

@@ -257,19 +257,20 @@ def _judged(
 ) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 
-    def fit(runs: Sequence[str], start: Solution | None = None) -> tuple[Vessel, Solution]:
+    def fit(runs: Sequence[str]) -> tuple[Vessel, Solution]:
+        """A fit to some runs; the others decide nothing in it, neither its start nor its priors."""
         report(f"{name}: {len(runs)} of {len(fitted)} runs")
-        solution = identify(other.vessel, dataset, runs, other.settings, start=start)
+        other = exchange(vessel, name, dataset, runs, settings)
+        solution = identify(other.vessel, dataset, runs, other.settings)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         return other.vessel.with_values(solution.values), solution
 
-    other = exchange(vessel, name, dataset, fitted, settings)
     whole, solution = fit(fitted)
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        replayed = free_runs({name: fit(rest, solution)[0]}, dataset, part, settings, ahead)
+        replayed = free_runs({name: fit(rest)[0]}, dataset, part, settings, ahead)
         frames.append(replayed.errors[replayed.errors["run"] != ALL])
         series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,7 +19,7 @@ from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.physics.signals import named, units
 from shipid.vessel.bindings import Binding, bindings
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import BEHIND, actuators, behind, signals, structural, term_blocks
+from shipid.vessel.schema import BEHIND, actuators, behind, signals, structural, term_blocks, term_parameters
 from shipid.vessel.schema import parameters as declared
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
@@ -223,9 +223,15 @@ def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, li
 def _rates(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
     """d(state)/dt of the additional states of a term."""
     assert term.rates is not None
-    taken = {parameter.name for parameter in declared(term.rates)}
-    kept = {keyword: value for keyword, value in keywords.items() if keyword in taken}
-    return SX(term.rates(*(available[name] for name in signals(term.rates)), **kept))
+    return SX(_called(term, term.rates, available, keywords))
+
+
+def _called(term: Term, function: Callable[..., Any], available: Mapping[str, SX], keywords: Mapping[str, Any]) -> Any:
+    """A function of a term for its signals, selected by name, with those of the keywords that it takes."""
+    others = {parameter.name for parameter in term_parameters(term)}
+    others -= {parameter.name for parameter in declared(function)}
+    kept = {keyword: value for keyword, value in keywords.items() if keyword not in others}
+    return function(*(available[name] for name in signals(function)), **kept)
 
 
 def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel) -> dict[str, SX]:
@@ -287,9 +293,9 @@ def _given(
     for path, key, _ in terms:
         for name, function in TERMS[key].gives.items():
             here = {**available, **_commands_of(path, available)}
-            taken = {parameter.name for parameter in declared(function)}
-            kept = {keyword: value for keyword, value in _values(bound[path], value_of).items() if keyword in taken}
-            result[f"{path.rsplit('.', 1)[-1]}.{name}"] = function(*(here[name] for name in signals(function)), **kept)
+            result[f"{path.rsplit('.', 1)[-1]}.{name}"] = _called(
+                TERMS[key], function, here, _values(bound[path], value_of)
+            )
     return result
 
 
@@ -309,11 +315,7 @@ def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], n
 
 def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> Any:
     """Wrench of one term for its signals, selected by name; `entries` are those of one component."""
-    here = {**available, **entries}
-    only = {parameter.name for parameter in declared(term.rates)} if term.rates else set()
-    only -= {parameter.name for parameter in declared(term.function)}
-    kept = {keyword: value for keyword, value in keywords.items() if keyword not in only}
-    return term.function(*(here[name] for name in signals(term.function)), **kept)
+    return _called(term, term.function, {**available, **entries}, keywords)
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:

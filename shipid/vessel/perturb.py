@@ -289,7 +289,7 @@ def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Cha
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
     original, times, result = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb):
-        where = f"family {family.name!r}.perturb.{index}"
+        where = f"family.{family.name}.perturb.{index}"
         for key, argument in block.given.items():
             rule = RULES[key]
             if rule.places is not None:
@@ -329,7 +329,7 @@ def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float
         base.with_values(values)
     except DocumentError as error:
         message = f"member {member + 1} would not be a valid vessel: {error.path}: {error.message}"
-        raise DocumentError(message, file=file, path=f"family {family.name!r}") from None
+        raise DocumentError(message, file=file, path=f"family.{family.name}") from None
 
 
 def uniform(*key: Any) -> float:

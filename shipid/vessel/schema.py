@@ -72,11 +72,13 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
 
 @cache
 def term_parameters(term: Term) -> tuple[Parameter, ...]:
-    """Parameters of a term: of its function, then those that only its rates take."""
-    declared = parameters(term.function)
-    names = {parameter.name for parameter in declared}
-    more = parameters(term.rates) if term.rates else ()
-    return declared + tuple(parameter for parameter in more if parameter.name not in names)
+    """Parameters of a term: of its function, then those that only what it gives, or its rates, take."""
+    functions = (term.function, *term.gives.values(), *([term.rates] if term.rates else []))
+    result: dict[str, Parameter] = {}
+    for function in functions:
+        for parameter in parameters(function):
+            result.setdefault(parameter.name, parameter)
+    return tuple(result.values())
 
 
 @cache

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
+import pytest
 from typer.testing import CliRunner
 
-from shipid.cli import app
+from shipid.cli import app, main
 
 BAD = Path(__file__).parents[1] / "bad"
 
@@ -20,6 +24,15 @@ def said(*arguments: object) -> str:
         raise result.exception
     assert result.exit_code == 0, result.output
     return result.output
+
+
+def ended(*arguments: object) -> tuple[object, str, str]:
+    """Exit status, output and error of a command in this process, as its entry point runs it."""
+    out, err = StringIO(), StringIO()
+    typed = patch.object(sys, "argv", ["shipid", *map(str, arguments)])
+    with typed, redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code, out.getvalue(), err.getvalue()
 
 
 def shell(*arguments: object, code: str = "from shipid.cli import main; main()") -> subprocess.CompletedProcess[str]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,23 @@ from typer.testing import CliRunner
 import shipid
 from shipid import cli
 from shipid.cli import app
-from tests.cli.running import BAD, said, shell
+from tests.cli.running import BAD, ended, said, shell
 from tests.study.tiny import TINY
 
 
 def test_help_and_version_are_light() -> None:
     """Nobody waits for PyTorch to read a help page."""
     heavy = {"torch", "casadi", "pandas", "optuna", "numpy", "dask", "plotly", "pyarrow"}
+    asked = (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"])
     code = (
-        "import sys\nfrom shipid.cli import main\ntry:\n    main()\nexcept SystemExit as end:\n"
-        f"    print(end.code, sorted({heavy!r} & set(sys.modules)))"
+        f"import sys\nfrom shipid.cli import main\nfor words in {asked!r}:\n    sys.argv[1:] = words\n"
+        "    try:\n        main()\n    except SystemExit as end:\n"
+        f"        print('ended', end.code, sorted({heavy!r} & set(sys.modules)))"
     )
-    for arguments in (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"]):
-        result = shell(*arguments, code=code)
-        assert re.search(r"(0|2|None) \[\]$", result.stdout.strip()), (arguments, result)
-    assert shipid.__version__ in shell("--version").stdout
+    result = shell(code=code)
+    assert re.findall(r"^ended (?:0|2|None) \[\]$", result.stdout, re.MULTILINE) == re.findall("ended.*", result.stdout)
+    assert result.stdout.count("ended ") == len(asked), result
+    assert shipid.__version__ in result.stdout
 
 
 def test_help_reads_the_same_whatever_is_built_for_it() -> None:
@@ -92,39 +93,23 @@ MISTAKES = {
 }
 
 
-def mistaken(
-    arguments: Sequence[object], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> tuple[object, str, str]:
-    """Exit status, output and error of a command in this process, as its entry point runs it."""
-    from shipid.cli import main
-
-    monkeypatch.setattr(sys, "argv", ["shipid", *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    out, err = capfd.readouterr()
-    return end.value.code, out, err
-
-
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_one_line(
-    mistake: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mistake_is_one_line(mistake: str, capfd: pytest.CaptureFixture[str]) -> None:
     arguments, remedy = MISTAKES[mistake]
-    status, out, err = mistaken(arguments, capfd, monkeypatch)
+    status, out, err = ended(*arguments)
     assert (status, out) == (1, "")
+    assert capfd.readouterr() == ("", "")
     assert re.fullmatch(r"error: [^\n]*\n", err)
     assert remedy in err
 
 
-def test_mistakes_with_folders(
-    tiny_run: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_mistakes_with_folders(tiny_run: Path) -> None:
     """No traceback, no warning, exit 1: another study's folder, a file where a folder should be."""
     for arguments, remedy in (
         (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
         (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
     ):
-        status, _, err = mistaken(arguments, capfd, monkeypatch)
+        status, _, err = ended(*arguments)
         assert status == 1
         assert re.fullmatch(r"error: [^\n]*\n", err), err
         assert remedy in err

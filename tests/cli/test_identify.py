@@ -15,6 +15,7 @@ def test_options_are_read_before_anything_is_loaded(tmp_path: Path) -> None:
         (["--prior", "hull.derivatives.*"], "--prior: 'hull.derivatives.*': write paths=0.3"),
         (["--bounds", "hull.derivatives.*=[0.5"], "--bounds: 'hull.derivatives.*=[0.5': write paths=[0.5,2]"),
         (["--html", "page.pdf"], "page.pdf: a page is an HTML file"),
+        (["--folds", "2"], "--folds: goes with --structures"),
     ):
         out = ["--out", str(tmp_path / "patch.toml")]
         result = CliRunner().invoke(app, ["identify", "gunnerus-28.9", "gone.parquet", *out, *arguments])

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
-from tests.cli.running import said, shell
+from tests.cli.running import ended, said
 
 
 def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,10 +35,10 @@ def test_manoeuvres_that_cannot_be() -> None:
         (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
         (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
     ):
-        result = shell(*arguments)
-        assert result.returncode == 1
-        assert result.stderr.startswith(expected)
-        assert result.stderr.count("\n") == 1
+        status, _, err = ended(*arguments)
+        assert status == 1
+        assert err.startswith(expected)
+        assert err.count("\n") == 1
 
 
 def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:
@@ -48,3 +49,18 @@ def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:
     assert re.search(r"^ *test +-?\d+\.\d / -?\d+\.\d / -?\d+\.\d", text, re.MULTILINE)
     with pytest.raises(ShipidError, match=r"let the name end in \.parquet"):
         said("simulate", study, "--out", "runs.csv")
+
+
+def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Given manoeuvres, as CSV and as a dataset that measures them."""
+    monkeypatch.chdir(tmp_path)
+    run = '[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nangle_deg = 20\nexecute_heading_deg = 20\nduration = 200\n'
+    Path("runs.toml").write_text("step = 0.5\n" + run)
+    text = said("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.csv")
+    assert "1 runs, 201 rows -> log.csv" in text
+    said("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.parquet")
+    log = pd.read_csv("log.csv")
+    np.testing.assert_allclose(log["psi"], read_dataset(Path("log.parquet")).frame["psi"], rtol=1e-12)
+    assert np.abs(log["psi"]).max() > np.radians(20)
+    with pytest.raises(ShipidError, match="changes a study"):
+        said("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")

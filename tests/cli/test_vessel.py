@@ -9,7 +9,7 @@ import pytest
 
 from shipid.document import bundled
 from shipid.vessel.load import load_vessel
-from tests.cli.running import said, shell
+from tests.cli.running import ended, said
 
 
 def test_vessels() -> None:
@@ -44,13 +44,13 @@ def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
     assert load_vessel(str(file)).parameters["thruster.port.y"] == pytest.approx(-2.688)
     assert "First guess, 33.9 m" in said("vessel", "show", file)
     written = file.read_text()
-    again = shell(*order)
-    assert (again.returncode, again.stderr) == (1, f"error: {file}: exists already: choose another name\n")
+    status, _, err = ended(*order)
+    assert (status, err) == (1, f"error: {file}: exists already: choose another name\n")
     assert file.read_text() == written
 
 
 def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
     sizes = ("--length", 100, "--beam", 5, "--draught", 2, "--block", 0.6)
-    found = shell("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
-    assert found.returncode == 1
-    assert found.stderr == "error: length / beam = 20: the formulae hold for 3 to 9\n"
+    status, _, err = ended("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
+    assert status == 1
+    assert err == "error: length / beam = 20: the formulae hold for 3 to 9\n"

@@ -20,6 +20,7 @@ from shipid.engine.native import Target, compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.vessel.load import load_vessel
+from tests.engine.conftest import QUICK
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 SHIP = load_vessel("gunnerus-28.9")
@@ -38,6 +39,7 @@ def forget() -> None:
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(native, "_refused", [])
+    monkeypatch.setattr(native, "OPTIONS", QUICK)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     forget()
     yield tmp_path / "cache" / "shipid"

@@ -23,21 +23,17 @@ from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
+from tests.engine.conftest import QUICK
 from tests.engine.operations import operations
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 SHIP = load_vessel("gunnerus-28.9")
 
 
-@pytest.fixture(scope="module")
-def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("libraries")
-
-
 @pytest.fixture(autouse=True)
-def no_other_cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A cache for these tests alone, so that a library is compiled once; `own_cache` is empty at first."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(shared_cache))
+def no_other_cache(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A cache for tests alone, so that a library is compiled once; `own_cache` is empty at first."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "_refused", [])
     native._library.cache_clear()
     yield
@@ -47,6 +43,7 @@ def no_other_cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
 @pytest.fixture
 def own_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:  # noqa: ARG001
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(native, "OPTIONS", QUICK)
     return tmp_path / "cache" / "shipid"
 
 

@@ -14,7 +14,7 @@ from tests.hybrid.tasks import compensation, tune
 torch.set_num_threads(1)
 COMMANDS = ("port.n", "port.delta", "starboard.n", "starboard.delta")
 SMALL = PathTrained(trials=3, units=16, layers=1, learning_rate=1e-2, epochs=40, patience=0)
-SEARCHED = PathTrained(trials=3, epochs=20)
+SEARCHED = PathTrained(trials=3, epochs=6)
 DRAWN = PathDrawn(trials=3, units=32, terms=4)
 FOLD = (np.arange(40, 200), np.arange(40))
 

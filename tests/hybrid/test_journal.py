@@ -129,7 +129,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_several_processes_write_at_once(tmp_path: Path) -> None:
     file = tmp_path / "t.log"
     Journal(file)
-    context = get_context("spawn")
+    context = get_context("fork")
     workers = [context.Process(target=_write, args=(file, name)) for name in "abc"]
     for worker in workers:
         worker.start()
@@ -141,6 +141,43 @@ def test_several_processes_write_at_once(tmp_path: Path) -> None:
         assert told(Journal(file).rows(name)) == told(wanted)
         assert Journal(file).count(name) == 30
     assert [entry.name for entry in tmp_path.iterdir()] == ["t.log"]  # no lock is left
+
+
+def test_who_may_not_write_any_more_writes_nothing(tmp_path: Path) -> None:
+    """A search whose claim another process has taken stops at its next write: the file stays as it was."""
+    held = [True]
+
+    def check() -> None:
+        if not held[0]:
+            raise ResultError("taken over")
+
+    slow = Journal(tmp_path / "t.log", check)
+    slow.add({"a": rows(2, 1)}, SPACE)
+    held[0] = False
+    before = (tmp_path / "t.log").read_bytes()
+    for write in (
+        lambda: slow.add({"a": rows(1, 2, first=2)}, SPACE),
+        lambda: slow.add({"b": rows(1, 2)}, SPACE),
+        lambda: slow.decide(["a"], 9),
+    ):
+        with pytest.raises(ResultError, match="taken over"):
+            write()
+    assert (tmp_path / "t.log").read_bytes() == before
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_that_write_the_same_trials_leave_each_once(tmp_path: Path, seed: int) -> None:
+    """The window between look and write: trials of both are in the file in any order, and each number counts once."""
+    rng, mine = np.random.default_rng(seed), rows(12, 5)
+    both = [Journal(tmp_path / "t.log"), Journal(tmp_path / "t.log")]
+    written = [0, 0]
+    while min(written) < len(mine):
+        which = int(rng.integers(2))
+        if written[which] < len(mine):
+            count = int(rng.integers(1, 4))
+            both[which].add({"a": mine[written[which] : written[which] + count]}, SPACE)
+            written[which] += count
+    assert told(Journal(tmp_path / "t.log").rows("a")) == told(mine)
 
 
 def test_a_file_that_is_no_journal_is_one_line(tmp_path: Path) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from shipid.errors import DataError, DocumentError, ResultError
-from shipid.hybrid.method import Case
+from shipid.hybrid.method import Case, Fitted
 from shipid.hybrid.methods import METHODS, kind_of, method_of
 from shipid.hybrid.physics import Physics
 from tests.documented import module
@@ -52,6 +54,12 @@ def here() -> World:
     return world(ship().with_values({"hull.derivatives.N_ur": -2.0e6}), ship(), runs=6, seconds=30, past=4, known=True)
 
 
+@pytest.fixture(scope="module")
+def fitted(here) -> Callable[[str], Fitted]:
+    """What a method learns beside the physics: fitted once a kind, not to be changed."""
+    return cache(lambda kind: quick(kind).fit(here.task())["physics"])
+
+
 def others(here, kind):
     """Foundations beside the first: another ship, and none where the method meets it."""
     doubtful = replace(here.physics, vessel=ship().with_values({"hull.derivatives.X_u|u|": -3000.0}))
@@ -75,10 +83,13 @@ def test_a_method_is_named_and_its_settings_are_checked(kind):
 
 
 @EVERY
-def test_what_is_saved_says_the_same_numbers(kind, here):
-    method = quick(kind)
-    for name, found in method.fit(here.task(others(here, kind))).items():
-        physics = others(here, kind)[name]
+def test_what_is_saved_says_the_same_numbers(kind, here, fitted):
+    """Beside the physics, and alone where the method meets none."""
+    method, none = quick(kind), Physics(None, HORIZON, 1.0)
+    learned = [(here.physics, fitted(kind))]
+    if method.meets_none:
+        learned.append((none, method.fit(here.task({"none": none}))["none"]))
+    for physics, found in learned:
         header = json.loads(json.dumps(found.corrector.header()))
         arrays = {key: np.asarray(values) for key, values in found.corrector.arrays().items()}
         again = type(found)(METHODS[kind].corrector.from_arrays(header, arrays), [], 0.0)
@@ -88,8 +99,8 @@ def test_what_is_saved_says_the_same_numbers(kind, here):
 
 
 @EVERY
-def test_arrays_that_are_missing_are_refused(kind, here):
-    corrector = quick(kind).fit(here.task())["physics"].corrector
+def test_arrays_that_are_missing_are_refused(kind, fitted):
+    corrector = fitted(kind).corrector
     arrays = corrector.arrays()
     for gone in arrays:
         with pytest.raises(ResultError):
@@ -111,31 +122,30 @@ def test_a_foundation_does_not_notice_its_company(kind, here):
 
 
 @EVERY
-def test_the_same_seed_gives_the_same_digits(kind, here):
-    first, again = (quick(kind).fit(here.task(seed=3))["physics"] for _ in range(2))
+def test_the_same_seed_gives_the_same_digits(kind, here, fitted):
+    first, again = fitted(kind), quick(kind).fit(here.task())["physics"]
     np.testing.assert_array_equal(predicted(here, first, here.physics), predicted(here, again, here.physics))
     assert [row["value"] for row in first.trials] == [row["value"] for row in again.trials]
 
 
 @COMPENSATING
-def test_a_foundation_that_diverged_is_a_value_and_harms_nobody(kind, here):
+def test_a_foundation_that_diverged_is_a_value_and_harms_nobody(kind, here, fitted):
     task = here.task()
     broken = Case(here.physics, np.full_like(task.cases["physics"].paths, np.nan))
     found = quick(kind).fit(replace(task, cases={"broken": broken, **task.cases}))
     assert found["broken"].corrector is None
     assert {row["state"] for row in found["broken"].trials} == {"diverged"}
-    alone = quick(kind).fit(task)["physics"]
     np.testing.assert_allclose(
         predicted(here, found["physics"], here.physics),
-        predicted(here, alone, here.physics),
+        predicted(here, fitted(kind), here.physics),
         rtol=0,
         atol=IN_STACKS.get(kind, CLOSE),
     )
 
 
 @EVERY
-def test_an_instant_does_not_notice_the_others(kind, here):
-    found = quick(kind).fit(here.task())["physics"]
+def test_an_instant_does_not_notice_the_others(kind, here, fitted):
+    found = fitted(kind)
     chosen = np.array([7, 2, 11])
     whole = predicted(here, found, here.physics)
     np.testing.assert_allclose(predicted(here, found, here.physics, chosen), whole[:, chosen], rtol=0, atol=CLOSE)
@@ -190,8 +200,8 @@ def test_without_physics_a_method_learns_the_path(kind, here):
 
 
 @pytest.mark.parametrize("kind", ["hankel-dmd", "recurrent"])
-def test_a_past_that_is_too_short_is_refused(kind, here):
-    found = quick(kind).fit(here.task())["physics"]
+def test_a_past_that_is_too_short_is_refused(kind, here, fitted):
+    found = fitted(kind)
     instants = replace(here.test.instants(known=True), past={})
     with pytest.raises(DataError, match="past"):
         found.corrector.predict(here.physics, instants, here.physics.paths(instants))

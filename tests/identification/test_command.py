@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +14,7 @@ from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.identification import outcome
 from shipid.vessel.load import load_vessel
-from tests.cli.running import said, shell
+from tests.cli.running import ended, said
 from tests.identification.trials import trials
 from tests.report.test_page import Page
 
@@ -31,7 +34,8 @@ def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_dataset(log, tmp_path / "log.parquet")
 
 
-def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path) -> None:
+def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
     text = said(
         *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
         *("--prior", "hull.*[order >= 2]=0.5", "--bounds", f"{ONE}=[0.5, 2]", "--horizon", 0, "--test", "*3"),
@@ -120,25 +124,24 @@ def test_a_vessel_that_does_not_fit_is_one_line(vessel: str, parameters: str, me
 
 def test_the_shell_sees_one_line_and_exit_status_1(tmp_path: Path) -> None:
     (tmp_path / "log.parquet").write_text("no")
-    done = shell(
-        "identify", "gunnerus-28.9", tmp_path / "log.parquet", "--parameters", ONE, "--out", tmp_path / "a.toml"
-    )
-    assert done.returncode == 1
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "not a Parquet file" in done.stderr
+    log = tmp_path / "log.parquet"
+    status, out, err = ended("identify", "gunnerus-28.9", log, "--parameters", ONE, "--out", tmp_path / "a.toml")
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "not a Parquet file" in err
 
 
-def test_ctrl_c_is_one_line_and_writes_nothing(file: Path) -> None:
-    code = (
-        "import os, signal\nimport shipid.identification.outcome as outcome\nfrom shipid.cli import identify, main\n"
-        "identify._look = lambda *_: None\n"
-        "real = outcome.identify\n"
-        "def pressed(*given, **more):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(*given, **more)\n"
-        "outcome.identify = pressed\nmain()"
-    )
-    done = shell("identify", "gunnerus-28.9", file, "--parameters", ONE, "--html", "a.html", code=code)
-    assert done.returncode == 130
-    assert done.stderr.splitlines()[-1] == "interrupted: nothing was written"
-    assert "Traceback" not in done.stderr
+def test_ctrl_c_is_one_line_and_writes_nothing(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = outcome.identify
+
+    def pressed(*given: Any, **more: Any) -> Any:
+        os.kill(os.getpid(), signal.SIGINT)
+        return real(*given, **more)
+
+    monkeypatch.setattr(command, "_look", lambda *_: None)
+    monkeypatch.setattr(outcome, "identify", pressed)
+    status, _, err = ended("identify", "gunnerus-28.9", file, "--parameters", ONE, "--html", "a.html")
+    assert status == 130
+    assert err.splitlines()[-1] == "interrupted: nothing was written"
+    assert "Traceback" not in err
     assert [one.name for one in Path().iterdir()] == [file.name]

@@ -56,3 +56,39 @@ def test_one_side_that_is_worse_is_said_with_what_to_run_next() -> None:
 @pytest.mark.parametrize(("port", "starboard", "noise"), [(-0.14, -0.13, 0.0), (0.01, 0.0, 0.003), (0.0, 0.0, 0.02)])
 def test_sides_alike_and_noise_are_not_said(port: float, starboard: float, noise: float) -> None:
     assert uneven(compared(port, starboard, noise)) == ()
+
+
+def alike(seed: int) -> pd.DataFrame:
+    """Groups of ten zigzags of many helm angles whose errors are drawn from one law for both sides, a level a piece."""
+    rng, rows = np.random.default_rng(seed), 320
+    t = np.tile(STEP * np.arange(rows), 10)
+    run = np.repeat([f"R{k}" for k in range(10)], rows)
+    piece, half = (t // 40).astype(int), (t // 10).astype(int)
+    side = np.where(half % 2, 1.0, -1.0)
+    r = 0.03 * side
+    place = pd.Series(run + piece.astype(str) + side.astype(str)).factorize()[0]
+    level = rng.normal(0, 0.12, place.max() + 1)[place]
+    helm = np.repeat(np.array([5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 5.0, 15.0, 25.0]), rows) * DEGREE * side
+    motion = {"run": run, "piece": piece, "t": t, "u": 1.0, "v": 0.0}
+    measured, after = (
+        pd.DataFrame({**motion, "r": r * (1 + k * level), "model": name}) for k, name in ((0, "measured"), (1, "after"))
+    )
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frame = pd.DataFrame({"run": run, "t": t, **still, "rudder.delta": helm, "propeller.n": 10.0, "flags": 0})
+    return by_group(pd.concat([measured, after]), "after", SHIP, Dataset(frame, {"clock": "run", "flags": []}))
+
+
+def test_of_many_groups_alike_few_are_said_to_differ() -> None:
+    """Eight groups are tested twice each: where nothing differs, not one in ten logs may say that something does."""
+    said = [uneven(alike(seed)) for seed in range(60)]
+    assert sum(map(bool, said)) <= 6
+
+
+def test_the_error_of_the_yaw_rate_is_tested_too() -> None:
+    """Twice as large on one side by the chance of a piece is not said; by every piece it is."""
+    row = {"group": "all", "rows": 200, "u": 0.1, "v": 0.1, "turning": 0.0, "error": 0.001, "pieces": 10}
+    sides = {"starboard": {"r": 0.01, "r_error": 0.004}, "port": {"r": 0.025, "r_error": 0.009}}
+    groups = pd.DataFrame([{**row, "side": side, **error} for side, error in sides.items()])
+    assert uneven(groups) == ()
+    sure = groups.assign(r_error=[0.001, 0.002])
+    assert uneven(sure) == ("the error of the yaw rate is 2.5 times as large to port as to starboard",)

@@ -56,7 +56,7 @@ def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> N
         assert np.sqrt(np.mean((free.r[free.signals == name] * width) ** 2)) < 1e-4 * extent
 
 
-@pytest.mark.parametrize("seed", [3, 5])
+@pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
     dataset, rng = trials(SHIP, runs=4), np.random.default_rng(seed)
     wanted = settings(parameters=["hull.derivatives.*"])

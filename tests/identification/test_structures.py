@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification.settings import Identify, unknowns
 from shipid.identification.structures import (
@@ -25,6 +26,16 @@ SETTINGS = Identify(
 )
 
 
+LOGS: dict[str, Dataset] = {}
+
+
+def log_of(ship: Vessel) -> Dataset:
+    """Runs of a ship, made once and not to be changed."""
+    if ship.digest not in LOGS:
+        LOGS[ship.digest] = trials(ship, runs=3, steps=60)
+    return LOGS[ship.digest]
+
+
 def rates(vessel: Vessel, nu: tuple[float, float, float], orders: dict[str, float]) -> np.ndarray:
     model = dynamics(vessel)
     commands = [orders[name.rsplit(".", 1)[-1]] for name in model.commands]
@@ -37,7 +48,7 @@ def rates(vessel: Vessel, nu: tuple[float, float, float], orders: dict[str, floa
 @pytest.mark.parametrize("ship", [KVLCC2, GUNNERUS], ids=["kvlcc2", "gunnerus"])
 @pytest.mark.parametrize("name", list(STRUCTURES))
 def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Vessel) -> None:
-    data = trials(ship, runs=3, steps=60)
+    data = log_of(ship)
     asked = SETTINGS if ship is KVLCC2 else Identify(parameters=["hull.*"])
     found = exchange(ship, name, data, data.runs, asked)
     assert max(found.misfit.values()) < 0.16
@@ -55,7 +66,7 @@ def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Ve
 
 
 def test_the_same_structure_is_found_again() -> None:
-    data = trials(KVLCC2, runs=3, steps=60)
+    data = log_of(KVLCC2)
     found = exchange(KVLCC2, "mmg", data, data.runs, SETTINGS)
     for path, value in KVLCC2.parameters.items():
         assert found.vessel.parameters[path] == pytest.approx(value, rel=1e-4, abs=1e-6), path

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import pieces
+from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import digest_of, import_log, read_mapping
 from tests.logs.conftest import PLAIN, as_log, turning
@@ -202,8 +202,8 @@ class TestHsva:
             pytest.skip(f"no {folder.name} in the data folder")
         return folder
 
-    def test_every_zigzag_passes_the_checks(self, folder: Path) -> None:
-        dataset = import_log(read_mapping("kvlcc2-hsva"), folder)
+    def test_every_zigzag_passes_the_checks(self, hsva: Dataset) -> None:
+        dataset = hsva
         assert len(dataset.runs) == 13
         assert len(dataset.frame) == 42413
         assert check_dataset(dataset)["ok"].all()
@@ -216,7 +216,7 @@ class TestHsva:
             found = sorted([-psi.min() - 10.0, psi.max() - 10.0])
             np.testing.assert_allclose(found, sorted(expected), atol=0.05)
 
-    def test_velocities_left_out_are_estimated(self, folder: Path, tmp_path: Path) -> None:
+    def test_velocities_left_out_are_estimated(self, folder: Path, hsva: Dataset, tmp_path: Path) -> None:
         """From position and heading alone: within 1 % of what each varies by, and no further off than it says."""
         text = (Path(__file__).parents[2] / "studies" / "mappings" / "kvlcc2-hsva.toml").read_text()
         head, *blocks = text.replace("Z_*.dat", "Z_20_10_*.dat").split("[columns.")
@@ -225,8 +225,7 @@ class TestHsva:
         noise = "position = 0.001\nheading_deg = 0.02\nacceleration = 0.01\nangular_acceleration_deg = 0.3\n"
         (tmp_path / "m.toml").write_text(f"{head}\n{''.join(kept)}\n[estimate]\n{noise}")
         found = import_log(read_mapping(tmp_path / "m.toml"), folder).frame
-        whole = import_log(read_mapping("kvlcc2-hsva"), folder).frame
-        logged = whole[whole["run"].str.startswith("20_10")].reset_index(drop=True)
+        logged = hsva.frame[hsva.frame["run"].str.startswith("20_10")].reset_index(drop=True)
         for name in ("u", "v", "r"):
             error = found[name] - logged[name]
             assert np.sqrt((error**2).mean()) < 0.01 * logged[name].std()

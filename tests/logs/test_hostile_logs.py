@@ -156,11 +156,11 @@ IMPORTS: dict[str, tuple[Write, str]] = {
     "a very long line": (text(lambda g: g + "9" * 2_000_000 + "\n"), ""),
     "a very long name": (renamed("u", "u" * 100_000), "columns.u.from"),
     "control characters": (renamed("u", "\x1b[31mu\x07"), "columns.u.from"),
-    "huge": (text(lambda g: g + (ROWS[-1] + "\n") * 200_000), "twice"),
+    "huge": (text(lambda g: g + (ROWS[-1] + "\n") * 50_000), "twice"),
     "many columns": (
         text(
             lambda _: (
-                ",".join(map(str, range(1000))) + "\n" + ",".join(["1"] * 1000) + "\n" + ",".join(["2"] * 1000) + "\n"
+                ",".join(map(str, range(400))) + "\n" + ",".join(["1"] * 400) + "\n" + ",".join(["2"] * 400) + "\n"
             )
         ),
         "clock.from",

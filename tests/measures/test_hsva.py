@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-
 import numpy as np
-import pandas as pd
 import pytest
 
-from shipid.logs.importing import import_log
-from shipid.logs.mapping import read_mapping
+from shipid.data.dataset import Dataset
 from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
@@ -25,22 +20,15 @@ READ_OFF = {
 }
 
 
-@cache
-def imported(folder: Path) -> pd.DataFrame:
-    return import_log(read_mapping("kvlcc2-hsva"), folder).frame
-
-
-def columns_of(folder: Path, name: str) -> dict[str, np.ndarray]:
-    if not (folder / "kvlcc2_hsva").is_dir():
-        pytest.skip("no kvlcc2_hsva in the folder of recorded data")
-    frame = imported(folder / "kvlcc2_hsva")
-    return {str(column): values.to_numpy() for column, values in frame[frame["run"] == name].items()}
+def columns_of(hsva: Dataset, name: str) -> dict[str, np.ndarray]:
+    rows = hsva.frame[hsva.frame["run"] == name]
+    return {str(column): values.to_numpy() for column, values in rows.items()}
 
 
 @pytest.mark.parametrize("name", READ_OFF)
-def test_overshoots_are_those_of_the_readme(shared_data: Path, name: str) -> None:
+def test_overshoots_are_those_of_the_readme(hsva: Dataset, name: str) -> None:
     """About the ordered course, 0, to 0.03 deg; about the heading at the execute to 0.1 deg."""
-    record = record_of(columns_of(shared_data, name))
+    record = record_of(columns_of(hsva, name))
     exact, found = zigzag(record, course=0.0), zigzag(record)
     assert found["execute_heading"].value == pytest.approx(10 * DEGREE)
     assert found["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
@@ -50,9 +38,9 @@ def test_overshoots_are_those_of_the_readme(shared_data: Path, name: str) -> Non
 
 
 @pytest.mark.parametrize("name", READ_OFF)
-def test_a_run_at_1_hz_says_the_same(shared_data: Path, name: str) -> None:
+def test_a_run_at_1_hz_says_the_same(hsva: Dataset, name: str) -> None:
     """20 Hz to 1 Hz, at full scale a row every 7 s: overshoots to 0.1 deg, their times to 0.1 s."""
-    columns = columns_of(shared_data, name)
+    columns = columns_of(hsva, name)
     fine = zigzag(record_of(columns), course=0.0)
     for offset in (0, 7, 13):
         coarse = zigzag(record_of({key: values[offset::20] for key, values in columns.items()}), course=0.0)
@@ -62,14 +50,14 @@ def test_a_run_at_1_hz_says_the_same(shared_data: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "heading"), [("05_01", 1), ("10_05", 5), ("15_01", 1), ("20_05", 5), ("35_05", 5)])
-def test_every_zigzag_is_recognised_with_its_execute_heading(shared_data: Path, name: str, heading: int) -> None:
-    record = record_of(columns_of(shared_data, name))
+def test_every_zigzag_is_recognised_with_its_execute_heading(hsva: Dataset, name: str, heading: int) -> None:
+    record = record_of(columns_of(hsva, name))
     assert kinds_of(record) == (("zigzag",), "")
     assert zigzag(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
 
 
-def test_a_short_log_leaves_measures_out_with_a_sentence(shared_data: Path) -> None:
-    found = zigzag(record_of(columns_of(shared_data, "10_10_P")))
+def test_a_short_log_leaves_measures_out_with_a_sentence(hsva: Dataset) -> None:
+    found = zigzag(record_of(columns_of(hsva, "10_10_P")))
     assert np.isnan(found["period"].value)
     assert found["period"].why == "the log ends before the fourth execute"
     judged = {one.name: one for one in criteria("zigzag", found, 7.0)}

@@ -89,7 +89,8 @@ def test_neutral_numbers_leave_the_expressions_as_they_were(function: Any) -> No
     nu_r, n = ca.SX.sym("nu", 6), ca.SX.sym("n")
     names = {"x", "D_p", "w_P0", "C_1", "C_2_plus", "C_2_minus"} | ({"t_P", "rho"} if function is propeller else set())
     numbers = {name: ca.SX.sym(name) for name in sorted(names)} | {"K_T": {"1": ca.SX.sym("a"), "J": ca.SX.sym("b")}}
-    neutral = {"tau": 0.0, "C_P": 0.0, "k_suction": 0.0, "K_T_astern": None, "k_astern": 1.0}
+    neutral: dict[str, Any] = {"tau": 0.0, "C_P": 0.0, "K_T_astern": None, "k_astern": 1.0}
+    neutral |= {"k_suction": 0.0} if function is wash else {}
     assert str(function(nu_r, n, **numbers)) == str(function(nu_r, n, **numbers, **neutral))
 
 
@@ -203,7 +204,7 @@ def test_a_screw_in_four_quadrants_is_continuous_and_finite_at_rest() -> None:
     assert in_four_quadrants(0.0, 0.0)[0] == 0
 
 
-QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4, "rho": 1014.0}
+QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4}
 
 
 def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
@@ -213,7 +214,7 @@ def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
 
 def quadratic_flow(u: float, n: float, **other: Any) -> np.ndarray:
     nu_r = ca.SX(np.array([u, 0.1, 0, 0, 0, 0]))
-    given = {name: value for name, value in {**QUADRATIC, **other}.items() if name != "x"}
+    given = {name: value for name, value in {**QUADRATIC, "rho": 1014.0, **other}.items() if name != "x"}
     return np.array(ca.evalf(quadratic_wash(nu_r, ca.SX(n), **given))).ravel()
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, bands
-from shipid.report.page import render
+from shipid.report.page import page
 from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
 
@@ -76,9 +76,9 @@ def test_the_map_of_the_width(banded: ReportContent) -> None:
 def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
     only = {"how-far-off": SECTIONS["how-far-off"]}
     none = {name: getattr(banded, name).iloc[:0] for name in ("horizon", "over_time", "trials")}
-    page = render(replace(banded, snapshots=[], answer=[], findings=[], **none))
-    assert "How far off it may be" in page
-    assert NASTY not in page
+    text = page(replace(banded, snapshots=[], answer=[], findings=[], **none), only, "study")
+    assert "How far off it may be" in text
+    assert NASTY not in text
     (section,) = drawn(only, banded)
     assert [item.id for item in section.items] == list(bands.SECTION.anchors)
 

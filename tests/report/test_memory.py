@@ -9,11 +9,12 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, memory
-from shipid.report.page import render
+from shipid.report.page import page
 from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
 
 NASTY = "<b>wrong</b>"
+ONLY = {"the-past": SECTIONS["the-past"]}
 SUMS = [  # comparison, model, N_D, A, H_without, H_with, low, high
     ("memory: b against a", "right", 10, 1.0, 0.8, 0.7, -0.2, -0.01),
     ("memory: b against a", "right", 30, 1.0, 0.6, 0.55, -0.1, 0.02),
@@ -57,15 +58,15 @@ def little(past: ReportContent) -> ReportContent:
 
 
 def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent) -> None:
-    past, text = little, render(little)
+    text = page(little, ONLY, "study")
     assert "What the past shows" in text
     assert NASTY not in text
-    section = next(one for one in drawn(SECTIONS, past) if one.id == "the-past")
+    (section,) = drawn(ONLY, little)
     assert [item.id for item in section.items] == list(SECTIONS["the-past"].anchors)
 
 
 def test_a_study_without_a_past_has_no_such_section(little: ReportContent) -> None:
-    assert "What the past shows" not in render(replace(little, frames={}))
+    assert "What the past shows" not in page(replace(little, frames={}), ONLY, "study")
 
 
 def test_an_observer_alone_is_shown(past: ReportContent) -> None:
@@ -88,7 +89,7 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     assert force.y == pytest.approx(-2.0)  # cm/s^2
 
 
-@pytest.mark.parametrize(("fade", "words"), [(0.0, "fades at once"), (np.inf, "does not fade")])
+@pytest.mark.parametrize(("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade")])
 def test_the_ends_of_the_fade_are_named(past: ReportContent, fade: float, words: str) -> None:
     figure = memory.observer(replace(past, frames={"observer": along(fade=fade)}))
     assert figure is not None

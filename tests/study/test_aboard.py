@@ -13,6 +13,7 @@ from shipid.errors import DataError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
+from shipid.study import aboard
 from shipid.study.aboard import play, summary, write
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
@@ -159,3 +160,11 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
 def test_a_wrong_interval_is_refused(predictor, tmp_path):
     with pytest.raises(DataError, match="--every"):
         play(predictor, saved(log(), tmp_path), every=0.0)
+
+
+def test_alarms_are_at_the_times_that_the_log_has():
+    """Dates where its clock has them, and not seconds since 1970; else seconds of its clock."""
+    rows = pd.DataFrame({"run": "a", "t": [1652954400.0, 1652954405.0, 1652954410.0], "outside": [True, True, False]})
+    assert aboard._spans(rows) == ["  a: from 2022-05-19 10:00:00 to 2022-05-19 10:00:05 UTC"]
+    early = rows.assign(t=[36000.0, 36005.5, 36010.0])
+    assert aboard._spans(early) == ["  a: from 36000.0 to 36005.5 s"]

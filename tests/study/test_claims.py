@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
 import random
 import socket
 import threading
@@ -17,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from shipid.study import claims
-from shipid.study.claims import Claims, held
+from shipid.study.claims import Claims, TakenOver, held
 
 
 def test_a_unit_is_claimed_once(tmp_path: Path) -> None:
@@ -166,6 +167,44 @@ def test_what_one_process_has_lost_it_does_not_give_back(tmp_path: Path) -> None
         assert other.take("a")
         slow.give_back("a")
         assert held(tmp_path) == ["a"]
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_worker_sees_that_the_claim_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool) -> None:
+    """What says who holds the claims travels to workers; it names who has taken a unit over, or that it is gone."""
+
+    def refused(*_: object) -> None:
+        raise OSError(errno.EPERM, "no links here")
+
+    if not links:
+        monkeypatch.setattr(os, "link", refused)
+    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+        assert slow.take("a")
+        holder = pickle.loads(pickle.dumps(slow.holder))
+        holder.check("a")
+        (tmp_path / "claims" / "a").unlink()
+        with pytest.raises(TakenOver, match="a: no longer claimed"):
+            holder.check("a")
+        assert other.take("a")
+        with pytest.raises(TakenOver, match=f"a: process {os.getpid()} on {socket.gethostname()} has taken it over"):
+            holder.check("a")
+        other.holder.check("a")
+
+
+def test_once_waits_for_the_one_that_took_over(tmp_path: Path) -> None:
+    """A process that was held up while it made a thing takes what the other one makes."""
+    made: list[str] = []
+    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+
+        def held_up() -> None:
+            (tmp_path / "claims" / "thing").unlink()
+            assert other.take("thing")
+            made.append("other")
+            slow.holder.check("thing")
+
+        slow.once("thing", lambda: bool(made), held_up)
+        assert made == ["other"]
+        assert held(tmp_path) == ["thing"]
 
 
 def test_once_is_once(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def napping(seconds: float) -> Callable[[int, int], int]:
 
 def test_no_scheduler_is_one_line() -> None:
     with pytest.raises(ShipidError, match="no Dask scheduler answers there") as caught:
-        list(on_dask("nonsense://x", napping(0.0), 1, {"a": 1}, "x"))
+        list(on_dask("nonsense://x", napping(0.0), 1, [("a", 1)], "x"))
     assert "\n" not in str(caught.value)
 
 
@@ -68,14 +68,24 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
     options = {"processes": False, "protocol": "tcp://", "dashboard_address": ":0", "silence_logs": 50}
     with LocalCluster(n_workers=1, threads_per_worker=1, **options) as local:
         address = local.scheduler_address
-        tasks = {f"t{i}": i for i in range(4)}
-        assert sorted(on_dask(address, napping(0.0), 10, tasks, "x")) == [(i, 10 + i) for i in range(4)]
+        taken: list[int] = []
+
+        def tasks() -> Iterator[tuple[str, int]]:
+            for i in range(12):
+                taken.append(i)
+                yield f"t{i}", i
+
+        found = []
+        for number, result in enumerate(on_dask(address, napping(0.0), 10, tasks(), "x")):
+            assert len(taken) <= number + cluster.AHEAD, "others may take what no worker needs yet"
+            found.append(result)
+        assert sorted(found) == [(i, 10 + i) for i in range(12)]
 
         def failing(_: int, task: int) -> float:
             return 1 / task
 
         with pytest.raises(ZeroDivisionError):
-            list(on_dask(address, failing, 10, {"t": 0}, "y"))
+            list(on_dask(address, failing, 10, [("t", 0)], "y"))
 
 
 @pytest.mark.slow
@@ -85,7 +95,7 @@ def test_a_scheduler_that_dies_or_falls_silent_is_one_line(
 ) -> None:
     monkeypatch.setattr(cluster, "SILENT", 3.0)
     with a_cluster(tmp_path) as (address, (scheduler, _)):
-        results = on_dask(address, napping(0.3), 1, {f"t{i}": i for i in range(2000)}, "x")
+        results = on_dask(address, napping(0.3), 1, ((f"t{i}", i) for i in range(2000)), "x")
         next(results)
         scheduler.send_signal(sent)
         killed = time.monotonic()
@@ -101,7 +111,7 @@ def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.Mon
     """Between the two there is no worker, and what both need must be sent anew."""
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     monkeypatch.setattr(cluster, "LOOK", 0.2)
-    tasks = {f"t{i}": i for i in range(6)}
+    tasks = [(f"t{i}", i) for i in range(6)]
     found: Done = []
     with a_cluster(tmp_path) as (address, (_, first)):
         results = on_dask(address, napping(0.3), 10, tasks, "x")
@@ -137,6 +147,6 @@ def test_a_task_that_kills_its_workers_is_named_when_the_others_are_done(tmp_pat
     with a_cluster(tmp_path, workers=0) as (address, _), workers(address, tmp_path):
         found: Done = []
         with pytest.raises(ShipidError, match=r"perhaps for want of memory, at .*t1.* and larger workers") as caught:
-            found.extend(on_dask(address, hungry, 0, {"t0": 0, "t1": 1}, "x"))
+            found.extend(on_dask(address, hungry, 0, [("t0", 0), ("t1", 1)], "x"))
     assert "\n" not in str(caught.value)
     assert all(task != 1 for task, _ in found)

@@ -27,6 +27,7 @@ def test_no_effect_is_confirmed_in_at_most_5_percent(case: str, runs: int, seeds
         assert round(found["refuted"] * tables) <= allowed(tables)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_more_evidence_never_makes_a_true_effect_less_likely_confirmed(case: str) -> None:
     """More test manoeuvres, then more seeds: the share may fall by what 20 tables leave to chance, no more."""

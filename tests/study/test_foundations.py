@@ -177,10 +177,10 @@ def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
 @pytest.mark.parametrize(
     ("block", "path", "said"),
     [
-        ({"parameters": ["hull.derivatives.Q_q"]}, "family.1.identify.parameters", "selects nothing"),
-        ({"parameters": PATHS, "fixed": PATHS}, "family.1.identify.fixed", "nothing is left"),
-        ({"parameters": PATHS, "weight": {}}, "family.1.identify.weight", "weights"),
-        ({}, "family.1.identify.parameters", "missing"),
+        ({"parameters": ["hull.derivatives.Q_q"]}, "family.fitted.identify.parameters", "selects nothing"),
+        ({"parameters": PATHS, "fixed": PATHS}, "family.fitted.identify.fixed", "none is left"),
+        ({"parameters": PATHS, "weight": {}}, "family.fitted.identify.weight", "weights"),
+        ({}, "family.fitted.identify.parameters", "missing"),
     ],
 )
 def test_a_wrong_block_is_one_line(recorded: Recorded, block: dict[str, Any], path: str, said: str) -> None:

@@ -115,7 +115,7 @@ def test_results_of_several_parts_are_read_one_by_one(four: tuple[Plan, Path], t
 
 BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "two of a name": ({"condition": [{"name": "a"}, {"name": "a"}]}, "condition.1.name", "two conditions"),
-    "a name that is no file": ({"condition": [{"name": "a/b"}]}, "condition.0.name", "pattern"),
+    "a name that is no file": ({"condition": [{"name": "a/b"}]}, "condition.a/b.name", "pattern"),
     "no value": ({"repeat": {"seed": []}}, "repeat.seed", "at least 1"),
     "an unknown block": ({"repeat": {"sead": [1]}}, "repeat.sead", "did you mean 'seed'"),
     "a part of parts": ({"repeat": {"repeat.seed": [1]}}, "repeat.repeat.seed", "no such block"),

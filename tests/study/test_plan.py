@@ -110,7 +110,8 @@ def test_worlds_of_memory_have_every_member_with_and_without_an_observer(name: s
 
 
 def test_the_first_instant_comes_after_the_run_up() -> None:
-    plan = read_plan("zigzags", {"truth.run_up": 32.0})
+    few = {"truth.manoeuvres": 4, "split.test": 1, "grid.N_D": [2], "truth.step": 0.5}
+    plan = read_plan("zigzags", {"truth.run_up": 32.0, **few})
     assert plan.past == 32
     windows = all_windows(plan, obtain(plan))
     assert (windows.t.min(), windows.t.max()) == (32.0, 32.0 + 59.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,32 @@ def test_an_interrupted_rotation_goes_on_to_the_same_digits(
     pd.testing.assert_frame_equal(again, whole, check_exact=True)
     rotate_module.forget(kept)
     assert not (tmp_path / "rows.csv.turns").exists()
+
+
+def test_two_rotations_to_one_file_share_the_work(
+    recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each batch is computed once, the other process waits for it; the one that ends last removes what was kept."""
+    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
+    kept, begun = rotate_module.kept_folder(tmp_path / "rows.csv", plan, dataset), []
+
+    def counted(*arguments: Any) -> Any:
+        begun.append(arguments)
+        return run_unit(*arguments)
+
+    monkeypatch.setattr(rotate_module, "run_unit", counted)
+    first = rotate(plan, dataset, ["a", "b"], kept=kept)
+    one = [next(first)]
+    second = threading.Thread(target=lambda: found.extend(rotate(plan, dataset, ["a", "b"], kept=kept)))
+    found: list[pd.DataFrame] = []
+    second.start()
+    one += list(first)
+    rotate_module.forget(kept)
+    second.join()
+    assert len(begun) == 2
+    pd.testing.assert_frame_equal(pd.concat(found), pd.concat(one), check_exact=True)
+    rotate_module.forget(kept)
+    assert not kept.exists()
 
 
 def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +21,7 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.claims import Claims
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
@@ -154,6 +155,66 @@ def test_what_another_process_finishes_is_waited_for(tmp_path: Path, tiny_run: P
         ("end", 8),
     ]
     assert numbers(folder) == numbers(tiny_run)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over(
+    late: bool, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its search writes no more to the journal, or its results are not stored; the other units go on."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    store.open_folder(folder, plan)
+    fit, lost = PathDrawn.fit, list[str]()
+    with Claims(folder) as other:
+
+        def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
+            found = fit(self, task) if late or lost else {}
+            if not lost:
+                (claim,) = (folder / "claims").glob("N*")
+                claim.unlink()
+                assert other.take(claim.name)
+                lost.append(claim.name)
+            return found or fit(self, task)
+
+        monkeypatch.setattr(PathDrawn, "fit", held_up)
+        *events, end = events_here(plan, folder, leave=True)
+        said = [event.text for event in events if "has taken it over" in event.text]
+        assert [words.split(":")[0] for words in said] == lost
+        assert (end.done, end.total) == (4, 8)
+        assert not (folder / "batches" / f"{lost[0]}.json").exists()
+        journal = folder / "trials" / f"{lost[0]}.log"
+        assert (journal.stat().st_size > 0) == late
+    run_here(plan, folder)
+    assert numbers(folder) == numbers(tiny_run)
+
+
+@pytest.mark.parametrize("leave", [False, True])
+@pytest.mark.parametrize("pattern", ["dataset.parquet", "cells/right+drawn-N0006-s0.npz"])
+def test_of_processes_that_start_together_one_mends(pattern: str, leave: bool, tmp_path: Path, tiny_run: Path) -> None:
+    """Another process has joined a folder with a damaged file, and has not looked."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    (folder / pattern).write_bytes(b"half")
+    with Claims(folder) as other:
+        assert other.take("elsewhere")
+        *events, end = events_here(plan, folder, leave=leave)
+    assert any("damaged: computed again" in event.text for event in events)
+    assert (end.done, end.total) == (8, 8)
+    assert seals.faults(folder) == []
+    assert numbers(folder) == numbers(tiny_run)
+
+
+def test_what_is_mended_while_a_process_works_is_done_again(tmp_path: Path, tiny_run: Path) -> None:
+    """A unit that it took for finished is none any more: it does not end before all are."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    shutil.copytree(tiny_run, folder)
+    seals.remove(folder, "N0004-s0")
+    for event in events_here(plan, folder):
+        if event.kind == "start":
+            seals.remove(folder, "N0006-s0")
+    assert event.done == 8
+    assert numbers(folder) == numbers(tiny_run)
+    assert seals.is_sealed(folder, "results")
 
 
 def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.identification.settings import Identify
+from shipid.identification.solve import Solution, identify
 from shipid.identification.structures import exchange
 from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
@@ -108,6 +111,29 @@ def test_what_cannot_be_compared_is_refused() -> None:
         compare_structures(SHIP, data, SETTINGS, ["mmg"], ahead=0.5)
     with pytest.raises(ShipidError, match="'kubic' is no structure"):
         compare_structures(SHIP, data, SETTINGS, ["kubic"])
+
+
+def test_a_run_held_out_decides_nothing_in_the_fit_that_predicts_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fit to all runs is one more that has seen it: a fold does not begin from there."""
+    fits: list[tuple[tuple[str, ...], bytes]] = []
+
+    def fitted(*args: Any, **kwargs: Any) -> Solution:
+        solution = identify(*args, **kwargs, progress=lambda number, _: number >= 2)
+        fits.append((tuple(solution.runs), np.array(list(solution.values.values())).tobytes()))
+        return replace(solution, status="ok")
+
+    monkeypatch.setattr("shipid.study.structures.identify", fitted)
+    monkeypatch.setattr("shipid.study.structures._table", lambda *_: 1 / 0)  # all is fitted
+    data = zigzags(SHIP)
+    frame = data.frame.copy()
+    frame.loc[frame["run"] == data.runs[0], ["u", "v", "r"]] *= 1.05
+    for one in (data, Dataset(frame, data.metadata)):
+        with pytest.raises(ZeroDivisionError):
+            compare_structures(SHIP, one, SETTINGS, ["modulus"], data.runs[:2], ahead=20.0, folds=2, level=None)
+    plain, changed = fits[:3], fits[3:]
+    assert [runs for runs, _ in plain] == [runs for runs, _ in changed]
+    for (runs, one), (_, other) in zip(plain, changed, strict=True):
+        assert (one == other) == (data.runs[0] not in runs)
 
 
 @pytest.mark.slow

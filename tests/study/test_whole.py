@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
@@ -19,15 +20,15 @@ from shipid.errors import DocumentError
 from shipid.hybrid.features import Inputs, Memory, group_of
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
-from shipid.observer import Observer, observe
+from shipid.observer import Estimates, Observer, observe
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import apply, store
 from shipid.study.apply import predict_log
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import at_instants, instants_of, prepare
-from shipid.study.results import read_results
-from shipid.vessel.load import load_vessel
+from shipid.study.results import Results, read_results
+from shipid.vessel.load import Vessel, load_vessel
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here, tiny_plan
 
@@ -97,6 +98,27 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 
 @pytest.fixture(scope="module")
+def results(whole: Finished) -> Results:
+    """What its folder holds."""
+    return read_results(whole.folder)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def observed_once() -> Iterator[None]:
+    """Predictors of one vessel share what its observer sees along one log."""
+    seen: dict[tuple[Any, ...], Estimates] = {}
+
+    def once(vessel: Vessel, dataset: Dataset, observer: Observer) -> Estimates:
+        key = (vessel.digest, tuple(vessel.parameters.items()), dataset.digest, observer.model_dump_json())
+        if key not in seen:
+            seen[key] = observe(vessel, dataset, observer)
+        return seen[key]
+
+    with patch.object(apply, "observe", once):
+        yield
+
+
+@pytest.fixture(scope="module")
 def along(whole: Finished, tmp_path_factory: pytest.TempPathFactory) -> dict[str, pd.DataFrame]:
     """What each cell predicts along the log of the study."""
     out = tmp_path_factory.mktemp("along") / "paths.parquet"
@@ -114,7 +136,7 @@ def later_changed(dataset: Dataset, spared: tuple[str, ...] = ()) -> Dataset:
     return Dataset(frame, dataset.metadata)
 
 
-def test_all_cells_are_there(whole: Finished) -> None:
+def test_all_cells_are_there(whole: Finished, results: Results) -> None:
     """Foundations that are variants, observed, identified, and both, each with each method that meets it."""
     pairs = {(row.foundation, row.method) for row in whole.rows.itertuples()}
     meets_none = {("none", name) for name, method in KINDS.items() if method.meets_none}
@@ -122,7 +144,7 @@ def test_all_cells_are_there(whole: Finished) -> None:
     refused = {(f["name"], kind) for f in FAMILIES if "observer" in f for kind in no_observer}
     assert pairs == {(f["name"], kind) for f in FAMILIES for kind in KINDS} - refused | meets_none
     assert len(refused) >= 2
-    notes = read_results(whole.folder).provenance["notes"]
+    notes = results.provenance["notes"]
     assert {f"{kind} takes no observer: not fitted to seen, both" for kind in no_observer} <= set(notes)
     assert (whole.rows["status"] == "ok").all(), whole.rows[["cell", "status", "sentence"]]
 
@@ -145,8 +167,7 @@ def test_an_identified_and_observed_family_has_both(whole: Finished) -> None:
     assert accuracy["fitted"] < accuracy["wrong"]
 
 
-def test_an_observer_changes_what_every_method_predicts_that_meets_it(whole: Finished) -> None:
-    results = read_results(whole.folder)
+def test_an_observer_changes_what_every_method_predicts_that_meets_it(whole: Finished, results: Results) -> None:
     cells = whole.rows.set_index(["foundation", "method"])["cell"]
     for kind, method in KINDS.items():
         if method.meets_observer:
@@ -173,14 +194,13 @@ def test_a_family_with_an_observer_is_refused_by_name(whole: Finished) -> None:
     assert plan.methods[0].foundations == ("wrong", "fitted", "none")
 
 
-def test_stored_predictors_give_the_paths_of_the_results(whole: Finished) -> None:
-    results = read_results(whole.folder)
+def test_stored_predictors_give_the_paths_of_the_results(whole: Finished, results: Results) -> None:
     for cell in whole.rows["cell"]:
         first = Predictor.load(store.cell_file(whole.folder, cell))
         again = Predictor.load(first.save(whole.folder.parent / "again.npz"))
         estimates = None
         if again.vessel is not None and again.physics.observer is not None:
-            estimates = observe(again.vessel, results.dataset, again.physics.observer)
+            estimates = apply.observe(again.vessel, results.dataset, again.physics.observer)
         instants = instants_of(whole.plan, again.vessel, results.dataset, results.test, estimates)
         np.testing.assert_allclose(again.predict(instants), results.paths[cell], atol=1e-9, err_msg=cell)
 
@@ -192,9 +212,8 @@ def test_the_report_shows_every_cell(whole: Finished) -> None:
         assert name in page
 
 
-def test_along_a_log_predictions_are_those_of_the_study(whole: Finished, along: dict[str, pd.DataFrame]) -> None:
+def test_along_a_log_predictions_are_those_of_the_study(results: Results, along: dict[str, pd.DataFrame]) -> None:
     """Memory, observers and identified numbers: what `predict_log` writes is what the study judged."""
-    results = read_results(whole.folder)
     test = results.test
     north, east, psi = (test.columns[name] for name in ("north", "east", "psi"))
     for cell, frame in along.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -61,13 +62,21 @@ def run_here(plan: Plan, folder: Path) -> list[run.Event]:
 
 def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.Event]:
     """The same, event by event."""
+    with without_workers():
+        yield from run.run_study(plan, folder, leave=leave)
+
+
+@contextmanager
+def without_workers() -> Iterator[None]:
+    """Whatever runs a study computes it in this process."""
 
     def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
         for unit in units:
-            yield unit, run.run_unit(plan, prepared, unit, "cpu", rest[-1] / store.JOURNALS)
+            *_, holder, place = rest
+            yield unit, run._claimed(plan, prepared, unit, "cpu", place / store.JOURNALS, holder)
 
     with patch.object(run, "_compute", compute):
-        yield from run.run_study(plan, folder, leave=leave)
+        yield
 
 
 def logged(runs: Mapping[str, Mapping[str, Any]], t: np.ndarray, **metadata: Any) -> Dataset:

@@ -11,7 +11,7 @@ from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
 from shipid.physics.inertia import rigid_body
 from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import kinds, parameters, signals, structural, term_blocks, vessel_model
+from shipid.vessel.schema import kinds, parameters, signals, structural, term_blocks, term_parameters, vessel_model
 
 
 @pytest.mark.parametrize("key", list(TERMS))
@@ -110,3 +110,15 @@ def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
     assert signals(memory.advance) == ("command", "state", "dt")
     numbers = {p.name: 1.0 for p in parameters(memory.advance) if p.default is None}
     assert float(memory.advance(ca.SX(0.7), ca.SX(0.7), ca.SX(0.5), **numbers)) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("key", [key for key, term in TERMS.items() if term.gives])
+def test_what_a_term_gives_has_its_parameters_in_the_same_block(key: str) -> None:
+    """Those that only the wash takes are keys of the block too, and the force does not list them."""
+    term = TERMS[key]
+    names = [parameter.name for parameter in term_parameters(term)]
+    assert len(names) == len(set(names))
+    for function in (term.function, *term.gives.values()):
+        assert {parameter.name for parameter in parameters(function)} <= set(names)
+    if key == "thruster.quadratic":
+        assert "c_uu" in set(names) - {parameter.name for parameter in parameters(term.function)}

@@ -6,6 +6,7 @@ log cannot decide is asked. A guess is a draft for a person to read. It corrects
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -22,6 +23,7 @@ from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
 from shipid.logs.guess.pose import choose_pose
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
+from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.words import parts_of, wind_kind
 
 LIKELY = 0.6
@@ -32,14 +34,14 @@ class Guess:
     """The result of a guess.
 
     source : the files. columns, findings, questions : suggested columns, defects, and what the log cannot decide.
-    unused : columns without a meaning.
+    unused : column without a meaning -> why.
     """
 
     source: Source
     columns: tuple[Suggestion, ...]
     findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
-    unused: tuple[str, ...]
+    unused: Mapping[str, str]
 
     @property
     def file(self) -> Path:
@@ -77,9 +79,10 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t))
-    for name, values in columns.items():
-        if np.array_equal(values, np.arange(len(values)) + values[0]):
-            state.taken.add(name)  # numbers of rows
+    numbering = tuple(
+        name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
+    )
+    state.taken.update(numbering)
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
     choose_pose(state, source.path)
@@ -92,7 +95,7 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     _others(state)
     defects_of_rows(state, sniffed)
     defects_of_motion(state)
-    left = tuple(state.free())
+    left = reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
 
 

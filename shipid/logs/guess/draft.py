@@ -149,7 +149,7 @@ def _columns(guess: Guess) -> Iterator[str]:
     for column in guess.columns:
         yield f"\n[columns.{_key(column.name)}]    # {_percent(column.confidence)}{_mark(column)}: {column.evidence}"
         yield from _lines({"from": column.source, "unit": column.unit, **column.extra})
-    unused = [*(f"column {name!r} is not used" for name in guess.unused), *guess.sniffed.notes]
+    unused = [*(f"column {name!r} is not used: {why}" for name, why in guess.unused.items()), *guess.sniffed.notes]
     if unused:
         yield ""
         yield from (f"# {words}" for words in unused)

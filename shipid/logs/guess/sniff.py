@@ -250,8 +250,7 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
             column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")
         values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
         values[np.isinf(values)] = np.nan
-        texts = table.iloc[:, index].dropna().astype(str).str.strip()
-        if np.isnan(values).all() and texts.ne("").any():
+        if np.isnan(values).all() and table.iloc[:, index].dropna().astype(str).str.strip().ne("").any():
             words.append(name)
         elif name and name not in columns:
             columns[name] = values

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.data.checks import check_dataset
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
@@ -78,11 +79,8 @@ def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) ->
         assert [6005.0 <= s.start <= 6200.0 for s in elsewhere] == [True] * (kind == "turning")
 
 
-def test_every_hsva_file_is_a_zigzag(data_folder: Path) -> None:
-    if not (data_folder / "kvlcc2_hsva").is_dir():
-        pytest.skip("no kvlcc2_hsva in the data folder")
-    dataset = import_log(read_mapping("kvlcc2-hsva"), data_folder / "kvlcc2_hsva")
-    assert {kind_of(rows) for _, rows in dataset.frame.groupby("run")} == {"zigzag"}
+def test_every_hsva_file_is_a_zigzag(hsva: Dataset) -> None:
+    assert {kind_of(rows) for _, rows in hsva.frame.groupby("run")} == {"zigzag"}
 
 
 def test_segments_are_text_to_edit(tmp_path: Path) -> None:

@@ -1,0 +1,70 @@
+"""Why a column of a log has no place in the draft: a sentence for each, so that a person may put it in by hand."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from shipid.logs.guess.clues import UNIT_WORDS, State, unit_said
+from shipid.logs.guess.words import fits, is_order
+from shipid.logs.mapping import INPUTS, UNITS
+from shipid.physics.signals import SIGNALS
+
+ALIKE = (
+    {"latitude", "longitude", "north", "east", "x", "y"},
+    {"u", "v", "speed", "course", "velocity_north", "velocity_east"},
+)
+"""Meanings of which a log needs one pair: what gives the position, what gives the velocity."""
+
+
+def reasons(state: State, numbering: tuple[str, ...] = ()) -> dict[str, str]:
+    """Column of the log without a meaning -> why: no known quantity, its values, its unit, or a better candidate.
+
+    numbering : columns that hold the numbers of the rows.
+    """
+    return {name: _reason(state, name, name in numbering) for name in [*numbering, *state.free()]}
+
+
+def _reason(state: State, name: str, numbers: bool) -> str:
+    if numbers:
+        return "it holds the numbers of the rows"
+    meanings = sorted((scores := fits(name)), key=lambda meaning: -scores[meaning])
+    if not meanings:
+        return "its name says no known quantity, and no other column is like it"
+    meaning = meanings[0]
+    if not meaning or meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:
+        return "it is a quantity that a dataset does not take"
+    if (unit := _wrong_unit(name, _unit(meaning))) is not None:
+        return f"its unit {unit} does not fit {_word(meaning)}"
+    group = next((alike for alike in ALIKE if meaning in alike), {meaning})
+    better = [one.source for one in state.suggestions if one.name.rsplit(".", 1)[-1] in group]
+    if better:
+        what = "an order, and the measured " if is_order(name) else ""
+        return f"{what}{_word(meaning)} is read from {' and '.join(map(repr, better))}"
+    if np.ptp(state.columns[name]) == 0:
+        return f"it may be {_word(meaning)}, but it is the same in every row"
+    return f"it may be {_word(meaning)}, but the motion in the log does not bear that out"
+
+
+def _word(meaning: str) -> str:
+    return {"x": "the position", "y": "the position"}.get(meaning) or (
+        SIGNALS[meaning].word if meaning in SIGNALS else meaning.replace("_", " ")
+    )
+
+
+def _unit(meaning: str) -> str:
+    if meaning in SIGNALS:
+        return SIGNALS[meaning].unit
+    return INPUTS.get(meaning, "m" if meaning in ("x", "y") else "m/s")
+
+
+def _wrong_unit(name: str, si: str) -> str | None:
+    """The unit that stands in brackets in a name, where it is a known one that does not convert to the SI unit."""
+    if si not in UNITS or unit_said(name, si) is not None:
+        return None
+    inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
+    known = (
+        word for word in inside for expected in UNIT_WORDS.values() if re.fullmatch(expected, word.strip().lower())
+    )
+    return next(known, None)

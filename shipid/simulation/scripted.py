@@ -1,0 +1,74 @@
+"""Runs of a vessel by a document of manoeuvres: drawn as a `[truth]` says, or `[[manoeuvre]]` after `[[manoeuvre]]`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from shipid import document as documents
+from shipid.errors import DocumentError, ShipidError, choices
+from shipid.simulation.approach import Controls
+from shipid.simulation.manoeuvre import KINDS, Manoeuvre
+from shipid.simulation.perform import perform
+from shipid.simulation.truth import Truth, simulate
+from shipid.vessel.load import Vessel
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class Script(BaseModel):
+    """Given manoeuvres: blocks with a `kind` and the keys of the kind, a run each; times in s."""
+
+    model_config = ConfigDict(extra="forbid")
+    manoeuvre: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    step: Annotated[Positive, Field(description="s, of the integration")] = 0.05
+    interval: Annotated[Positive, Field(description="s between logged rows, a multiple of step")] = 1.0
+
+
+def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
+    """Simulate a vessel by the manoeuvres of a document; the columns are those of a dataset.
+
+    Parameters
+    ----------
+    name : bundled study, or path of a TOML document. Its `[truth]` draws the manoeuvres, weather and sensor noise; the
+        vessel and its changes that it names are left out. Without one, its `[[manoeuvre]]` blocks are performed in
+        calm water.
+
+    Raises DocumentError with file, path and remedy for what this vessel cannot perform.
+    """
+    file = documents.find(name, "studies")
+    document = documents.read(file)
+    documents.check_values(document, file)
+    truth = document.get("truth")
+    try:
+        if isinstance(truth, Mapping):
+            drawn = {key: value for key, value in truth.items() if key != "set"} | {"vessel": vessel.key}
+            return simulate(documents.parse(Truth, drawn, file, "truth"), vessel)
+        if "manoeuvre" not in document:
+            raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
+        script = documents.parse(Script, document, file)
+        frame = perform(vessel, _given(script, vessel), step=script.step, interval=script.interval)
+    except ShipidError as error:
+        raise DocumentError(error.message, file=file, path=error.path) from None
+    return frame.drop(columns=[column for column in frame if str(column).startswith("actual.")])
+
+
+def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
+    """The manoeuvres of a document, which this vessel can perform."""
+    controls, found = Controls(vessel), []
+    for place, block in enumerate(script.manoeuvre):
+        kind, where = str(block.get("kind", "")), f"manoeuvre.{place}"
+        if kind not in KINDS:
+            raise DocumentError(f"{kind!r} is no kind of manoeuvre: {choices(kind, KINDS)}", path=f"{where}.kind")
+        rest = {key: value for key, value in block.items() if key != "kind"}
+        one: Manoeuvre = documents.parse(KINDS[kind], rest, None, where)
+        try:
+            one.check(controls)
+        except DocumentError as error:
+            key = (error.path or "").removeprefix("manoeuvre").removeprefix(".")
+            raise DocumentError(error.message, path=f"{where}.{key}".rstrip(".")) from None
+        found.append(one)
+    return found

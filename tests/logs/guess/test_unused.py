@@ -1,0 +1,34 @@
+"""Every column that a draft leaves out has a reason, which names what is in its place."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipid.logs.guess.columns import guess
+from shipid.logs.guess.draft import draft_mapping
+from tests.logs.simulated import as_bridge, si_log
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("Fuel rate", "noise", "a quantity that a dataset does not take"),
+        ("qqxz", "noise", "its name says no known quantity"),
+        ("Heading 2", "psi", "heading is read from 'psi'"),
+        ("Rudder order", "rudder", "an order, and the measured rudder is read from 'rudder'"),
+        ("Wind speed [deg]", "noise", "its unit deg does not fit wind speed"),
+        ("SOG", "u", "is read from 'u' and 'v'"),
+        ("row", "number", "it holds the numbers of the rows"),
+    ],
+)
+def test_a_column_that_is_not_used_says_why(name: str, values: str, said: str, tmp_path: Path) -> None:
+    log = as_bridge(si_log())
+    drawn = {"noise": np.random.default_rng(1).normal(size=len(log)), "number": np.arange(len(log))}
+    added = drawn.get(values, log.get(values))
+    file = tmp_path / "log.csv"
+    log.assign(**{name: added}).to_csv(file, index=False)
+    found = guess(file)
+    assert list(found.unused) == [name]
+    assert said in found.unused[name]
+    assert f"# column {name!r} is not used: {found.unused[name]}" in draft_mapping(found, manoeuvres=False)

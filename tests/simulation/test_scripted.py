@@ -1,0 +1,89 @@
+"""Runs of any vessel by a document of manoeuvres, drawn or given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
+from shipid.simulation.scripted import simulated
+from shipid.simulation.truth import Truth, simulate
+from shipid.vessel.load import load_vessel
+
+SHIP = load_vessel("mariner")
+GIVEN = """
+step = 0.5
+[[manoeuvre]]
+kind = "zigzag"
+name = "zz"
+n_rpm = 80
+angle_deg = 10
+execute_heading_deg = 5
+duration = 60
+[[manoeuvre]]
+kind = "zigzag"
+n_rpm = 80
+angle_deg = 20
+execute_heading_deg = 10
+duration = 40
+"""
+
+
+def written(folder: Path, text: str) -> str:
+    (folder / "runs.toml").write_text(text)
+    return str(folder / "runs.toml")
+
+
+def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
+    runs = [
+        Zigzag(name="zz", n_rpm=80, angle_deg=10, execute_heading_deg=5, duration=60),
+        Zigzag(n_rpm=80, angle_deg=20, execute_heading_deg=10, duration=40),
+    ]
+    found = simulated(SHIP, written(tmp_path, GIVEN))
+    wanted = perform(SHIP, runs, step=0.5, interval=1.0)
+    pd.testing.assert_frame_equal(found, wanted[list(found)])
+    assert list(found["run"].unique()) == ["zz", "M002"]
+    assert not [name for name in found if str(name).startswith("actual.")]
+
+
+def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
+    """The vessel that it names, and what it sets of it, are left out."""
+    text = """
+[truth]
+vessel = "gunnerus-28.9"
+set = {"hull.derivatives.N_r" = 1.0}
+manoeuvres = 2
+duration = 20.0
+step = 0.5
+[[truth.manoeuvre]]
+n_rpm = [60.0, 80.0]
+delta_deg = [-20.0, 20.0]
+start_speed = [4.0, 6.0]
+"""
+    found = simulated(SHIP, written(tmp_path, text))
+    block = {"n_rpm": [60.0, 80.0], "delta_deg": [-20.0, 20.0], "start_speed": [4.0, 6.0]}
+    truth = Truth(vessel="mariner", manoeuvres=2, duration=20.0, step=0.5, manoeuvre=[block])  # type: ignore[list-item]
+    pd.testing.assert_frame_equal(found, simulate(truth, SHIP))
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "said"),
+    [
+        ("question = 'none'", None, "holds no manoeuvres"),
+        (GIVEN.replace('"zigzag"', '"zigzak"', 1), "manoeuvre.0.kind", "did you mean 'zigzag'"),
+        (GIVEN.replace("angle_deg = 20", "angel_deg = 20"), "manoeuvre.1.angel_deg", "unknown key"),
+        (GIVEN + 'n_rmp = 7\n', "manoeuvre.1.n_rmp", "unknown key"),
+        (GIVEN.replace("step = 0.5", "step = -1"), "step", "greater than 0"),
+        (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, said: str, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=said) as caught:
+        simulated(SHIP, written(tmp_path, text))
+    assert caught.value.path == path
+    assert str(caught.value).startswith(str(tmp_path / "runs.toml"))
+    assert "\n" not in str(caught.value)
