@@ -29,7 +29,7 @@ def identify(
     parameters: Annotated[
         list[str] | None,
         typer.Option(
-            help='numbers to identify: dotted paths with commas between, "hull.derivatives.*", "...\\[order >= 3]"'
+            help='numbers to identify: dotted paths with commas between, "hull.derivatives.*", "...[order >= 3]"'
         ),
     ] = None,
     fixed: Annotated[
@@ -46,9 +46,9 @@ def identify(
     ] = None,
     horizon: Annotated[float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs")] = None,
     changes: Annotated[
-        list[str] | None, typer.Option("--set", help="key=value: any other key of \\[identify], such as weights.u=0.05")
+        list[str] | None, typer.Option("--set", help="key=value: any other key of [identify], such as weights.u=0.05")
     ] = None,
-    settings: Annotated[Path | None, typer.Option(help="TOML file with an \\[identify] table to begin with")] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with an [identify] table to begin with")] = None,
     runs: Annotated[list[str] | None, typer.Option(help="runs to fit, * for any part of a name; default: all")] = None,
     test: Annotated[list[str] | None, typer.Option(help="runs held out to test the result on; * as above")] = None,
     ahead: Annotated[

@@ -19,7 +19,7 @@ def simulate(
         str,
         typer.Argument(
             metavar="STUDY|VESSEL",
-            help="bundled name or path of a study with a \\[truth]; with --manoeuvres of a vessel",
+            help="bundled name or path of a study with a [truth]; with --manoeuvres of a vessel",
             autocompletion=bundled_or_file("studies"),
         ),
     ],
@@ -29,9 +29,7 @@ def simulate(
     ] = None,
     manoeuvres: Annotated[
         str | None,
-        typer.Option(
-            help="runs of a vessel: bundled study or TOML file with a \\[truth], or with \\[\\[manoeuvre]] blocks"
-        ),
+        typer.Option(help="runs of a vessel: bundled study or TOML file with a [truth], or with [[manoeuvre]] blocks"),
     ] = None,
     changes: Changes = None,
     as_json: Json = False,

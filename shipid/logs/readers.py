@@ -219,8 +219,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
         raise DataError(message, file=file, path="format.encoding") from None
     except pd.errors.EmptyDataError:
-        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
-        raise DataError(message, file=file, path="format.skip_rows") from None
+        raise _nothing_left(form, file) from None
     except (pd.errors.ParserError, ValueError) as error:
         message = f"not a table with this separator ({error}): check separator and skip_rows"
         raise DataError(message, file=file, path="format.separator") from None
@@ -229,8 +228,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
     table = table.loc[~blank]
     if not len(table):
-        message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
-        raise DataError(message, file=file, path="format.skip_rows")
+        raise _nothing_left(form, file)
     names, table = _named_columns(table, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
@@ -250,6 +248,13 @@ def _width(source: Path | io.StringIO, form: TextFormat) -> int:
         return max((len(line.split()) for line in lines), default=1) or 1
     counts = [len(re.sub(r'"[^"]*"', "", line).split(form.separator)) for line in lines]
     return max(counts, default=1)
+
+
+def _nothing_left(form: TextFormat, file: Path) -> DataError:
+    if not form.skip_rows:
+        return DataError("holds no line with values", file=file)
+    message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
+    return DataError(message, file=file, path="format.skip_rows")
 
 
 def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:

@@ -210,7 +210,7 @@ def test_blocks_cut_all_signals_at_the_same_times() -> None:
 
 def test_fits_without_a_meaning_are_refused() -> None:
     fit = one()
-    with pytest.raises(ShipidError, match="take more data"):
+    with pytest.raises(ShipidError, match="use more data"):
         replace(fit, residuals=fit.residuals[:5], jacobian=fit.jacobian[:5], clusters=CLUSTERS[:5], signals=NAMES[:5])
     with pytest.raises(ShipidError, match="finite"):
         replace(fit, residuals=fit.residuals * np.nan)

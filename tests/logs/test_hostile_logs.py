@@ -90,8 +90,8 @@ def sixteen_bit(file: Path, good: str) -> None:
 IMPORTS: dict[str, tuple[Write, str]] = {
     # what it is -> how it is made, a part of the line
     "empty": (raw(b""), "the file is empty"),
-    "one newline": (raw(b"\n"), "nothing is left"),
-    "blanks only": (raw(b"   \n  \n"), "nothing is left"),
+    "one newline": (raw(b"\n"), "holds no line with values"),
+    "blanks only": (raw(b"   \n  \n"), "holds no line with values"),
     "one word": (raw(b"hello"), "needs two rows"),
     "header only": (text(lambda _: HEADER + "\n"), "needs two rows"),
     "one row": (text(lambda _: "\n".join(ROWS[:2])), "needs two rows"),

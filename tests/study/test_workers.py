@@ -59,7 +59,7 @@ def test_nothing_to_do_starts_nothing() -> None:
 def test_an_error_arises_here_and_keeps_where_it_arose() -> None:
     with pytest.raises(ValueError, match="math domain") as caught:
         list(on_workers(math.sqrt, [-1.0], 1))
-    assert "found = work(task)" in caught.value.__notes__[0]
+    assert "work(task)" in caught.value.__notes__[0]
     assert not multiprocessing.active_children()
 
 
