@@ -83,6 +83,17 @@ def _settings() -> Schema:
     return _schema_of(Settings)
 
 
+class _Closed(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class _Ordered(BaseModel):
+    """All other keys are commands: a number, a range, or a table of the commands of a component."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat] | dict[str, Any]]
+
+
 def _draws() -> Iterator[type[BaseModel]]:
     """A model for each kind of `[[truth.manoeuvre]]`: the keys of the kind, a range in place of a number."""
     default = Draw.model_fields["kind"].default
@@ -95,8 +106,8 @@ def _draws() -> Iterator[type[BaseModel]]:
             needed = field.is_required() and name != "seed"
             fields[name] = (one if takes_many(field.annotation) else _ranged(one), ... if needed else None)
         fields["kind"] = (Literal[kind], kind if kind == default else ...)
-        config = ConfigDict(extra="allow" if "orders" in model.model_fields else "forbid")
-        yield create_model(f"manoeuvre_{kind}", __config__=config, **fields)
+        base = _Ordered if "orders" in model.model_fields else _Closed
+        yield create_model(f"manoeuvre_{kind}", __base__=base, **fields)
 
 
 def _ranged(one: Any) -> Any:
