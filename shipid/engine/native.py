@@ -31,7 +31,7 @@ from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
-from shipid.metrics import BINS, LEAST, OCTAVES, SHIFT
+from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
 log = logging.getLogger(__name__)
@@ -156,8 +156,8 @@ def compiler_version(command: str) -> str:
 
 def _measure(of: Precision) -> str:
     """C function: distances of a group, tallied. A number without its last bits is the number of its bin."""
-    shift, bins = SHIFT - 52 + of.mantissa, BINS // (OCTAVES[1] - OCTAVES[0])
-    first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * bins
+    shift = SHIFT - DOUBLE.mantissa + of.mantissa
+    first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * BINS_AN_OCTAVE
     most = float(np.nextafter(of.dtype.type(2.0 ** OCTAVES[1]), 0))
     return f"""
 static inline V measured(V north, V east, long samples, unsigned *tally) {{
@@ -349,7 +349,9 @@ def _library(model: Dynamics, step: float, method: Method, precision: Precision 
 def compiled_for(source: Callable[[], str]) -> Any:
     """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
     if compiler() is None:
-        raise NoLibrary("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
+        raise NoLibrary(
+            "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
+        )
     try:
         return compiled(source())
     except NoLibrary as error:

@@ -21,24 +21,24 @@ WORST = 4.0  # units in the last place
 Array = np.ndarray[Any, Any]
 
 
-def vectors() -> list[Target]:
-    """The widest vectors of this processor with every way to its functions, half as wide ones, single precision."""
-    widest, single = target(), target(SINGLE)
-    if not widest.fused:
-        return [widest, single]
-    narrow = [Target(4, ("-march=native",), fused=True)] if widest.lanes > 4 else []
-    library = replace(single, fused=False)
-    return [widest, replace(widest, fused=False), replace(widest, fused=False, prefix=""), *narrow, single, library]
+def _half() -> Target:
+    return Target(4, ("-march=native",), fused=True) if target().lanes > 4 else target()
 
 
-def shown(of: Target) -> str:
-    return f"{of.precision.real}-{of.lanes}{'-fused' * of.fused}{'-glibc' * bool(of.prefix)}"
+TARGETS: dict[str, Callable[[], Target]] = {  # looked at when a test runs, since that takes a compiler
+    "widest": target,
+    "glibc": lambda: replace(target(), fused=False),
+    "lane by lane": lambda: replace(target(), fused=False, prefix=""),
+    "half as wide": _half,
+    "single": lambda: target(SINGLE),
+    "single, glibc": lambda: replace(target(SINGLE), fused=False),
+}
 
 
-@pytest.fixture(params=vectors(), ids=shown)
+@pytest.fixture(params=TARGETS)
 def wanted(request: pytest.FixtureRequest) -> Target:
-    found: Target = request.param
-    return found
+    """Vectors of this processor, with every way to their functions."""
+    return TARGETS[request.param]()
 
 
 @pytest.fixture
