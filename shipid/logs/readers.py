@@ -12,6 +12,7 @@ import re
 import stat
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -147,6 +148,11 @@ def seconds(dates: pd.Series[Any]) -> Array:
                 rest = pd.to_datetime(dates, format=pattern.replace(".%f", ""), utc=True, errors="coerce")
                 return _since_1970(moments.fillna(rest))
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+
+
+def date_of(moment: float) -> str:
+    """A moment in seconds since 1970 as date and time in UTC, the reverse of `seconds`."""
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
 def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:

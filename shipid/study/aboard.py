@@ -17,9 +17,9 @@ from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
-from shipid.logs.guess.draft import moment as date
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.logs.readers import date_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
@@ -323,4 +323,4 @@ def _between(first: float, last: float) -> str:
     """Two moments as the log has them: dates in UTC, or seconds on its clock."""
     if first < DATED:
         return f"from {first:.1f} to {last:.1f} s"
-    return f"from {date(first, 'date')} to {date(last, 'date')} UTC"
+    return f"from {date_of(first)} to {date_of(last)} UTC"

@@ -12,7 +12,7 @@ from scipy.io import savemat
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import WIDEST, TextFormat, read_table, require_file, seconds, widest
+from shipid.logs.readers import WIDEST, TextFormat, date_of, read_table, require_file, seconds, widest
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]
@@ -332,3 +332,8 @@ def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refuse
         return
     with pytest.raises(DataError, match=f"a line of {cells} cells: a log has {WIDEST} columns at most"):
         widest(head, separator, Path("log.csv"))
+
+
+def test_a_moment_and_its_date() -> None:
+    text = "2022-11-30 09:15:02"
+    assert date_of(float(seconds(pd.Series([text]))[0])) == text

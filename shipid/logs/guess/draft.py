@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from shipid.logs.guess.clues import Finding, Suggestion
 from shipid.logs.guess.columns import LIKELY, Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
-from shipid.logs.readers import LARGE
+from shipid.logs.readers import LARGE, date_of
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
@@ -78,9 +77,7 @@ def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
 
 def moment(value: float, unit: str) -> str:
     """Return a moment on the log's clock as text: a date in UTC, or the number."""
-    if unit == "date":
-        return datetime.fromtimestamp(value, UTC).strftime("%Y-%m-%d %H:%M:%S")
-    return f"{value:.10g}"
+    return date_of(value) if unit == "date" else f"{value:.10g}"
 
 
 def _read(text: str) -> Mapping:
