@@ -13,7 +13,7 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
 from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.terminal import counted, digits, draw, short, show_reasons, table
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, ShipidError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -147,13 +147,15 @@ def study_screen(
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.engine.engines import REPEATED, named
+    from shipid.engine.engines import ENGINES, REPEATED, named
     from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain
 
     engine = "single" if single else REPEATED
     named(engine, device)
+    if single and not ENGINES[engine].available():
+        raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     for note in screen.notes(plan, dataset, wanted):

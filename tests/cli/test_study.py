@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.document import bundled
+from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
@@ -30,6 +31,12 @@ def test_studies_and_variants(study: Path) -> None:
     assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
     text = said("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
     assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
+
+
+def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engines, "compiler", lambda: None)
+    with pytest.raises(ShipidError, match="--single: needs a C compiler"):
+        said("study", "screen", study, "--single")
 
 
 def test_screen_writes_a_row_per_member(study: Path) -> None:
