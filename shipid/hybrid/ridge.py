@@ -14,7 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -354,7 +354,7 @@ def _left_out(
         first = 0
         for block in blocks:
             folds, rows = slice(first, first + len(block.out)), block.rows
-            without = _few_rows if block.out.shape[1] <= part.rotated.shape[1] else _many_rows
+            without = _FewRows if block.out.shape[1] <= part.rotated.shape[1] else _many_rows
             solved = without(part, block)
             for i in sorted(range(len(ridges)), key=ridges.__getitem__, reverse=True):
                 error = solved(part.eigenvalues + ridges[i])
@@ -384,47 +384,28 @@ def _chosen_without(by_fold: Array, errors: _Errors, columns: slice) -> _LeftOut
     return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), columns))
 
 
-def _few_rows(part: _Part, block: _Block) -> Callable[[Tensor], Tensor]:
-    """Errors (folds, b, K r) of blocks without themselves, by their part of the hat matrix, (b, b); of a diagonal.
+class _FewRows:
+    """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b); of a diagonal.
 
-    In single precision as long as that is sound. Call it for the greatest ridge first: the smaller the ridge, the
-    worse is the condition, so what is not sound once is not tried for smaller ones.
+    In single precision, which is twice as fast, as long as that is sound. Call it for the greatest ridge first: the
+    smaller the ridge, the worse is the condition, so what is not sound once is not tried for smaller ones.
     """
-    single = _Single(part, block)
-    sound = True
-    exact: list[tuple[Tensor, Tensor]] = []
-    unit = torch.eye(block.out.shape[1], dtype=part.rotated.dtype, device=part.rotated.device)
-
-    def errors(diagonal: Tensor) -> Tensor:
-        nonlocal sound
-        found = single.errors(diagonal) if sound else None
-        if found is not None:
-            return found
-        sound = False
-        if not exact:
-            exact.append((part.rotated[block.out], part.targets[block.out]))
-        rows, targets = exact[0]
-        weighted = rows / diagonal
-        solved: Tensor = torch.linalg.solve(unit - weighted @ rows.mT, targets - weighted @ part.product)
-        return solved
-
-    return errors
-
-
-class _Single:
-    """`_few_rows` in single precision, twice as fast: products of matrices, and Cholesky's factors of I - H_bb."""
 
     def __init__(self, part: _Part, block: _Block) -> None:
-        self.part, self.shape = part, block.out.shape
-        flat = block.out.flatten()
-        self.flat = part.rotated[flat].float()
+        self.part, self.block, self.shape, self.sound = part, block, block.out.shape, True
+        out = block.out.flatten()
+        self.flat, self.targets = part.rotated[out].float(), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
-        self.targets = part.targets[flat].float()
-        self.unit = torch.eye(self.shape[1], device=flat.device)
+        self.unit = torch.eye(self.shape[1], device=out.device)
 
-    def errors(self, diagonal: Tensor) -> Tensor | None:
-        """Errors (folds, b, K r); None where a square of a pivot is below `SOUND`, which limits the digits."""
+    def __call__(self, diagonal: Tensor) -> Tensor:
+        found = self._single(diagonal) if self.sound else None
+        self.sound = found is not None
+        return self._double(diagonal) if found is None else found
+
+    def _single(self, diagonal: Tensor) -> Tensor | None:
+        """By Cholesky's factors of I - H_bb; None where a squared pivot is below `SOUND`, which limits the digits."""
         remainder = torch.baddbmm(self.unit, self.rows, self.columns * (1 / diagonal).float()[:, None], alpha=-1)
         lower, failed = torch.linalg.cholesky_ex(remainder)
         if failed.any() or lower.diagonal(dim1=1, dim2=2).min() ** 2 < SOUND:
@@ -433,6 +414,19 @@ class _Single:
         weights = (self.part.product / diagonal[:, None]).float()
         missed = torch.addmm(self.targets, self.flat, weights, alpha=-1).view(*self.shape, -1)
         return torch.bmm(torch.bmm(inverse.mT, inverse), missed)
+
+    def _double(self, diagonal: Tensor) -> Tensor:
+        rows, targets = self._exact
+        weighted = rows / diagonal
+        solved: Tensor = torch.linalg.solve(
+            self.unit.double() - weighted @ rows.mT, targets - weighted @ self.part.product
+        )
+        return solved
+
+    @cached_property
+    def _exact(self) -> tuple[Tensor, Tensor]:
+        """Features (folds, b, M) and targets (folds, b, K r) of the blocks."""
+        return self.part.rotated[self.block.out], self.part.targets[self.block.out]
 
 
 def _many_rows(part: _Part, block: _Block) -> Callable[[Tensor], Tensor]:

@@ -7,7 +7,18 @@ import torch
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.ridge import SOUND, _Best, _blocks, _decompose, _left_out, _LeftOut, _Part, _reflection, smooth_basis
+from shipid.hybrid.ridge import (
+    SOUND,
+    _Best,
+    _blocks,
+    _decompose,
+    _FewRows,
+    _left_out,
+    _LeftOut,
+    _Part,
+    _reflection,
+    smooth_basis,
+)
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -78,6 +89,17 @@ def part_of(features, targets):
     eigenvalues, axes = _decompose(features)
     rotated = features @ axes
     return _Part(rotated, eigenvalues, axes, targets, rotated.T @ targets)
+
+
+def test_single_precision_ends_where_digits_would():
+    """And is not tried again after that."""
+    rng = np.random.default_rng(0)
+    part = part_of(rng.normal(size=(len(ALL), 300)), rng.normal(size=(len(ALL), 4)))
+    (block, *_) = _blocks(FOLDS, ALL, "cpu")
+    few = _FewRows(part, block)
+    for ridge, single in ((1e4, True), (1e-6, False), (1e4, False)):
+        errors = few(part.eigenvalues + ridge)
+        assert (errors.dtype == torch.float32) == few.sound == single, ridge
 
 
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
