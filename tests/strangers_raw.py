@@ -161,7 +161,7 @@ def _style(random: Random, drawn: Mapping[str, Any]) -> dict[str, Any]:
     """Habits of a team: language, instruments, frames, and format of the files."""
     team = _one(random, "basin basin autonomy" if drawn["model"] else "yard yard logger autonomy", " ")
     pace = drawn["L"] / drawn["U"]
-    offered, most = ((4, 5, 10, 20), 60) if drawn["model"] else ((1, 2, 4, 5, 10), 40)
+    offered, most = ((4, 5, 10, 20), 60) if drawn["model"] else ((1, 2, 4, 5, 10), 80)
     rates = [hz for hz in offered if 3 <= hz * pace <= most] or [offered[0]]
     hz = int(random.choice(rates))
     digits = 0 if hz == 1 else 1 if hz in (2, 5, 10) else 2
@@ -184,7 +184,8 @@ def _style(random: Random, drawn: Mapping[str, Any]) -> dict[str, Any]:
     speeds = {"basin": "uv uv none", "yard": "sog sog both", "autonomy": "uv uv earth sog", "logger": "sog sog both"}
     return {
         "team": team, "language": language, "tidy": bool(random.random() < 0.5), "hz": hz, "digits": digits,
-        "job": drawn["name"], "a day": int(random.integers(6, 20)), "separator": separator, "decimal": "," if comma else ".",
+        "job": drawn["name"], "a day": int(random.integers(6, 20)),
+        "separator": separator, "decimal": "," if comma else ".",
         "encoding": _one(random, encodings, " "), "newline": _one(random, "\n" if plain else "\r\n|\n"),
         "missing": "NaN" if separator == "blanks" else _one(random, "|NaN|-999|hold|"),
         "preamble": 0 if plain else int(random.choice([0, 0, 2, 4, 9])), "comment": _one(random, "|#|%|"),

@@ -82,7 +82,11 @@ def draw_ship(random: Random) -> dict[str, Any]:
     T = B / flat
     U = froude * float(np.sqrt(9.81 * L))
     rho = 1000.0 if model else 1025.0
-    drive = str(random.choice(DRIVES[:2] if kind in MERCHANT else DRIVES))
+    drive = str(
+        random.choice(
+            DRIVES[:2] if kind in MERCHANT else DRIVES, p=None if kind in MERCHANT else (0.15, 0.2, 0.3, 0.35)
+        )
+    )
     rudder = "azimuth" if drive == "azimuth" else str(random.choice([*RACE, "speed"]))
     hull = str(random.choice(["cubic", "cross-flow", "abkowitz"]))
     size: dict[str, Any] = {"L": L, "B": B, "T": T, "C_b": block, "U": U, "rho": rho, "scale": scale}

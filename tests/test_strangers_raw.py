@@ -58,7 +58,8 @@ def ships(tmp_path_factory: pytest.TempPathFactory) -> list[RawStranger]:
 
 @pytest.fixture(params=range(len(SEEDS)))
 def ship(request: pytest.FixtureRequest, ships: list[RawStranger]) -> RawStranger:
-    return ships[request.param]
+    chosen: RawStranger = ships[request.param]
+    return chosen
 
 
 def test_a_seed_makes_the_same_bytes_and_another_seed_others(tmp_path: Path, ships: list[RawStranger]) -> None:
