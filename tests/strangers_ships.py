@@ -138,7 +138,7 @@ def _shape(kind: str, size: Mapping[str, Any], lift: Mapping[str, float], R: flo
 
 
 def _steering(thruster: dict[str, Any], rudder: str, size: Mapping[str, Any], f: Any, *, servo: bool) -> None:
-    """Other rudder laws in place of the rudder in the race; gear with stops, at a constant rate or with lag."""
+    """Other rudder laws in place of the rudder in the race; gear with stops; screws as large as the draught allows."""
     quick = size["quick"]
     rate = f(12, 45) if servo else f(2.32, 5.5) * quick
     stop = float(np.radians(round(f(0.0, 2.99) // 1 * 5 + 35)))
@@ -147,9 +147,12 @@ def _steering(thruster: dict[str, Any], rudder: str, size: Mapping[str, Any], f:
         {"kind": "rate_limit"} if f(0, 1) < 0.4 else {"kind": "first_order", "T": f(0.2, 1.5) / quick}
     )
     skew, loss = f(-0.08, 0.08), f(0.0, 0.4)
+    screw = f(0.58, 0.75) * size["T"] * (0.8 if "port" in thruster else 1.0)
     for name, block in thruster.items():
         if block["kind"] == "tunnel":
             block["actuator"] = {"n": {"kind": "first_order", "T": f(1, 3) / quick, "rate": 1e3}}
+        elif block["kind"] == "propeller":
+            block["D_p"] = screw
         if "rudder" not in block["kind"]:
             continue
         if rudder == "race":
