@@ -152,7 +152,7 @@ def data_check(
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position, thrust against a vessel."""
+    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position, thrust of a vessel."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 

@@ -40,16 +40,14 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
         motion = columns | aboard(columns)
         states = [motion.get(column_of(name), still) for name in (*model.state, *model.hidden)]
         memory = memory_along(vessel, {name: columns[name] for name in model.commands}, columns["t"]) or {}
-        inputs = (
-            np.array(part).reshape(len(part), len(rows))
-            for part in (
-                states,
-                [memory[name] for name in model.memory],
-                [columns[name] for name in model.commands],
-                [columns.get(name, still) for name in model.environment],
-            )
+        seen = (
+            states,
+            [memory[name] for name in model.memory],
+            [columns[name] for name in model.commands],
+            [columns.get(name, still) for name in model.environment],
         )
-        shown = outputs_of(model, *inputs, values)[places]
+        state, reached, orders, weather = (np.array(part).reshape(len(part), len(rows)) for part in seen)
+        shown = outputs_of(model, state, reached, orders, weather, values)[places]
         parts.append(pd.DataFrame({"run": run, "t": columns["t"], **dict(zip(wanted, shown, strict=True))}))
     return pd.concat(parts, ignore_index=True)
 
@@ -57,8 +55,8 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
 def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """Measured outputs beside the predicted ones, run by run.
 
-    Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted, by
-    least squares) and `error` (root mean square of the difference); empty without a common output.
+    Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted,
+    by least squares) and `error` (root mean square of the difference); empty without a common output.
     """
     table: list[dict[str, Any]] = []
     predictions = predicted_outputs(vessel, dataset)
@@ -83,11 +81,14 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     if not common_outputs(vessel, dataset):
         measured = ", ".join(dataset.outputs) or "none"
         predicted = ", ".join(dynamics(vessel).outputs) or "none"
-        raise DataError(f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel")
+        raise DataError(
+            f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel"
+        )
     table = []
     for row in compare_outputs(vessel, dataset).to_dict("records"):
         scatter = row["error"] / max(row["predicted"], 1e-300)
-        sentence = f"{row['output']} is {row['scale']:.3g} times what {vessel.name} predicts (difference {100 * scatter:.2g} %)"
+        off = f"(difference {100 * scatter:.2g} %)"
+        sentence = f"{row['output']} is {row['scale']:.3g} times what {vessel.name} predicts {off}"
         words = "; wrong sign?" if row["scale"] < 0 else "; right unit, right size of the component?"
         ok = scatter <= OFF
         table.append({

@@ -161,9 +161,7 @@ def outputs_of(
 
 
 def _of_samples(mapped: ca.Function, inputs: Sequence[Array], parameters: Array) -> Array:
-    count, parts = inputs[0].shape[1], []
-    for samples in np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(
-        -1, BLOCK
-    ):  # the last is padded
-        parts.append(np.array(mapped(*(part[:, samples] for part in inputs), parameters)))
+    count = inputs[0].shape[1]
+    blocks = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(-1, BLOCK)  # the last is padded
+    parts = [np.array(mapped(*(part[:, samples] for part in inputs), parameters)) for samples in blocks]
     return np.concatenate(parts, axis=1)[:, :count]

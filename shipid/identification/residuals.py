@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import compiler, refuse
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
 from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation

@@ -129,7 +129,9 @@ def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
     settings, seen = solution.settings, whiteness(LinearFit.of(solution))
     factors = {
-        name: max(float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in columns_of(name)])), LEAST)
+        name: max(
+            float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in columns_of(name)])), LEAST
+        )
         for name in settings.weights
     }
     widths = settings.widths

@@ -165,7 +165,11 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     known = [name for name in (*required(), *optional()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
     outputs = [str(name) for name in rows.columns if is_output(str(name))]
-    order = [*known, *commands, *outputs, "flags"] if mapping.resamples or "latitude" in mapping.columns else list(rows.columns)
+    order = (
+        [*known, *commands, *outputs, "flags"]
+        if mapping.resamples or "latitude" in mapping.columns
+        else list(rows.columns)
+    )
     return Imported(rows[order], first + records + gaps + more + estimated, read, origin)
 
 

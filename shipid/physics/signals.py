@@ -246,13 +246,26 @@ SIGNALS: dict[str, Signal] = {
         component="propeller",
     ),
     "thrust": Signal(  # in the shaft: before the thrust deduction
-        "output", "N", "thrust", names=r"thrust\w*|t_?prop\w*|(port|starboard|stbd)_thrust|f_?thrust", component="propeller"
+        "output",
+        "N",
+        "thrust",
+        names=r"thrust\w*|t_?prop\w*|(port|starboard|stbd)_thrust|f_?thrust",
+        component="propeller",
     ),
     "torque": Signal(
-        "output", "N m", "torque", names=r"torque\w*|q|q_?(prop|p|shaft)\w*|(port|starboard|stbd)_torque", component="propeller"
+        "output",
+        "N m",
+        "torque",
+        names=r"torque\w*|q|q_?(prop|p|shaft)\w*|(port|starboard|stbd)_torque",
+        component="propeller",
     ),
     "normal_force": Signal(
-        "output", "N", "normal force", mirror=-1, names=r"(rudder_)?normal_?force\w*|f_?n|rudder_force", component="rudder"
+        "output",
+        "N",
+        "normal force",
+        mirror=-1,
+        names=r"(rudder_)?normal_?force\w*|f_?n|rudder_force",
+        component="rudder",
     ),
 }
 """Name -> row. Columns of datasets and messages list signals in the order of this table."""

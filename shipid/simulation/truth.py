@@ -53,7 +53,9 @@ class Truth(Checked, BaseModel):
     gusts: Gusts | None = None
     waves: Sea | None = None
     current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
-    sensors: dict[str, Sensor] = Field(default={}, description="logged column -> sensor model; an output (propeller.thrust) is logged where it has one")
+    sensors: dict[str, Sensor] = Field(
+        default={}, description="logged column -> sensor model; an output (propeller.thrust) is logged where it has one"
+    )
     manoeuvre: Annotated[list[Draw], Field(min_length=1, description="kinds, drawn by their shares")] = [Draw()]
 
     @model_validator(mode="before")
