@@ -35,7 +35,7 @@ def _reason(state: State, name: str, numbers: bool) -> str:
     meaning = meanings[0]
     if not meaning or meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:
         return "it is a quantity that a dataset does not take"
-    if (unit := _wrong_unit(name, _unit(meaning))) is not None:
+    if (unit := wrong_unit(name, _unit(meaning))) is not None:
         return f"its unit {unit} does not fit {_word(meaning)}"
     group = next((alike for alike in ALIKE if meaning in alike), {meaning})
     better = [one.source for one in state.suggestions if one.name.rsplit(".", 1)[-1] in group]
@@ -59,7 +59,7 @@ def _unit(meaning: str) -> str:
     return INPUTS.get(meaning, "m" if meaning in ("x", "y") else "m/s")
 
 
-def _wrong_unit(name: str, si: str) -> str | None:
+def wrong_unit(name: str, si: str) -> str | None:
     """The unit that stands in brackets in a name, where it is a known one that does not convert to the SI unit."""
     if si not in UNITS or unit_said(name, si) is not None:
         return None

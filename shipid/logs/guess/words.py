@@ -106,12 +106,23 @@ PHRASES: dict[str, str] = {
         "revoluciones, turns"
     ),
     "pitch": "cpp, cpp pitch, prop pitch, propeller pitch, pitch ratio, p d",
+    "thrust": (
+        "thrust, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller schub, wellen schub, "
+        "skyvekraft, poussee, empuje, thrust force"
+    ),
+    "torque": (
+        "torque, q, q prop, shaft torque, propeller torque, prop torque, dreh moment, drehmoment, wellen drehmoment, "
+        "dreiemoment, akselmoment, couple, par motor, moment shaft"
+    ),
+    "normal_force": (
+        "rudder force, rudder normal force, normal force, f n, fn, ruder normalkraft, ruder kraft, rorkraft"
+    ),
 }
 """Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
 OTHERS = (
     "stw, log speed, speed log, doppler log, speed through water, water speed, v log, vbw, log spd, fahrt "
-    "durchs wasser, fdw, fart gjennom vann, power, shaft power, leistung, effekt, torque, shaft torque, "
-    "drehmoment, moment, thrust, fuel, fuel rate, fuel flow, depth, water depth, wasser tiefe, dybde, draft, "
+    "durchs wasser, fdw, fart gjennom vann, power, shaft power, leistung, effekt, moment, engine torque, fuel, "
+    "fuel rate, fuel flow, depth, water depth, wasser tiefe, dybde, draft, "
     "draught, draft fwd, draft aft, draught aft, draught fwd, tiefgang, tauchung, temp, temperature, air "
     "temp, temperatur, water temp, hdop, pdop, vdop, num sat, nsat, sats, satellites, heave, hiv, acc, acc x, "
     "acc y, acc z, acceleration, a x, a y, a z, pressure, humidity, voltage, current, set, drift, load, wave, "
@@ -139,7 +150,7 @@ SOURCES = frozenset(
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
-UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knots kt kts min mps ms pct rad rads rps sec").split())
+UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knots kt kts knm min mps ms nm pct rad rads rps sec").split())
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
     "port": "port|ps|bb|babord|backbord|p|prt|portside|left",
