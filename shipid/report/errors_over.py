@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import Floats, Indices, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, apart, axis, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, apart, axis, layout, line, silent
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
@@ -55,7 +54,7 @@ def horizon(content: ReportContent) -> Figure | None:
         reach = float(means.ahead.max())
         x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
         plot = layout(x, y, hovermode="x unified", annotations=names)
-        views[f"{i}-{j}"] = [Panel(go.Figure(traces, plot))]
+        views[f"{i}-{j}"] = [Panel(Plot(traces, plot))]
     return Figure(
         id="horizon",
         title="Error over the horizon",
@@ -142,7 +141,7 @@ def _size_control(counts: Sequence[int]) -> Control:
     return Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)
 
 
-def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
+def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[Trace]:
     looks, pure, traces = close_styles(content), data_driven(content), []
     groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
     for key, mine in groups:  # what has no physics first: thick ink must not cover the others
@@ -160,9 +159,14 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
     return traces
 
 
-def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Scatter]:
+def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
     """Areas from the least to the greatest seed at each time ahead, in the colours of the lines of their models."""
-    colours = {key: trace.line.color for trace in traces for key in trace.meta if "source:cooperative" in trace.meta}
+    colours = {
+        key: trace["line"]["color"]
+        for trace in traces
+        for key in trace["meta"]
+        if "source:cooperative" in trace["meta"]
+    }
     bands = []
     for name, mine in seeds[seeds["size"] > 1].groupby("model", sort=False):
         ahead = mine["ahead"].to_numpy(dtype=float)
@@ -171,19 +175,22 @@ def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Sc
         if colour is not None:
             keys = ["source:cooperative", f"model:{name}"]
             bands.append(line(f"{name}, seeds", x, y, keys, line={"width": 0}, fill="toself", fillcolor=colour))
-            bands[-1].update(opacity=0.18, hoverinfo="skip", hovertemplate=None)
+            bands[-1] = silent(bands[-1]) | {"opacity": 0.18}
     return bands
 
 
-def _names_at_the_end(traces: Sequence[go.Scatter], most: float) -> list[dict[str, Any]]:
+def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, Any]]:
     """Names beside the ends of the compensated lines, moved apart where they would collide."""
-    ends = sorted((float(t.y[-1]), float(t.x[-1]), t) for t in traces if t.mode == "lines+markers" and len(t.y))
+    ends = sorted(
+        ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
+        key=lambda end: end[:2],
+    )
     heights = apart([height for height, _, _ in ends], 0.055 * most, math.inf)
     notes = []
     for height, (_, place, trace) in zip(heights, ends, strict=True):
-        short = trace.name.removesuffix(", compensated")
+        short = trace["name"].removesuffix(", compensated")
         short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
-        font = {"size": 11, "color": trace.line.color}
+        font = {"size": 11, "color": trace["line"]["color"]}
         notes.append({"x": place, "y": height, "text": short, "xanchor": "left", "xshift": 8, "font": font})
     return [{**note, "showarrow": False, "align": "left"} for note in notes]
 
@@ -227,7 +234,7 @@ def _command_chips(commands: pd.DataFrame) -> list[Chip]:
     ]
 
 
-def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.Figure:
+def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> Plot:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _units(content.commands)
     mine = content.commands[content.commands.run == run]
@@ -249,7 +256,7 @@ def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.
     lowest = "y" if not units else f"y{len(units) + 1}"
     x = axis("time of the recording [s]", anchor=lowest)
     y = axis("position error [m]", rangemode="tozero", domain=[1 - ERROR / total, 1.0])
-    return go.Figure(traces, layout(x, y, hovermode="x unified", **axes))
+    return Plot(traces, layout(x, y, hovermode="x unified", **axes))
 
 
 def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) -> str:

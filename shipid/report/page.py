@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -11,6 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
@@ -136,12 +138,23 @@ def _figures(parts: Sequence[Drawn]) -> list[Figure]:
 
 def _views(figure: Figure) -> dict[str, Any]:
     return {
-        key: [
-            {"data": spec["data"], "layout": spec["layout"]}
-            for spec in (json.loads(p.figure.to_json()) for p in panels)
-        ]
+        key: [{"data": _plain(panel.plot.traces), "layout": _plain(panel.plot.layout)} for panel in panels]
         for key, panels in figure.views.items()
     }
+
+
+def _plain(value: Any) -> Any:
+    """Content of JSON as Plotly.js takes it: columns of numbers as bytes, and what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f":
+        data = base64.b64encode(np.ascontiguousarray(value, dtype="<f4").tobytes()).decode("ascii")
+        return {"dtype": "f4", "bdata": data}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:
