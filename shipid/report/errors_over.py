@@ -22,15 +22,17 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
-STATISTICS = {  # option -> column of the frame, title of the axis
-    "mean": ("mean", "position error, mean"),
-    "90th percentile": ("p90", "position error, 90th percentile"),
-    "along (surge)": ("along", "error along, mean absolute"),
-    "across (sway)": ("across", "error across, mean absolute"),
+STATISTICS = {  # option -> column of the frame, title of the axis, unit
+    "mean": ("mean", "position error, mean", "m"),
+    "90th percentile": ("p90", "position error, 90th percentile", "m"),
+    "along (surge)": ("along", "error along, mean absolute", "m"),
+    "across (sway)": ("across", "error across, mean absolute", "m"),
+    "course": ("course", "error of the course, mean absolute", "deg"),
 }
 BY_AXIS = (
     " Along and across are the axes of the ship at the instant of prediction (11), the directions of surge and sway. "
-    "Predictors give positions, so no error of the heading is shown."
+    "Predictors give positions, so no error of the heading is shown. The course is the direction of the track, "
+    "where the ship truly makes 0.2 m/s or more."
 )
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
@@ -41,15 +43,15 @@ def horizon(content: ReportContent) -> Figure | None:
         return None
     frame = _settled(content.horizon, content)
     statistics = {word: given for word, given in STATISTICS.items() if given[0] in frame}
-    columns = [column for column, _ in statistics.values()]
+    columns = [column for column, *_ in statistics.values()]
     means, counts = over_seeds(frame, [*BY, "ahead"], columns), sizes(frame.N_D)
     groups = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])
     seeds = {column: groups[column].agg(["min", "max", "size"]).reset_index() for column in columns}
     views = {}
-    for (i, (column, title)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
-        traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
+    for (i, (column, title, unit)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
+        traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
         traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
-        y = axis(f"{title} [m]", rangemode="tozero")
+        y = axis(f"{title} [{unit}]", rangemode="tozero")
         names = _names_at_the_end(traces, float(means[column].max()))
         reach = float(means.ahead.max())
         x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
@@ -68,7 +70,7 @@ def horizon(content: ReportContent) -> Figure | None:
         "compensation.",
         height=420,
         views=views,
-        controls=[Control("Position error", list(statistics)), _size_control(counts)],
+        controls=[Control("Error", list(statistics)), _size_control(counts)],
         chips=model_chips(content, set(means.source)),
     )
 
@@ -141,7 +143,7 @@ def _size_control(counts: Sequence[int]) -> Control:
     return Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)
 
 
-def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[Trace]:
+def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str, unit: str = "m") -> list[Trace]:
     looks, pure, traces = close_styles(content), data_driven(content), []
     groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
     for key, mine in groups:  # what has no physics first: thick ink must not cover the others
@@ -152,7 +154,7 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
         name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         keep = _visible(x, y)
-        traces.append(line(name, x[keep], y[keep], keys, line={"dash": DASHES[source], **ink}))
+        traces.append(line(name, x[keep], y[keep], keys, unit, line={"dash": DASHES[source], **ink}))
         if model and source == "cooperative":
             mark = {"symbol": looks[model].symbol, "size": 7, "color": ink["color"], "maxdisplayed": 9}
             traces[-1].update(mode="lines+markers", marker=mark)

@@ -6,7 +6,7 @@ import base64
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -67,13 +67,19 @@ class Shown(Protocol):
         ...
 
 
-def render(content: ReportContent) -> str:
+def render(content: ReportContent, say: Callable[[str], object] | None = None) -> str:
     """Write the page of a study as text."""
     windows = paths.window_data(content) if content.snapshots else None
-    return page(content, SECTIONS, "study", windows)
+    return page(content, SECTIONS, "study", windows, say)
 
 
-def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
+def page(
+    content: Shown,
+    sections: Mapping[str, Section],
+    kicker: str,
+    windows: dict[str, Any] | None = None,
+    say: Callable[[str], object] | None = None,
+) -> str:
     """Write the sections that have something to show as one page of HTML.
 
     Parameters
@@ -82,10 +88,11 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
     sections : registry of the page: id -> section, in order.
     kicker : what kind of page it is, above the title.
     windows : what page.js lets a reader browse, as `paths.window_data` returns it.
+    say : called with the heading of each section that is about to be drawn.
 
     Raises ValueError for a sentence that links to a figure which no section declares.
     """
-    parts = drawn(sections, content)
+    parts = drawn(sections, content, say)
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -118,9 +125,9 @@ def _check_links(answer: Sequence[Sentence], known: set[str]) -> None:
             raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
 
 
-def write_report(content: ReportContent, file: Path) -> Path:
+def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
     """Write the report as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(render(content), file)
+    return write(render(content, say), file)
 
 
 def write(text: str, file: Path) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from itertools import pairwise
@@ -18,7 +18,15 @@ from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands, Region
-from shipid.metrics import error_by_axis, over_horizon, over_horizon_by_axis, over_time, position_error, summary
+from shipid.metrics import (
+    course_over_horizon,
+    error_by_axis,
+    over_horizon,
+    over_horizon_by_axis,
+    over_time,
+    position_error,
+    summary,
+)
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor, checked_bands, read_bands
@@ -32,6 +40,7 @@ from shipid.vessel.outline import ship_outline
 ALL_KINDS = "all"
 MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
+STRIDE = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
@@ -144,8 +153,11 @@ def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     return cells.assign(model=[plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)])
 
 
-def read_results(folder: str | os.PathLike[str]) -> Results:
-    """Read a run's folder: its tables, and the path that every cell predicts on every test window."""
+def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
+    """Read a run's folder: its tables, and the path that every cell predicts on every test window.
+
+    say : called with a few words on how far it is.
+    """
     folder = Path(folder)
     plan = store.stored_plan(folder)
     if plan.parts:
@@ -160,8 +172,11 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     files: dict[str, Path] = {}
     kept: dict[str, np.ndarray] = {}
     known: dict[str, Estimates] = {}
-    for row in cells[cells["status"] == "ok"].to_dict("records"):
+    good = cells[cells["status"] == "ok"].to_dict("records")
+    for count, row in enumerate(good, start=1):
         cell = row["cell"]
+        if say is not None and count % STRIDE == 0:
+            say(f"reading cells: {count} of {len(good)}")
         file = store.cell_file(folder, cell)
         if store.paths_file(folder, cell).is_file():
             files[cell] = store.paths_file(folder, cell)
@@ -232,7 +247,7 @@ def _shown_cells(results: Results) -> list[dict[str, Any]]:
 
 
 def horizon_frame(results: Results) -> pd.DataFrame:
-    """Mean and 90th percentile error, mean error along x and across [m], per step ahead [s].
+    """Mean and 90th percentile error, mean error along x and across [m] and of the course [deg], per step ahead [s].
 
     Of physics, cooperative models and the naive floor; x and y are those of the frame (11).
     """
@@ -280,6 +295,7 @@ def _horizon(results: Results, path: np.ndarray, model: str, N_D: int, seed: int
     keys = {"model": model, "N_D": N_D, "seed": seed, "source": source}
     ahead = test.step * np.arange(1, test.horizon + 1)
     errors = {**over_horizon(position_error(path, true)), **over_horizon_by_axis(path, true)}
+    errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
     return pd.DataFrame({**keys, "ahead": ahead, **errors})
 
 

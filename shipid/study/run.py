@@ -226,20 +226,20 @@ def _shared(
 ) -> Iterator[Event]:
     """Compute every unit that is not finished yet, here or, where another process is at work on it, there."""
     units = {unit.key: unit for unit in plan.units}
-    known = {unit.key for unit in store.finished(folder, plan.units)}
+    known = store.finished_keys(folder, units)
     cells = _cells(units[key] for key in known)
     yield Event("start", done=cells, total=plan.cells)
     wait = WAIT
     while True:
         if known >= units.keys():  # unless another process has just mended some of them
-            known = {unit.key for unit in store.finished(folder, plan.units)}
+            known = store.finished_keys(folder, units)
             cells = _cells(units[key] for key in known)
         if not (left := [key for key in units if key not in known]):
             return
         before = len(known)
         free = claims.free(
             left,
-            lambda: {unit.key for unit in store.finished(folder, plan.units)},
+            partial(store.finished_keys, folder, units),
             lambda key: store.is_finished(folder, units[key]),
         )
         for unit, results in compute(units[key] for key in free):
@@ -257,7 +257,7 @@ def _shared(
             for cell in results:
                 cells += 1
                 yield Event("cell", done=cells, total=plan.cells, row=cell.row)
-        known |= {unit.key for unit in store.finished(folder, plan.units)}
+        known |= store.finished_keys(folder, units)
         if cells < _cells(units[key] for key in known):
             cells = _cells(units[key] for key in known)
             yield Event("others", done=cells, total=plan.cells)

@@ -195,9 +195,17 @@ def part_folder(folder: Path, part: str) -> Path:
 
 def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
     """Units whose results are stored whole: with a seal, or in a batch that was one unit to an earlier version."""
+    known = {unit.key: unit for unit in units}
+    done = finished_keys(folder, known)
+    return [unit for key, unit in known.items() if key in done]
+
+
+def finished_keys(folder: Path, units: Mapping[str, Unit]) -> set[str]:
+    """Keys of the units, by key, whose results are stored whole; 10,000 take some milliseconds."""
     sealed = seals.sealed(folder)
     batches = {name for name in sealed - seals.FIRST.keys() if WITH not in name}
-    return [unit for unit in units if unit.key in sealed or (batches and unit.batch.key in batches)]
+    before = {key for key, unit in units.items() if unit.batch.key in batches} if batches else set()
+    return (sealed & units.keys()) | before
 
 
 def is_finished(folder: Path, unit: Unit) -> bool:

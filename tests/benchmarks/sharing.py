@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[st
     def taken(claims: Claims) -> Iterator[str]:
         return claims.free(
             list(units),
-            lambda: {unit.key for unit in store.finished(folder, plan.units)},
+            partial(store.finished_keys, folder, units),
             lambda key: store.is_finished(folder, units[key]),
         )
 
