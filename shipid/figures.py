@@ -97,7 +97,7 @@ def error_over_horizon(
     *,
     dark: bool = False,
 ) -> go.Figure:
-    """Error of position [m], or of the course [deg], over the time ahead, of models trained on `N_D` manoeuvres; default: the most."""
+    """Error over the time ahead, of position [m] or course [deg]; `N_D` default: the most."""
     return standalone("error_over_horizon", content_of(source), [statistic, N_D], dark=dark)
 
 

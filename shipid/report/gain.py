@@ -62,7 +62,7 @@ def gain(content: ReportContent) -> Figure:
 def unplotted(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
     names, by = [], ["model", "N_D"]
-    every = content.cells.groupby(by, sort=False).size()
+    every = content.cells.groupby(by, sort=False).size().to_dict()
     bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
     for (model, size), failed in bad.groupby(by, sort=False):
         count = every[model, size]
