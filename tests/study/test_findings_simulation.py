@@ -48,7 +48,7 @@ def judged(made: Any) -> Any:
     def judge(rows: Rows = H, *, seeds: int = 1, wobble: Mapping[str, float] | None = None, **options: Any) -> Any:
         made_up = cells(rows, seeds=seeds, wobble=wobble) if "none" in rows else rows
         options = {"family": FAMILY, "alone": ALONE, "claims": ROLES, "runs": 8, **options}
-        found = findings(made(made_up, **options))
+        found = [one for one in findings(made(made_up, **options)) if one["id"].startswith("S")]
         assert [finding["id"] for finding in found] == list(CLAIMS)
         assert all("nan" not in finding["evidence"].split() for finding in found)
         return {finding["id"]: finding for finding in found}
