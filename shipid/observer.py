@@ -549,7 +549,7 @@ def tune_observer(
     def fades(given: Observer, label: str) -> Observer:
         estimates = observe(vessel, dataset, given)
         columns = at_windows(dataset, estimates, windows)
-        found = {}
+        best = {}
         for fade in (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None):
             one = given.model_copy(update={"fade": fade})
             paths, diverged = observed_paths(
@@ -560,8 +560,8 @@ def tune_observer(
                 errors = position_error(paths, windows.future).mean(axis=0)
             worst = float(errors[~diverged].max(initial=0.0))
             tried[f"{label}, fade {fade}"] = float(np.where(diverged, 2 * worst, errors).mean())
-            found[tried[f"{label}, fade {fade}"]] = one
-        return found[min(found)]
+            best[tried[f"{label}, fade {fade}"]] = one
+        return best[min(best)]
 
     for name, values in (("current", (best.current, 0.0)), ("change", (best.change, *((c,) for c in best.change)))):
         options = {f"{name} {value}": best.model_copy(update={name: value}) for value in dict.fromkeys(values)}

@@ -92,7 +92,7 @@ class Physics:
         """
         assert self.vessel is not None
         start, commands, environment, slow, drift = self._inputs(instants)
-        found = rollout_gradient(
+        gradients = rollout_gradient(
             self.vessel,
             start,
             commands,
@@ -106,10 +106,10 @@ class Physics:
             memory=instants.hidden,
             tau_extra=slow,
         )
-        sound = ~found.diverged
+        sound = ~gradients.diverged
         if not sound.any():
             return float("inf"), np.zeros(len(names))
-        return float(found.loss[sound].mean()), np.asarray(found.parameters[sound].mean(axis=0))
+        return float(gradients.loss[sound].mean()), np.asarray(gradients.parameters[sound].mean(axis=0))
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""

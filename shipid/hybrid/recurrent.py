@@ -109,8 +109,8 @@ class GatedNetwork:
             gate = _sigmoid(update + update_h)
             hidden = (1 - gate) * np.tanh(fresh + _sigmoid(reset + reset_h) * fresh_h) + gate * hidden
         full = np.concatenate([hidden, seen.now], axis=1)
-        found: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-        return found
+        outputs: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        return outputs
 
 
 def _sigmoid(values: Array) -> Array:
@@ -129,8 +129,8 @@ class RecurrentCorrector:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         table = self.inputs.table(physics, instants)
-        found = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
-        return np.asarray(paths + np.mean(found, axis=0))
+        corrections = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
+        return np.asarray(paths + np.mean(corrections, axis=0))
 
     def header(self) -> dict[str, Any]:
         """Return names and hyperparameters."""
@@ -152,15 +152,15 @@ class RecurrentCorrector:
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by flat names: `0.W_i`, `0.past.mean`, ..."""
-        found: dict[str, Array] = {}
+        stored: dict[str, Array] = {}
         for i, network in enumerate(self.networks):
             parts = {**network.layers, "basis": network.basis}
             for name, normaliser in (("past", network.reader.past), ("now", network.reader.now)):
                 parts |= {f"{name}.mean": normaliser.mean, f"{name}.std": normaliser.std}
             if network.reader.mirrors is not None:
                 parts |= dict(zip(("past.mirror", "now.mirror"), network.reader.mirrors, strict=True))
-            found |= {f"{i}.{name}": values for name, values in parts.items()}
-        return found
+            stored |= {f"{i}.{name}": values for name, values in parts.items()}
+        return stored
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
@@ -235,11 +235,11 @@ class Recurrent(Searched):
 
         def networks_of(number: int, point: Mapping[str, float]) -> tuple[tuple[GatedNetwork, ...], int]:
             """A network of each fold, and the most epochs that one took."""
-            found = []
+            trained = []
             for fold, (training, validation) in enumerate(task.folds):
                 seed = seed_of(task.seed, name, number, fold)
-                found.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
-            return tuple(network for network, _ in found), max(epochs for _, epochs in found)
+                trained.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
+            return tuple(network for network, _ in trained), max(epochs for _, epochs in trained)
 
         for number, point in search.left(points_of(self)):
             start, losses = time.process_time(), []
@@ -361,10 +361,10 @@ def _train(
         flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
         _, hidden = torch.gru(past, torch.zeros(1, now.shape[0], units), flat, True, 1, 0.0, False, False, False)
         full = torch.cat([hidden[0], now], dim=1)
-        found: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        outputs: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
         if len(seen) == 1:
-            return found
-        plain, image = found.chunk(2)
+            return outputs
+        plain, image = outputs.chunk(2)
         both: torch.Tensor = (plain + sign * image) / 2
         return both
 

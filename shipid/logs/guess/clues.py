@@ -75,7 +75,7 @@ class Question:
     sentence: str
 
 
-def unit_said(name: str, si: str) -> str | None:
+def unit_in_name(name: str, si: str) -> str | None:
     """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
 
     A unit is in brackets, or it is the last part or the last two parts of a name.
@@ -87,9 +87,11 @@ def unit_said(name: str, si: str) -> str | None:
     ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
     if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
         ends.append("rpm" if "rpm" in bare.lower() else "rps")
-    for said in [*reversed(inside), *ends]:
+    for candidate in [*reversed(inside), *ends]:
         for unit, expected in UNIT_WORDS.items():
-            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(expected, said.strip().lower()):
+            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(
+                expected, candidate.strip().lower()
+            ):
                 return unit
     return None
 

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from shipid.logs.guess.clues import UNIT_WORDS, State, unit_said
+from shipid.logs.guess.clues import UNIT_WORDS, State, unit_in_name
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import INPUTS, UNITS
 from shipid.physics.signals import SIGNALS
@@ -61,7 +61,7 @@ def _unit(meaning: str) -> str:
 
 def _wrong_unit(name: str, si: str) -> str | None:
     """The unit that stands in brackets in a name, where it is a known one that does not convert to the SI unit."""
-    if si not in UNITS or unit_said(name, si) is not None:
+    if si not in UNITS or unit_in_name(name, si) is not None:
         return None
     inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
     known = (

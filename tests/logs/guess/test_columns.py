@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.guess.clues import unit_said
+from shipid.logs.guess.clues import unit_in_name
 from shipid.logs.guess.columns import Guess, guess
 from tests.logs.simulated import KNOT, Change, as_bridge, si_log
 
@@ -340,7 +340,7 @@ def test_a_turn_while_the_logger_was_off_is_no_interpolation_across_360(tmp_path
     ("name", "unit"), [("Wind kn", "kn"), ("wind_kn", "kn"), ("Wind [kn]", "kn"), ("Wind", None), ("Wind speed", None)]
 )
 def test_a_name_says_its_unit(name: str, unit: str | None) -> None:
-    assert unit_said(name, "m/s") == unit
+    assert unit_in_name(name, "m/s") == unit
 
 
 @pytest.mark.parametrize(
