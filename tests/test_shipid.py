@@ -51,7 +51,7 @@ def test_public_names_load() -> None:
     assert np.isfinite(len(shipid.__all__))
 
 
-def test_names_can_be_found_by_typing() -> None:
+def test_names_are_listed_while_typing() -> None:
     """What `dir` lists, what is imported on first use and what a type checker sees are the same names."""
     assert set(shipid.__all__) <= set(dir(shipid))
     tree = ast.parse(Path(shipid.__file__).read_text(encoding="utf-8"))

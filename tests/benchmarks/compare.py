@@ -61,8 +61,8 @@ class Ratio:
 
 def read_recorded() -> dict[str, dict[str, dict[str, Any]]]:
     """Read group -> label -> entry."""
-    found: dict[str, dict[str, dict[str, Any]]] = json.loads(RECORDED.read_text())
-    return found
+    document: dict[str, dict[str, dict[str, Any]]] = json.loads(RECORDED.read_text())
+    return document
 
 
 def compare(figures: Figures, recorded: Figures) -> list[Ratio]:

@@ -45,9 +45,9 @@ def run(replicates: int = REPLICATES) -> dict[str, Any]:
                 judged[horizon].append(_judged(vessel, data, horizon))
         for horizon in horizons:
             case = f"{noise}, {f'{horizon:g} s' if horizon else 'whole runs'}"
-            found = [one for one in judged[horizon] if one is not None]
-            result |= {f"{case}: {label}": value for label, value in _figures(found).items()}
-            result[f"{case}: did not converge"] = replicates - len(found)
+            converged = [one for one in judged[horizon] if one is not None]
+            result |= {f"{case}: {label}": value for label, value in _figures(converged).items()}
+            result[f"{case}: did not converge"] = replicates - len(converged)
     return result
 
 
@@ -96,8 +96,8 @@ def _judged(vessel: Vessel, data: Dataset, horizon: float) -> Statistics | None:
         start="base",
     )
     begin = dict(zip(paths, (1 + 0.2 * np.sin(np.arange(len(paths)))).tolist(), strict=True))
-    found = identify(vessel, data, data.runs, settings, start=begin)
-    return statistics(LinearFit.of(found)) if found.status == "ok" else None
+    solution = identify(vessel, data, data.runs, settings, start=begin)
+    return statistics(LinearFit.of(solution)) if solution.status == "ok" else None
 
 
 def _figures(judged: list[Statistics]) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def _figures(judged: list[Statistics]) -> dict[str, Any]:
     worst = min(free, key=lambda j: float(covered[j]))
     others = [j for j in range(len(paths)) if j not in free]
     named = [
-        any(set(PAIR) <= set(own.paths) for own in one.collinearity.combinations)
+        any(set(PAIR) <= set(combination.paths) for combination in one.collinearity.combinations)
         and not any(one.identifiable[paths.index(path)] for path in PAIR)
         for one in judged
     ]

@@ -17,7 +17,7 @@ from shipid.cli import app, main
 BAD = Path(__file__).parents[1] / "bad"
 
 
-def said(*arguments: object) -> str:
+def output_of(*arguments: object) -> str:
     """Output of a command that must succeed."""
     result = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if result.exception is not None and not isinstance(result.exception, SystemExit):

@@ -614,15 +614,15 @@ def judge(drawn: Drawn) -> Verdict:
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "said", (f"not imported: {error.path or ''}: {error.message}",))
     if drawn.impossible:
-        said = _unsure(guessed, "psi", "north", "east", "latitude")
-        return Verdict("said" if said else "silent", ("imported what has no position or no heading",))
+        reported = _unsure(guessed, "psi", "north", "east", "latitude")
+        return Verdict("said" if reported else "silent", ("imported what has no position or no heading",))
     wrong = _compare(drawn, frame, guessed)
-    if any(said and reason.startswith("psi") for said, reason in wrong):  # the rest follows from the heading
+    if any(reported and reason.startswith("psi") for reported, reason in wrong):  # the rest follows from the heading
         wrong = [(True, reason) for _, reason in wrong]
     if not wrong:
         return Verdict("right", ())
-    word = "said" if all(said for said, _ in wrong) else "silent"
-    return Verdict(word, tuple(("said: " if said else "SILENT: ") + reason for said, reason in wrong))
+    word = "said" if all(reported for reported, _ in wrong) else "silent"
+    return Verdict(word, tuple(("said: " if reported else "SILENT: ") + reason for reported, reason in wrong))
 
 
 def _unsure(guessed: Guess, *names: str) -> bool:

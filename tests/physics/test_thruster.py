@@ -36,10 +36,10 @@ def test_azimuth_against_the_published_samples(shared_data: Path) -> None:
     n, alpha = revs / 60, np.radians(angle)
     at_unit = np.zeros((6, len(u)))
     at_unit[0], at_unit[1] = u, v
-    found = np.array(azimuth().map(len(u))(at_unit, n, alpha))
+    forces = np.array(azimuth().map(len(u))(at_unit, n, alpha))
     turn = np.stack([np.cos(alpha), np.sin(alpha)])
     scale = 1025.0 * n**2 * 1.9**4
-    difference = np.stack([found[0] - F_x, found[1] - F_y]) / scale
+    difference = np.stack([forces[0] - F_x, forces[1] - F_y]) / scale
     along = turn[0] * difference[0] + turn[1] * difference[1]
     across = -turn[1] * difference[0] + turn[0] * difference[1]
     under_way = u >= 2

@@ -93,8 +93,8 @@ def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, fl
     M = np.array([[m + m_x, 0, 0], [0, m + m_y, x_G * m], [0, x_G * m, I_z + x_G**2 * m + J_z]])
     turning = [(m + m_y) * v * r + x_G * m * r**2, -(m + m_x) * u * r, -x_G * m * u * r]
     expected = np.linalg.solve(M, np.array([X, Y, N]) + turning)
-    found = accelerations(load_vessel("kvlcc2-l7"), nu, delta, n)
-    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=2e-4)
+    computed = accelerations(load_vessel("kvlcc2-l7"), nu, delta, n)
+    np.testing.assert_allclose(computed, expected, rtol=5e-3, atol=2e-4)
 
 
 # Free-running tests of the 7 m model at MARIN (SIMMAN 2008), as compared with in Yasukawa and Yoshimura (2015),
@@ -125,9 +125,9 @@ def test_kvlcc2_overshoots_near_those_of_another_tank(
     kvlcc2: dict[str, pd.DataFrame], side: str, measured: tuple[float, float]
 ) -> None:
     """10/10 at HSVA (SIMMAN 2008), read off the records: the method falls short, by up to 8, as in the paper."""
-    found = overshoots(kvlcc2[f"10 {side}"], 10)
-    assert (found > np.array(measured) - 8.5).all()
-    assert (found < np.array(measured)).all()
+    angles = overshoots(kvlcc2[f"10 {side}"], 10)
+    assert (angles > np.array(measured) - 8.5).all()
+    assert (angles < np.array(measured)).all()
 
 
 def test_kvlcc2_is_course_unstable_as_the_ship(kvlcc2: dict[str, pd.DataFrame]) -> None:

@@ -94,7 +94,7 @@ def test_frames_agree_with_the_cells(results: Results) -> None:
     assert bands.answer(results)[0][0].startswith("Bands of 80% held ")
 
 
-def test_too_few_runs_are_said(tiny_run: Path) -> None:
+def test_too_few_runs_are_reported(tiny_run: Path) -> None:
     results = read_results(tiny_run)  # 0.9 of 6 runs
     assert results.cells["coverage"].isna().all()
     assert "needs 9 runs or more" in bands.answer(results)[0][0]

@@ -55,12 +55,12 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     made, run = getattr(contents, at), [threading.Thread(target=run_here, args=(plan, folder))]
 
     def meanwhile(*args: Any) -> Any:
-        found = made(*args)
+        content = made(*args)
         if not run[0].is_alive():
             run[0].start()
             if at == "report_content":  # else the run waits for the tables that are written
                 run[0].join()
-        return found
+        return content
 
     monkeypatch.setattr(contents, at, meanwhile)
     report = write_pages(folder)
@@ -77,7 +77,7 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     assert report.stat().st_mtime_ns == last, "another process that ends at the same time writes no second page"
 
 
-def test_a_report_before_the_last_note_of_a_run_leaves_it_to_write_its_own(tmp_path: Path) -> None:
+def test_a_report_before_the_last_note_of_a_run_leaves_the_final_one_to_the_run(tmp_path: Path) -> None:
     """All cells are there and the report is written; only the run itself knows how long it took, and on what."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     for event in events_here(plan, folder):

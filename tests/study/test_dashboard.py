@@ -31,7 +31,7 @@ def dashboard(tiny_run: Path, tmp_path: Path) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-c", START, str(tiny_run / TRIALS), "--port", str(port), "--host", "127.0.0.1"]
-    with (tmp_path / "said").open("w") as said, subprocess.Popen(command, stdout=said, stderr=said) as process:
+    with (tmp_path / "said").open("w") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
         address = f"http://127.0.0.1:{port}"
         for _ in range(200):
             try:

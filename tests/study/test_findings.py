@@ -14,10 +14,10 @@ RUNS = 8  # test manoeuvres, all alike but for a tenth
 
 
 def verdicts(results: Results) -> dict[str, str]:
-    found = findings(results)
-    assert [finding["id"] for finding in found] == list(CLAIMS)
-    assert all(finding["claim"] == CLAIMS[finding["id"]] for finding in found)
-    return {finding["id"]: finding["verdict"] for finding in found}
+    claims = findings(results)
+    assert [finding["id"] for finding in claims] == list(CLAIMS)
+    assert all(finding["claim"] == CLAIMS[finding["id"]] for finding in claims)
+    return {finding["id"]: finding["verdict"] for finding in claims}
 
 
 def one(good: float, bad: float, none: float) -> dict[Any, float | None]:
@@ -38,9 +38,9 @@ def test_all_confirmed(made: Any) -> None:
     ],
 )
 def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
-    found = verdicts(made(one(*H), runs=RUNS))
-    assert {key for key, verdict in found.items() if verdict == "refuted"} == refuted
-    assert {verdict for key, verdict in found.items() if key not in refuted} == {"confirmed"}
+    by_claim = verdicts(made(one(*H), runs=RUNS))
+    assert {key for key, verdict in by_claim.items() if verdict == "refuted"} == refuted
+    assert {verdict for key, verdict in by_claim.items() if key not in refuted} == {"confirmed"}
 
 
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
@@ -96,8 +96,8 @@ def test_no_claims_no_findings(made: Any) -> None:
 
 def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
     cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
-    found = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
-    assert [finding["id"] for finding in found] == [*CLAIMS, *(f"S{k}" for k in range(1, 8))]
+    claims = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
+    assert [finding["id"] for finding in claims] == [*CLAIMS, *(f"S{k}" for k in range(1, 8))]
 
 
 def test_numbers_are_those_of_the_evidence(made: Any) -> None:

@@ -126,8 +126,8 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
 
 @pytest.mark.parametrize("kind", BAD)
 def test_a_wrong_part_is_one_line_before_anything_runs(tmp_path: Path, kind: str) -> None:
-    changes, path, said = BAD[kind]
-    with pytest.raises(DocumentError, match=said) as caught:
+    changes, path, message = BAD[kind]
+    with pytest.raises(DocumentError, match=message) as caught:
         tiny_plan(tmp_path, changes)
     assert caught.value.path == path
     assert "\n" not in str(caught.value)

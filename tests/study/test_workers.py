@@ -41,8 +41,10 @@ process.start()
 process.join()
 """
     environment = os.environ | dict.fromkeys(ONE_THREAD, "2")
-    found = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
-    assert found.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), found.stderr
+    process = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    assert process.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), process.stderr
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

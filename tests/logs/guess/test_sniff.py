@@ -120,7 +120,7 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"", "the file is empty"),
         (b"\x00\x01\x02 binary", "a binary file of unknown format"),
@@ -134,9 +134,9 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         (text(table=TABLE.assign(time=1.0, N=1.0, psi=1.0).rename(columns={"time": "x"})).encode(), "none rises"),
     ],
 )
-def test_what_is_no_log_is_one_sentence(content: bytes, said: str, tmp_path: Path) -> None:
+def test_what_is_no_log_is_one_sentence(content: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_bytes(content)
-    with pytest.raises(DataError, match=rf"log\.csv.*{said}"):
+    with pytest.raises(DataError, match=rf"log\.csv.*{message}"):
         sniff(tmp_path / "log.csv")
 
 
