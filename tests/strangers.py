@@ -2,7 +2,7 @@
 
 The truth has a hull of cubic MMG terms, or linear lift with cross-flow drag; a rudder in the race, or one that knows
 the ship's speed alone; lags of shaft and steering gear; a current and gusts that nobody measured. Slopes are those of
-Inoue et al. (1981), each times a factor of its own; the template has Clarke's and Kijima's.
+Inoue et al. (1981), each times a separate factor; the template has Clarke's and Kijima's.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The machine: its processor has a name, and memory that cannot be had is said in GiB."""
+"""The machine: its processor has a name, and memory that cannot be had is reported in GiB."""
 
 from __future__ import annotations
 

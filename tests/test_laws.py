@@ -30,7 +30,7 @@ ALL = pytest.mark.parametrize("key", list(TERMS))
 DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
 
 VECTORS = ("eta", "nu", "nu_r")
-WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of what a rudder stands in
+WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of the flow at a rudder
 STATE = 0.5  # range of what a term remembers
 MOTION_RANGE = np.array([6.0, 1.5, 0.3, 0.1, 0.05, 0.15])  # m/s, rad/s; surge is drawn from -1/3 of it
 RANGES = {name: row.reach for name, row in SIGNALS.items()}
@@ -47,7 +47,7 @@ MIRROR_OF_A_TERM = {  # a tunnel's shaft drives sideways, so the mirrored unit t
 WHOLE_CIRCLE = {"beta_deg": [-180.0, -65.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
 EXAMPLES = {"thruster.quadratic": "naval-51"}  # a vessel other than the first that has the term
 SCALE_OF_STATES = {"radiation.heave_pitch": [1.0] * 6 + [0.0] * 6}  # metres, then radians
-DRAWN_COMPONENTS = ("waves.first_order", "waves.drift")  # forces of the sea: not zero at rest, no numbers of their own
+DRAWN_COMPONENTS = ("waves.first_order", "waves.drift")  # forces of the sea: not zero at rest, no numbers
 DISSIPATIVE = ("hull.crossflow", "hull.resistance")
 AT_REST = 0.1  # N: what the floor of the shaft speed (1e-3 rev/s) leaves of a thruster at n = 0
 
@@ -98,7 +98,7 @@ def example(key: str) -> Example:
 
 
 def _columns(key: str, block: Mapping[str, Any]) -> dict[str, Any]:
-    """Component argument -> its values: the term's own, or two wave components as drawn for one ship."""
+    """Component argument -> its values: those of the term, or two wave components as drawn for one ship."""
     term = TERMS[key]
     keys = {name: block[name] for name in structural(term)}
     if term.components:
@@ -255,7 +255,7 @@ def test_mirror_port_starboard(key: str, seed: int) -> None:
 
 
 def _other_side(path: str, paths: tuple[str, ...]) -> int:
-    """Where the number of the other side stands: a screw that turns the other way has its wake and flow mirrored."""
+    """Place of the number of the other side: a screw that turns the other way has its wake and flow mirrored."""
     turned = re.sub("_plus$|_minus$", lambda end: "_minus" if end[0] == "_plus" else "_plus", path)
     return paths.index(turned)
 

@@ -63,7 +63,7 @@ class Journal:
         return numbered
 
     def count(self, cell: str) -> int | None:
-        """Return how many trials a search by budget was found to have."""
+        """Return how many trials the budget of a search allowed; None before that is decided."""
         return self._study(cell).user_attrs.get(COUNT) if cell in self._known else None
 
     def decide(self, cells: Sequence[str], count: int) -> None:

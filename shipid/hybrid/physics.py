@@ -212,7 +212,7 @@ def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Arr
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
-    """States and weather that a vessel has and the columns do not hold: they are taken as zero and must be said."""
+    """States and weather that a vessel has and the columns lack: they are taken as zero, and the report names them."""
     model = dynamics(vessel)
     return [name for name in (*model.state, *model.environment) if name not in columns]
 

@@ -187,7 +187,7 @@ class Recurrent(Searched):
 
     Parameters
     ----------
-    trials : networks tried per foundation and fold, each with a start of its own; the best by validation is taken.
+    trials : networks tried per foundation and fold, each from other initial weights; the best by validation is taken.
     seconds : length of the past that it reads.
     units : of the recurrent state, and of the layer after it.
     learning_rate : of AdamW at the start, falling to 0 by half a cosine; a range is searched by its logarithm.

@@ -62,7 +62,7 @@ def free(physics: Physics, at: Instants) -> Array:
 
 
 def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
-    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
+    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
     engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO

@@ -134,7 +134,7 @@ def run_study(
 def _run_parts(
     plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool
 ) -> Iterator[Event]:
-    """Run every part of a study in a folder of its own, one after the other; events count the cells of all.
+    """Run the parts of a study one after the other, each in its folder; events count the cells of all parts.
 
     What others work on is left to the end.
     """

@@ -342,7 +342,7 @@ def wind(given: Particulars) -> Values:
 class Screw:
     """A screw that drives the ship at its service speed.
 
-    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was found.
+    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was estimated.
     """
 
     D: float

@@ -173,7 +173,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
             row |= {f"{kind}": by_run(fresh.run[mine], held[mine]), f"{kind} runs": calibrated_kinds.count(kind)}
             if one.bands.promises(level, str(kind)):
                 known = one.bands.region(one.paths, fresh.columns, 1.0, level, kind=str(kind))
-                row[f"{kind} said"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
+                row[f"{kind} named"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
         yield row
 
 
@@ -271,7 +271,7 @@ def figures(kept: pd.DataFrame, beside: pd.DataFrame) -> dict[str, Any]:
                 enough = part[part[f"{kind} runs"] >= needed(float(str(level)))]
                 label = f"22 runs, {kind}, {level:.0%}: coverage"
                 summary[label] = mean_interval(enough.groupby("world")[kind].mean())
-                summary[f"{label}, kind said"] = mean_interval(enough.groupby("world")[f"{kind} said"].mean())
+                summary[f"{label}, kind named"] = mean_interval(enough.groupby("world")[f"{kind} named"].mean())
     for rival, part in beside.groupby("rival"):
         width = part.width.to_numpy() / _of_band(beside, part)
         summary[f"22 runs, 90%, {rival}: coverage"] = mean_interval(part["coverage"])

@@ -24,7 +24,7 @@ class Ratio:
 
     Parameters
     ----------
-    group, label : where the figure stands.
+    group, label : where the figure is.
     value : measured now.
     recorded : measured when it was accepted; None if never.
     better : whether `higher` or `lower` is better.

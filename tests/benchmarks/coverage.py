@@ -1,7 +1,7 @@
 """Whether the 95 % intervals cover: replicates of trials with noise whose truth is known, each fitted and judged.
 
 The 28.9 m Gunnerus, 20 runs of 80 s at 1 Hz, eight hull derivatives; the moment of inertia and its added part as well,
-which act as one sum and so cannot be told apart. Every fit starts from factors off by up to 20 %.
+which act as one sum and so cannot be separated. Every fit starts from factors off by up to 20 %.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def run(replicates: int = REPLICATES) -> dict[str, Any]:
 
 
 def _noisy(vessel: Vessel, seed: int, strength: float) -> Dataset:
-    """The same orders each time, with noise of their own, shaken by forces that many times as strong as declared."""
+    """The same orders each time, with other noise, shaken by forces that many times as strong as declared."""
     data, rng = trials(vessel, RUNS, STEPS), np.random.default_rng([seed, 5])
     columns = _shaken(vessel, data, rng, strength)
     return changed(data, **{name: columns[name] + rng.normal(0, s, len(data.frame)) for name, s in NOISE.items()})

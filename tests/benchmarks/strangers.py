@@ -56,8 +56,8 @@ def run(ships: int = SHIPS, first: int = FIRST) -> dict[str, Any]:
                 f"{numbers['corrected']:.2f}, compensated {numbers['compensated']:.2f}, true vessel "
                 f"{numbers['true']:.2f} of {numbers['constant']:.3g} m{'' if numbers['passed'] else ' MISSED'}"
             )
-        figures[f"{seed} said"] = outcome["said"][:400]
-        print(figures[f"{seed} 1x"], figures[f"{seed} 2x"], outcome["said"], sep="\n", file=sys.stderr, flush=True)
+        figures[f"{seed} warning"] = outcome["warning"][:400]
+        print(figures[f"{seed} 1x"], figures[f"{seed} 2x"], outcome["warning"], sep="\n", file=sys.stderr, flush=True)
     figures["within the goal at the proposed horizon, at twice that"] = f"{passed[0]}, {passed[1]} of {ships}"
     return figures
 
@@ -71,7 +71,7 @@ def one(seed: int, runs: int = 18) -> dict[str, Any]:
         output = command("study", "new", "--vessel", "./ship.toml", "--data", "log.parquet", "--out", "study.toml")
         document = tomllib.loads(Path("study.toml").read_text())
         ahead, most = document["prediction"]["ahead"], document["grid"]["N_D"][-1]
-        result: dict[str, Any] = {"words": ship.words, "said": _warning(output)}
+        result: dict[str, Any] = {"words": ship.words, "warning": _warning(output)}
         for times, far in ((1, "1x"), (2, "2x")):
             changes = SHORT | {"prediction.ahead": times * ahead, "grid.N_D": [most]}
             changes |= {"prediction.interval": FEWER * document["prediction"]["interval"]}

@@ -35,7 +35,7 @@ PIECES = Path("results/yardstick")
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the study `simulation` in a world of its own (top-level `seed`)."""
+    """A cell of the study `simulation` in another world (top-level `seed`)."""
 
     world: int
     N_D: int

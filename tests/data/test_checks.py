@@ -1,4 +1,4 @@
-"""A clean log passes every check; each defect put into it fails its own check."""
+"""A clean log passes every check; each defect put into it fails the check for it."""
 
 from collections.abc import Callable
 

@@ -28,7 +28,7 @@ def test_constant_turn_without_noise(step: float) -> None:
 
 
 def random_motion(random: np.random.Generator, t: np.ndarray, given: Noise) -> np.ndarray:
-    """The filter's own model in fine steps: u, v, r walk at random; (N, 6)."""
+    """The model of the filter in fine steps: u, v, r walk at random; (N, 6)."""
     fine, states = 20, np.zeros((len(t), 6))
     x = np.array([0.0, 0.0, 1.0, 5.0, 0.3, 0.02])
     states[0] = x

@@ -1,4 +1,4 @@
-"""The dict of engines: a new one is one line, `auto` chooses by size, and what an engine cannot do is said."""
+"""The dict of engines: a new one is one line, `auto` chooses by size, and what an engine cannot do is reported."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
 def test_a_broken_library_is_made_anew(
     empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
 ) -> None:
-    """What a full disk left behind, found by a later process: here another cache, as a loaded file stays loaded."""
+    """What a full disk left behind, read by a later process: here another cache, as a loaded file stays loaded."""
 
     def run() -> np.ndarray:
         native._library.cache_clear()

@@ -124,7 +124,7 @@ def test_order_of_the_integrator(vessel: Vessel, draw_inputs: Draw, method: Meth
     calm = smooth(vessel)
     exact = last_state(calm, draw_inputs, "rk4", 1 / 32)
     errors = [np.abs(last_state(calm, draw_inputs, method, step / 2**k) - exact).max(axis=1) for k in range(3)]
-    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink of its own
+    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink
     assert np.abs(orders - order).min() < 0.35
     assert orders[-1] == pytest.approx(order, abs=0.5)
 

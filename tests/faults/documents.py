@@ -153,6 +153,6 @@ def memory(seed: int) -> None:
             prepare(plan, obtain(plan))
         except DocumentError as error:
             if "GiB" not in error.message:
-                raise Failure("not said", str(error)) from None
+                raise Failure("no line of an error", str(error)) from None
             return
         raise Failure("not refused", f"{path} = {value:g}")

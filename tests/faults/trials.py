@@ -1,4 +1,4 @@
-"""Trials in a process of their own: each ends in an outcome, and none may hang or bring the campaign down."""
+"""Each trial in a new process: each ends in an outcome, and none may hang or bring the campaign down."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Outcome:
 
 
 class Failure(Exception):
-    """A trial that found what must not be; the first argument is the kind of failure."""
+    """A trial that showed what must not be; the first argument is the kind of failure."""
 
 
 def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HANG) -> Iterator[Outcome]:

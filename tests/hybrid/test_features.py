@@ -84,7 +84,7 @@ def test_a_missing_column_is_named(columns):
 
 @pytest.fixture(scope="module")
 def past():
-    """Windows of the ship's own Euler runs with 8 s of past."""
+    """Windows of Euler runs of the ship with 8 s of past."""
     return cut_windows(weaving("ab"), horizon=5, past=8)
 
 

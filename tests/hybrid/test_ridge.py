@@ -374,7 +374,7 @@ def test_windows_outside_the_folds_are_not_seen(columns, targets):
 
 
 def test_what_can_be_solved_is_learned(columns):
-    """A compensation of the same kind, of the same hidden units, is found again where nothing was seen."""
+    """A compensation of the same kind, of the same hidden units, is recovered where nothing was seen."""
     new = drawn(seed=7)
     setup = recipe(mirror=0.0, trials=1, ridge=1e-9)
     first = tuned(columns, {"any": missed(columns)}, setup)["any"].corrector

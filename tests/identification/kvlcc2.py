@@ -66,7 +66,7 @@ def to_identify() -> Vessel:
 
 
 def sailing(solution: Solution) -> Vessel:
-    """What was found, with the steering gear."""
+    """The identified vessel, with the steering gear."""
     return load_vessel("kvlcc2-hsva").with_values(solution.values)
 
 

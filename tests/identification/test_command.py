@@ -29,7 +29,7 @@ def log() -> Dataset:
 
 @pytest.fixture
 def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The log in a folder of its own, which is the working folder."""
+    """The log in a new folder, which is the working folder."""
     monkeypatch.chdir(tmp_path)
     return write_dataset(log, tmp_path / "log.parquet")
 

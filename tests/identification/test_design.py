@@ -146,7 +146,7 @@ def test_no_kind_orders_more_than_the_limits(manoeuvre: Approached, helm: float,
 
 @pytest.mark.parametrize("name", ["gunnerus-33.9", "roll", "six"])
 def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
-    """Their starts are along the ship's own axes, the velocities of a log are horizontal: the next start is met."""
+    """Their starts are along the ship's axes, the velocities of a log are horizontal: the next start is met."""
     ship = variety()[name]
     one = TurningCircle(n_rpm=180, approach="rest", duration=60)
     log = perform(ship, [one], step=0.2, environment={})
@@ -176,7 +176,7 @@ def test_mistakes_are_reported() -> None:
 
 
 def test_a_zigzag_is_replayed_as_logged() -> None:
-    """Copies get the orders of the log: the helmsman would answer each copy in his own way, at whole steps."""
+    """Copies get the orders of the log: the helmsman would answer each copy differently, at whole steps."""
     zigzag = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
     fine, coarse = (informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
     np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)

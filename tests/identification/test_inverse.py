@@ -1,4 +1,4 @@
-"""Inverse dynamics: simulated forces are found again, whatever they are made of."""
+"""Inverse dynamics: simulated forces are recovered, whatever they are made of."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_orders_that_jump_within_a_bump_do_no_harm() -> None:
 
 
 def test_what_data_do_not_see_stays_at_the_base_and_priors_hold() -> None:
-    still = ["wind.A_FW"]  # no wind in these runs, but the ship's own
+    still = ["wind.A_FW"]  # no wind in these runs but that of the ship's motion
     low = Dataset(LOG.frame.assign(V_w=0.0), LOG.metadata)
     free = inverse_dynamics(SHIP, low, low.runs, [["hull.derivatives.N_ur"], ["thruster.port.k_over2"]])
     assert free.factors[1] == pytest.approx(1)

@@ -1,4 +1,4 @@
-"""The whole of an identification: what is said agrees with what was done, and a patch is the vessel that was found."""
+"""The whole of an identification: the report agrees with the fit, and a patch is the identified vessel."""
 
 from __future__ import annotations
 
@@ -247,7 +247,7 @@ def test_a_fit_that_fails_is_its_sentence(log: Dataset, monkeypatch: pytest.Monk
 
 @pytest.mark.usefixtures("one_manoeuvre")
 def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Libraries turn an interrupt into complaints of their own; here it comes while they are at work."""
+    """Libraries turn an interrupt into other errors; here it comes while they are at work."""
     real = outcome._measured
 
     def interrupted(*given: object) -> object:

@@ -1,4 +1,4 @@
-"""How far data and manoeuvres reach, and what is said where a manoeuvre goes beyond."""
+"""How far data and manoeuvres reach, and the warning where a manoeuvre goes beyond."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def test_a_command_that_was_not_logged_is_reported() -> None:
 
 @pytest.mark.parametrize("name", ["roll", "six"])
 def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
-    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along her own axes."""
+    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along the ship's axes."""
     vessel = variety()[name]
     data = trials(vessel, runs=2, steps=40)
     assert np.abs(data.frame["phi"]).max() > 0.02
@@ -90,7 +90,7 @@ def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
 
 
 def test_actuators_lag_as_in_each_run() -> None:
-    """An override of an actuator's time constant also says where the actuator stands when a prediction begins."""
+    """An override of an actuator's time constant also sets the actuator's position when a prediction begins."""
     vessel = variety()["actuators"]
     lags = {path: 3.0 * x for path, x in vessel.parameters.items() if path.startswith("thruster.port.actuator.n.")}
     numbers = np.tile(list(vessel.parameters.values()), (2, 1))

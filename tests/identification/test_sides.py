@@ -1,4 +1,4 @@
-"""Errors by side, helm and speed: what is wrong on one side only is said, and noise is not."""
+"""Errors by side, helm and speed: what is wrong on one side only is reported, and noise is not."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_of_many_groups_alike_few_are_reported_to_differ() -> None:
 
 
 def test_the_error_of_the_yaw_rate_is_tested_too() -> None:
-    """Twice as large on one side by the chance of a piece is not said; by every piece it is."""
+    """Twice as large on one side by the chance of a piece is not reported; by every piece it is."""
     row = {"group": "all", "rows": 200, "u": 0.1, "v": 0.1, "turning": 0.0, "error": 0.001, "pieces": 10}
     sides = {"starboard": {"r": 0.01, "r_error": 0.004}, "port": {"r": 0.025, "r_error": 0.009}}
     groups = pd.DataFrame([{**row, "side": side, **error} for side, error in sides.items()])

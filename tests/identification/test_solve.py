@@ -1,4 +1,4 @@
-"""Laws of identify: what made the data is found again, what is declared holds, and each failure is one sentence."""
+"""Laws of identify: what made the data is recovered, what is declared holds, and each failure is one sentence."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_levels_and_memory_are_measured() -> None:
 
 
 def test_a_pair_that_acts_as_one_is_named() -> None:
-    """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is told, others are."""
+    """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is named, others are."""
     jacobian = JACOBIAN.copy()
     jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
     estimates = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))

@@ -1,4 +1,4 @@
-"""Trials that shipid's own simulator sails: random orders held for a while, logged once a step, without noise."""
+"""Trials by the simulator of shipid: random orders held for a while, logged once a step, without noise."""
 
 from __future__ import annotations
 

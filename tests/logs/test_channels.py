@@ -1,4 +1,4 @@
-"""Channels with clocks, delays and frames of their own become one dataset, equal to the motion that made them."""
+"""Channels with different clocks, delays and frames become one dataset, equal to the motion that made them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,7 +43,7 @@ GAP = ('from = "time"', 'from = "time"\nmax_gap = 3.0')
 
 
 def test_irregular_clocks_and_latencies(tmp_path: Path) -> None:
-    """GPS of 1 s and compass of 0.3 to 0.7 s in files of their own, each late by its own delay."""
+    """GPS of 1 s and compass of 0.3 to 0.7 s in separate files, each with another delay."""
     random = np.random.default_rng(0)
     dense = turning(np.arange(0.0, 125.0, 0.01))
     gps = dense.iloc[::100]

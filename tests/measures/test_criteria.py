@@ -25,7 +25,7 @@ def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[
     measures = MEASURES[kind](every(RECORDS[kind](), 0.5))
     changed = Measures()
     for name, one in measures.items():
-        changed.add(name, values.get(name, one.value), one.unit, one.why or "was not found")
+        changed.add(name, values.get(name, one.value), one.unit, one.why or "is missing")
     judgements = criteria(kind, changed, length)
     return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in judgements}
 
@@ -61,5 +61,5 @@ def test_a_stop() -> None:
 
 def test_what_is_not_judged_says_why() -> None:
     assert judged("stop", None)["5.3.4"][2:] == (None, "the length of the ship is not known")
-    assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "was not found")
+    assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "is missing")
     assert "100 m and more" in judged("stop", 50.0)["5.3.4"][3]

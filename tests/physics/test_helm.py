@@ -1,4 +1,4 @@
-"""Helmsmen's laws on their own: what they order and remember, number by number."""
+"""Helmsmen's laws alone: what they order and remember, number by number."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_angles_steer_and_shafts_do_not() -> None:
 
 @pytest.mark.parametrize("make", [zigzag, yaw_rate])
 def test_one_helmsman_per_set_of_commands(make: Any) -> None:
-    """One object, one compilation; he is told every command."""
+    """One object, one compilation; he gets every command."""
     assert make(COMMANDS) is make(COMMANDS)
     assert make(COMMANDS) != make(COMMANDS[:2])
     assert dict(list(make(COMMANDS).inputs.items())[:3]) == dict(zip(COMMANDS, ("rev/s", "rad", "rad"), strict=True))

@@ -29,7 +29,7 @@ def stiffness(**values: float) -> np.ndarray:
 
 
 def test_columns_of_water() -> None:
-    """A wall-sided body of columns: each is pushed up by its extra depth, its own buoyancy leans with it.
+    """A wall-sided body of columns: each is pushed up by its extra depth, its buoyancy leans with it.
 
     Moments of the weight and the buoyancy at rest, W (z_B - z_G) times the angle, are Fossen (2021), eq. 4.27.
     """

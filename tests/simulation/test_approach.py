@@ -1,4 +1,4 @@
-"""What commands do, found by asking the equations; the steady approach; how units share a load."""
+"""What commands do, by the equations; the steady approach; how units share a load."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_an_approach_is_that_of_the_vessel_whoever_asked_before() -> None:
 
 
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
-    """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
+    """Speeds of the 2015 derivatives, computed separately in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
     approach = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
     state = approach.state

@@ -130,7 +130,7 @@ def test_together_is_one_at_a_time() -> None:
 
 @pytest.mark.parametrize(("n_rpm", "u", "v", "r"), [(145, 2.76, 0.60, 3.54), (200, 3.81, 0.72, 4.95)])
 def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: float, r: float) -> None:
-    """Steady turns at 35 deg of the 2015 derivatives, integrated on their own in NumPy [m/s, m/s, deg/s]."""
+    """Steady turns at 35 deg of the 2015 derivatives, integrated separately in NumPy [m/s, m/s, deg/s]."""
     to_either = [TurningCircle(n_rpm=n_rpm, duration=200, side=side) for side in ("starboard", "port")]
     for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
         end = log.iloc[-1]
@@ -149,7 +149,7 @@ def test_turning_takes_commands_as_the_vessel_does() -> None:
 
 
 def test_steps_hold_levels_in_their_ranges() -> None:
-    """Levels differ, each holds for 2 to 5 s, shaft and angle change at their own times; another seed, other orders."""
+    """Levels differ, each holds for 2 to 5 s, shaft and angle change at different times; another seed, other orders."""
     steps = Steps(orders={"n_rpm": (60, 90), "alpha_deg": (-20, 10)}, hold=(2.0, 5.0), seed=3, duration=60)
     log = one(SHIP, steps)
     for signal, unit, low, high in (("n", 1 / 60, 60, 90), ("alpha", DEGREE, -20, 10)):

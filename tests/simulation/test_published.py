@@ -65,7 +65,7 @@ def test_kvlcc2_approaches_at_the_speed_of_the_tests(kvlcc2: dict[str, pd.DataFr
 @pytest.mark.parametrize("nu", [(1.1, 0.0, 0.0), (0.9, -0.3, 0.12), (1.0, 0.2, -0.08)])
 @pytest.mark.parametrize("delta", [0.0, 0.6, -0.3])
 def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, float], delta: float) -> None:
-    """Yasukawa and Yoshimura (2015), eqs. 4-27 with table 3, amidships, in their own primes."""
+    """Yasukawa and Yoshimura (2015), eqs. 4-27 with table 3, amidships, in their prime system."""
     u, v, r = nu
     L, d, rho, n, D, x_G = 7.0, 0.46, 1000.0, 10.4, 0.216, 0.25
     U, beta = np.hypot(u, v), np.arctan2(-v, u)
@@ -100,12 +100,12 @@ def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, fl
 # Free-running tests of the 7 m model at MARIN (SIMMAN 2008), as compared with in Yasukawa and Yoshimura (2015),
 # tables 4 and 5: advance and tactical diameter over L at 35 deg; first and second overshoot [deg].
 TURNS = {"starboard": (3.25, 3.34), "port": (3.11, 3.08)}
-CALCULATED = (3.31, 3.36)  # their own, to starboard
+CALCULATED = (3.31, 3.36)  # theirs, to starboard
 
 
 @pytest.mark.parametrize("side", SIDES)
 def test_kvlcc2_turns_as_the_free_model(kvlcc2: dict[str, pd.DataFrame], side: str) -> None:
-    """To 8 %: the paper's own calculation is off by as much to port."""
+    """To 8 %: the paper's calculation is off by as much to port."""
     np.testing.assert_allclose(turn(kvlcc2[f"turn {side}"], 7.0), TURNS[side], rtol=0.08)
 
 

@@ -72,7 +72,7 @@ def test_elevation_has_the_standard_deviation_of_the_sea_and_does_not_repeat() -
 
 
 def test_draws_of_a_sample_depend_on_its_name_alone() -> None:
-    """Not on how many there are, nor on where it stands, nor on the direction."""
+    """Not on their number, nor on the row, nor on the direction."""
     few = draw_components(SEA, np.array([0.1, 0.2]), ["a", "b"])
     many = draw_components(SEA, np.array([0.3, 0.2, 2.0, 0.1]), ["c", "b", "d", "a"])
     for name in ("omega", "epsilon", "amplitude", "chi"):

@@ -237,7 +237,7 @@ def test_free_decay_is_that_of_the_linear_ship(name: str, axis: int) -> None:
 
 @BOTH
 def test_equations_at_rest_are_the_linear_ship_of_the_document(name: str) -> None:
-    """All six directions free, beam and bow waves: the rates' own linearisation against the document's matrices."""
+    """All six directions free, beam and bow waves: the linearised rates against the document's matrices."""
     omega, theory = np.linspace(0.4, 3.0, 14), linear(ship(name))
     for beta in (np.pi / 2, 2.4):
         response = linearised(ship(name)).response(omega, theory.excitation(omega, beta))

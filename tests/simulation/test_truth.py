@@ -71,7 +71,7 @@ def test_draws_fill_their_ranges() -> None:
         assert abs(values.mean() - (low + high) / 2) < 5 * width / np.sqrt(12 * count), name
     drawn = rows[list(ranges)].to_numpy()
     off_diagonal = np.corrcoef(drawn.T) - np.eye(len(ranges))
-    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity on its own
+    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity alone
 
 
 def test_orders_and_wind_hold_and_are_equal_on_both_sides() -> None:

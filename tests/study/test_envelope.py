@@ -44,7 +44,7 @@ def test_simulate_writes_a_dataset_and_shows_the_envelope(tmp_path: Path) -> Non
 
 
 def test_the_first_manoeuvres_stay_when_more_are_asked_for() -> None:
-    """Each manoeuvre, its sea included, depends on its own number alone."""
+    """Each manoeuvre, its sea included, depends on its number alone."""
     few, more = (
         obtain(read_plan("simulation-small", {"truth.manoeuvres": n, "split.test": 2, "grid.N_D": [4]}))
         for n in (8, 11)

@@ -44,7 +44,7 @@ def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) ->
 
 
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
-    """1 % below its own physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
+    """1 % below its physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
     assert verdicts(made(one(1.98, 1.9, 9.0), runs=RUNS))["R1"] == "undecided"
 
 

@@ -1,4 +1,4 @@
-"""Verdicts S1 to S7 on maps H(A, N_D) made by hand: what confirms, what refutes, what cannot be told."""
+"""Verdicts S1 to S7 on maps H(A, N_D) made by hand: what confirms, what refutes, what cannot be decided."""
 
 from __future__ import annotations
 

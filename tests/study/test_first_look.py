@@ -1,4 +1,4 @@
-"""A vessel against its log: a planted mistake is found, named and explained; a true vessel is left alone."""
+"""A vessel against its log: a planted mistake is detected, named and explained; a true vessel is left alone."""
 
 from __future__ import annotations
 

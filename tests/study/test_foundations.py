@@ -1,4 +1,4 @@
-"""Foundations identified from the runs of a batch: their own physics, seen nowhere but there."""
+"""Foundations identified from the runs of a batch, and from no other run."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_other_runs_teach_nothing(recorded: Recorded) -> None:
 def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    assert apart(dataset, prepared.test) is dataset  # every run has a clock of its own
+    assert apart(dataset, prepared.test) is dataset  # every run has a separate clock
     frame = dataset.frame.copy()
     frame["t"] += 30.0 * (frame["run"].str[0].map(ord) - ord("a"))  # the next begins before one ends
     test = replace(prepared.test, t=prepared.test.t + 150.0, shared_clock=True)

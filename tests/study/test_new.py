@@ -150,7 +150,7 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
 
 
 def test_what_the_log_corrects_is_a_family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The numbers that explain the log are set in a family of their own, said as a warning, and drafted as a patch."""
+    """The numbers that explain the log are set in a separate family, reported as a warning, and drafted as a patch."""
     path = "thruster.port.D_p"
 
     def differs(vessel: Vessel, *_: Any, ahead: float, **__: Any) -> Look:

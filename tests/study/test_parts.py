@@ -1,4 +1,4 @@
-"""A study of several parts: repetitions and conditions, each a run of its own, and a page over all."""
+"""A study of several parts: repetitions and conditions, each a separate run, and a page over all."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def test_a_method_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Data
 
 @pytest.mark.parametrize("kind", ["path-drawn", "path-trained"])
 def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
-    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out, and told."""
+    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out and reported."""
     t = np.arange(21.0)
     runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
     dataset = logged(runs, t, clock="shared")
@@ -152,7 +152,7 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
 
 
 def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
-    """The next counter draws anew, the others keep theirs, and it is told; the same again gives the same."""
+    """The next counter draws anew, the others keep theirs, and it is reported; the same again gives the same."""
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
     plan = tiny_plan(tmp_path, {"family": [family]})
@@ -267,7 +267,7 @@ def test_a_stretch_of_one_row_has_its_order_reached() -> None:
 def test_perturbed_lags_have_separate_hidden_states(
     tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]
 ) -> None:
-    """What a stored predictor predicts is what the study has seen: each variant models its own actuators."""
+    """What a stored predictor predicts is what the study has seen: each variant models its actuators."""
     ship, dataset = stepped(order=2.0, T=4.0, rate=1.0)
     (tmp_path / "lagged.toml").write_text(tomlkit.dumps(ship.document))
     family = {"name": "lagged", "base": "./lagged.toml", "members": 3}

@@ -1,4 +1,4 @@
-"""What is said of searches that go on, from journals that others write."""
+"""The state of searches that go on, from journals that others write."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Turns: each is the study with that run as its test, and what is said of them follows by hand."""
+"""Turns: each is the study with that run as its test, and their findings follow by hand."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_two_rotations_to_one_file_share_the_work(
 
 
 def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
-    """Another setting, other data or another device has a folder of its own; a damaged file is computed again."""
+    """Another setting, other data or another device has another folder; a damaged file is computed again."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})

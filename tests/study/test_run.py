@@ -90,7 +90,7 @@ def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> No
     wider = {row["cell"]: row for row in numbers(tmp_path / "run")}
     for row in numbers(tiny_run):
         twin = wider[row["cell"]]
-        assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round in their own way
+        assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round differently
         assert twin["A"] == pytest.approx(row["A"], nan_ok=True) if row["A"] is not None else twin["A"] is None
 
 

@@ -97,7 +97,7 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
 
 
 def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
-    """Each lag has its own hidden states at the start of a window: those of the orders before."""
+    """Each lag has separate hidden states at the start of a window: those of the orders before."""
     vessel = tmp_path / "lagged.toml"
     lag = "kind = 'first_order'\nT = 2.0\nrate = 0.2\n"
     vessel.write_text(
@@ -126,7 +126,7 @@ def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
 
 
 def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
-    """Two numbers drawn together count once; one that matters stands before one that does not."""
+    """Two numbers drawn together count once; one that matters is listed before one that does not."""
     rules = [
         {"parameters": ["thruster.*.D_p"], "factor": [0.5, 1.5], "together": True},
         {"parameters": ["hull.derivatives.X_rr"], "factor": [0.99, 1.01]},

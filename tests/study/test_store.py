@@ -1,4 +1,4 @@
-"""The folder of a run: whose it is, what it holds, and what is said where it is damaged."""
+"""The folder of a run: whose it is, what it holds, and the message where it is damaged."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def test_planar_equations_by_hand() -> None:
         total = 0.0
         for name, value in d.items():
             if name.startswith(f"{axis}_"):
-                pieces = name[2:].split("|")  # every second piece stands between bars
+                pieces = name[2:].split("|")  # every second piece is between bars
                 bare, modulus = "".join(pieces[::2]), "".join(pieces[1::2])
                 total += value * np.prod([motion[s] for s in bare]) * np.prod([abs(motion[s]) for s in modulus])
         return total
@@ -128,7 +128,7 @@ def test_switching_the_wind_off_takes_its_force_away() -> None:
     vessel = load_vessel("gunnerus-28.9")
     calm = rates(vessel, u=3.0, psi=0.2, V_w=0.0)
     off = rates(vessel.with_values({"wind.off": True}), u=3.0, psi=0.2)
-    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of her own speed
+    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of the ship's speed
     assert calm["u"] - off["u"] == pytest.approx(-headwind, rel=1e-9)
 
 

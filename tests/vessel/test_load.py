@@ -52,7 +52,7 @@ def test_units_follow_from_names() -> None:
 
 
 def test_a_number_of_the_block_goes_before_the_shared_one() -> None:
-    """33.9 m: T of the cross-flow stands in its block; rho comes from [constants]; both are parameters once."""
+    """33.9 m: T of the cross-flow is in its block; rho comes from [constants]; both are parameters once."""
     vessel = load_vessel("gunnerus-33.9")
     assert "hull.crossflow.T" in vessel.parameters
     assert "particulars.T" not in vessel.parameters

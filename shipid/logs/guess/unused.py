@@ -60,7 +60,7 @@ def _unit(meaning: str) -> str:
 
 
 def _wrong_unit(name: str, si: str) -> str | None:
-    """The unit that stands in brackets in a name, where it is a known one that does not convert to the SI unit."""
+    """The unit in brackets in a name, where it is known and does not convert to the SI unit."""
     if si not in UNITS or unit_in_name(name, si) is not None:
         return None
     inside = re.findall(r"[\[(]([^\])]*)[\])]", name)

@@ -1,4 +1,4 @@
-"""What was put into a log is named, and nothing else; every documented trap of the recorded sets is found."""
+"""What was put into a log is named, and nothing else; every documented trap of the recorded sets is detected."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -96,7 +96,7 @@ def offset(log: pd.DataFrame) -> pd.DataFrame:
 
 
 DEFECTS: dict[str, tuple[Change, str, str | None, tuple[object, ...] | None]] = {
-    # defect -> how it is put in, the kind that must be named, the column it changes, what is said of that
+    # defect -> how it is put in, the kind that must be named, the column it changes, what it then is
     "earth": (earth, "earth-fixed velocities", "u", ("u", "m/s", 1, "earth")),
     "rate": (
         lambda f: f.rename(columns={"r": "p"}).assign(r=np.sin(f["time"] / 3)),
@@ -186,7 +186,7 @@ def test_a_defect_is_named(name: str, tmp_path: Path) -> None:
 
 
 def test_gunnerus(gunnerus_log: Path) -> None:
-    """Every trap of the description that a log can betray: places as it gives them, sizes within its own scatter."""
+    """Every trap of the description that a log can betray: places as it gives them, sizes within the scatter."""
     proposal = guess(gunnerus_log)
     columns = described(proposal)
     assert columns["psi"] == ("psi", "deg", 1, "body")
@@ -234,7 +234,7 @@ RUNS = [
     "run", [*RUNS[::3], *(pytest.param(run, marks=pytest.mark.slow) for run in RUNS if run not in RUNS[::3])]
 )
 def test_hsva(run: str, data_folder: Path) -> None:
-    """The names of the publication are seen through, and the same columns found where there are no names at all."""
+    """The names of the publication are seen through, and the same columns result where there are no names at all."""
     log = data_folder / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat"
     if not log.is_file():
         pytest.skip(f"no {log.name} in the data folder")

@@ -84,7 +84,7 @@ def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
         ("shaft speed [%]", RPM / 2.5, "rpm", True, set()),
         ("shaft speed", RPM / 2.5, "rpm", True, set()),
     ],
-    ids=["rpm", "rev/s", "said", "wrongly said", "%", "% not said"],
+    ids=["rpm", "rev/s", "rpm in the name", "wrong unit in the name", "%", "% not in the name"],
 )
 def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bool, kinds: set[str]) -> None:
     state = chosen({"rudder": RUDDER, name: values})

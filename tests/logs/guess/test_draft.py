@@ -1,4 +1,4 @@
-"""A draft is a mapping that imports, says why, and finds the manoeuvres that were sailed."""
+"""A draft is a mapping that imports, says why, and lists the manoeuvres of the log."""
 
 from pathlib import Path
 
@@ -66,7 +66,7 @@ def test_segments_are_the_schedule(tmp_path: Path) -> None:
 
 
 def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) -> None:
-    """Each zigzag and turning circle of the trial's log is found within its span, and no other but the rescue's."""
+    """Each zigzag and turning circle of the trial's log is detected within its span, and no other but the rescue's."""
     mapping = read_mapping("gunnerus-2022")
     segments = segment_log(mapping, gunnerus_log)
     for word, kind in (("ZZ", "zigzag"), ("TC", "turning")):
