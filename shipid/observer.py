@@ -169,7 +169,7 @@ def _mass(vessel: Vessel) -> Array:
 
 @lru_cache(maxsize=16)
 def filter_function(model: Dynamics) -> ca.Function:
-    """One filter's step as a pure SX function; the motion goes on by the midpoint rule.
+    """One step of a filter as a pure SX function; the midpoint rule integrates the motion.
 
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
@@ -513,7 +513,7 @@ def observed_paths(
 
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
-    """Columns of windows with the estimates of the last row at or before each instant: `observer.*` (S,) added."""
+    """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant."""
     frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:

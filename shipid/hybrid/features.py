@@ -196,7 +196,7 @@ def steps_of(seconds: float, step: float) -> int:
 
 
 def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str, Array]:
-    """What the physics, started so long ago with the commands then given, gets wrong by now, (S,) each.
+    """Errors (S,) at the instants of a prediction by the physics from `seconds` before, with the commands given since.
 
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
     velocities [m/s, rad/s]. A prediction that diverged gives zeros.

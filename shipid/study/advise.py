@@ -94,7 +94,7 @@ class Case:
         return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
 
     def place(self, amount: int) -> int:
-        """Place of an amount in the table."""
+        """Index of an amount of data in the error table; ValueError if it is not there."""
         return self.table.amounts.index(amount)
 
     def H(self, model: str, amount: int) -> str:

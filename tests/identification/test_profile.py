@@ -1,4 +1,4 @@
-"""Profiles: the linear one is the interval of the standard error, others follow their formula, open ends are reported."""
+"""Profiles: the linear one is the interval of the standard error, others follow their formula, open ends are named."""
 
 from __future__ import annotations
 

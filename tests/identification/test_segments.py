@@ -80,7 +80,7 @@ def test_a_command_that_was_not_logged_is_reported() -> None:
 
 @pytest.mark.parametrize("name", ["roll", "six"])
 def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
-    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along the ship's axes."""
+    """u, v and r of a log are horizontal; the states of a ship with 4 or 6 degrees of freedom are along its axes."""
     vessel = variety()[name]
     data = trials(vessel, runs=2, steps=40)
     assert np.abs(data.frame["phi"]).max() > 0.02

@@ -258,7 +258,7 @@ def test_mapping_is_frozen_and_digested(plain_mapping: Write) -> None:
 def test_wind_felt_on_board_becomes_the_wind_over_ground(
     seed: int, direction: str, plain_mapping: Write, tmp_path: Path
 ) -> None:
-    """A ship that turns and drifts in one wind feels the wind less the ship's velocity, from another side each second."""
+    """A ship that turns and drifts feels the true wind less the ship's velocity, from another side each second."""
     rng = np.random.default_rng(seed)
     motion = turning(T, u=rng.uniform(2, 6), v=rng.uniform(-2, 2), psi0=rng.uniform(0, 6))
     speed, towards = rng.uniform(1, 12), rng.uniform(0, 2 * np.pi)

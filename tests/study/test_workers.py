@@ -1,4 +1,4 @@
-"""Workers: every task once, whoever does it; errors and deaths are reported; no process outlives its iterator or parent."""
+"""Workers: every task once, whoever does it; errors and deaths are reported; no process outlives its iterator."""
 
 from __future__ import annotations
 
