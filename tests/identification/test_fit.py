@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.fit import Point, evaluate, loss, origin, search
+from shipid.identification import fit
+from shipid.identification.fit import Point, _Value, evaluate, loss, origin, search
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import Identify
 from shipid.simulation.manoeuvre import Zigzag
@@ -90,6 +92,24 @@ def test_it_ends_where_whoever_looks_on_asks() -> None:
     assert (end.status, end.iterations) == ("stopped", 4)
     none = search(task, begin, origin(task), progress=lambda *_: True)
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
+
+
+@pytest.mark.parametrize("slope", [1.0, 10.0, 100.0])
+def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """(1 + slope |y - x|)^2 + (x - 3)^2 / 9 is least at (3, 3); from (0, 0) every step of one side's slope goes up."""
+
+    def kinked(_: object, at: np.ndarray, __: object) -> _Value:
+        side = 1.0 if at[1] >= at[0] else -1.0
+        f = np.array([1 + slope * side * (at[1] - at[0]), (at[0] - 3) / 3])
+        J = np.array([[-slope * side, slope * side], [1 / 3, 0.0]])
+        return _Value(at, SimpleNamespace(nuisances=None, away=None), f, J)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fit, "evaluate", kinked)
+    unknown = SimpleNamespace(low=np.full(2, -10.0), high=np.full(2, 10.0))
+    end = search(SimpleNamespace(unknown=unknown), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
+    assert end.status == "ok"
+    assert end.objective < 1.05
+    np.testing.assert_allclose(end.factors, 3, atol=0.7)
 
 
 @pytest.mark.slow
