@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import cos, pi
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -329,6 +330,8 @@ def _train(
 ) -> tuple[dict[str, Array], int]:
     import torch
 
+    from shipid.hybrid.training import Adam
+
     def tensor(values: Array) -> torch.Tensor:
         return torch.as_tensor(values, dtype=torch.float32)
 
@@ -345,9 +348,11 @@ def _train(
         "c_2": (data[0][2].shape[1],),
     }
     bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
-    layers = {
-        name: ((torch.rand(shape, generator=generator) * 2 - 1) * bounds[name]).requires_grad_()
-        for name, shape in shapes.items()
+    draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
+    weights = torch.cat([draw.flatten() for draw in draws])[None]
+    pieces = weights[0].split([draw.numel() for draw in draws])
+    layers = {  # leaves in the memory of the flat weights
+        name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
     }
     parts = [
         ([(tensor(s.past), tensor(s.now)) for s in (seen, image) if s is not None], tensor(outputs))
@@ -368,18 +373,17 @@ def _train(
         both: torch.Tensor = (plain + sign * image) / 2
         return both
 
-    optimiser = torch.optim.AdamW(layers.values(), lr=learning_rate, weight_decay=method.weight_decay)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, method.epochs)
+    adam = Adam(weights, [method.weight_decay])
     seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
     for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is reported
+        rate = torch.tensor([[learning_rate * (1 + cos(pi * (epoch - 1) / method.epochs)) / 2]])
         order = torch.randperm(len(outputs), generator=generator)
         for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
-            optimiser.zero_grad()
             loss = (forward([(past[:, rows], now[rows]) for past, now in seen]) - outputs[rows]).square().mean()
-            loss.backward()  # type: ignore[no-untyped-call]
-            optimiser.step()
-        schedule.step()
+            gradients = torch.autograd.grad(loss, list(layers.values()))
+            with torch.no_grad():
+                adam.step(torch.cat([gradient.flatten() for gradient in gradients])[None], rate)
         with torch.no_grad():
             value = float((forward(parts[1][0]) - parts[1][1]).square().mean())
         since += 1
