@@ -376,7 +376,7 @@ def _train(
     adam = Adam(weights, [method.weight_decay])
     seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
-    for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is reported
+    for epoch in range(1, method.epochs + 1):
         rate = torch.tensor([[learning_rate * (1 + cos(pi * (epoch - 1) / method.epochs)) / 2]])
         order = torch.randperm(len(outputs), generator=generator)
         for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):

@@ -17,7 +17,7 @@ from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
 from tests.cli.running import output_of
-from tests.study.tiny import without_workers
+from tests.study.tiny import without_figures, without_workers
 
 
 def test_studies_and_variants(study: Path) -> None:
@@ -86,10 +86,11 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     assert "Does the whole chain hold together?" in (folder / "summary.md").read_text()
 
     (folder / "report.html").unlink()
-    assert output_of("study", "report", folder).strip() == str(folder / "report.html")
+    with without_figures():
+        assert output_of("study", "report", folder).strip() == str(folder / "report.html")
     assert (folder / "report.html").is_file()
     next((folder / "batches").iterdir()).unlink()
-    with without_workers():
+    with without_workers(), without_figures():
         text = output_of("study", "resume", folder, "--workers", "1")
     assert "missing: computed again" in text
     assert "4 of 8 cells to do" in text
@@ -109,7 +110,8 @@ def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run:
     shutil.copytree(tiny_run, folder)
     (folder / "batches" / "N0004-s0.json").unlink()
     (folder / "seals" / "N0004-s0.sha256").unlink()
-    output_of("study", "report", folder)
+    with without_figures():
+        output_of("study", "report", folder)
     assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
     assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
 
