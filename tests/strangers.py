@@ -7,7 +7,7 @@ Inoue et al. (1981), each times a separate factor; the template has Clarke's and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,20 +58,34 @@ class Stranger:
 
 def stranger(seed: int, runs: int = 24) -> Stranger:
     """Draw a ship and its log."""
-    random = np.random.default_rng([seed, 20])
-    drive = DRIVES[seed % len(DRIVES)]
-    for _ in range(TRIES):
-        drawn = _ship(random, drive)
+    random, drive = np.random.default_rng([seed, 20]), DRIVES[seed % len(DRIVES)]
+    for drawn, vessel, n in _candidates(random, drive, f"stranger-{seed}.toml"):
         try:
-            vessel = check_vessel(drawn["document"], f"stranger-{seed}.toml")
-            n = shaft_speed(Controls.of(vessel), drawn["U"])
-            if not _sails(vessel, n, drawn):
-                continue
             dataset = _log(random, vessel, n, drawn, runs)
         except ShipidError:
             continue
         return Stranger(seed, drive, drawn["words"], vessel, dataset, _known(random, drawn, n))
     raise AssertionError(f"no ship of seed {seed} goes straight and turns")
+
+
+def strange_vessel(seed: int) -> tuple[Vessel, float, float]:
+    """Draw a ship without a log: the vessel, its service speed U [m/s], and the shaft speed [rev/s] of that speed."""
+    random, drive = np.random.default_rng([seed, 21]), DRIVES[seed % len(DRIVES)]
+    drawn, vessel, n = next(_candidates(random, drive, f"stranger-{seed}.toml"))
+    return vessel, drawn["U"], n
+
+
+def _candidates(random: np.random.Generator, drive: str, name: str) -> Iterator[tuple[dict[str, Any], Vessel, float]]:
+    """Ships that go straight and turn: how each was drawn, the vessel, and its shaft speed [rev/s] at U."""
+    for _ in range(TRIES):
+        drawn = _ship(random, drive)
+        try:
+            vessel = check_vessel(drawn["document"], name)
+            n = shaft_speed(Controls.of(vessel), drawn["U"])
+            if _sails(vessel, n, drawn):
+                yield drawn, vessel, n
+        except ShipidError:
+            continue
 
 
 def _ship(random: np.random.Generator, drive: str) -> dict[str, Any]:

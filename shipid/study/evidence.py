@@ -151,6 +151,13 @@ def over_worlds(values: Array) -> tuple[float, float]:
     return float(values.mean()) - wide, float(values.mean()) + wide
 
 
+def doubling(x: Array) -> Array:
+    """Weights (J,) that turn values at x, a logarithm, into their slope by least squares, for a doubling."""
+    centred = x - x.mean()
+    weights: Array = np.log(2) * centred / np.square(centred).sum()
+    return weights
+
+
 def holm(chances: Array) -> Array:
     """Return p-values (J,) corrected for their number (Holm 1979): one of them at most `LEVEL` is a finding."""
     order = np.argsort(chances)

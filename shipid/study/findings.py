@@ -1,4 +1,4 @@
-"""Verdicts on the findings of the method, each with its numbers: R1-R4 here, S1-S7 beside.
+"""Verdicts on the findings of the method, each with its numbers: R1-R4 here, S1-S7 and B1-B2 (bands) beside.
 
 R1-R4 (method, section 5) are taken at the largest amount of data, from paired differences over test manoeuvres, as
 S1-S7 are: "shown" means a 95 % interval free of 0.
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from shipid.metrics import position_error
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import contrasts
+from shipid.study.findings_bands import band_findings
 from shipid.study.findings_simulation import simulation_findings
 from shipid.study.plan import NO_MODEL, Claims
 from shipid.study.results import Results, judged_cells
@@ -62,12 +63,15 @@ class Rivals:
 
 
 def findings(results: Results) -> list[Finding]:
-    """Verdicts on what the study claims: R1-R4 (method, section 5), S1-S7 (section 4), both or none."""
+    """Verdicts on what the study claims: R1-R4 (method, section 5), S1-S7 (section 4), both or none; then B1-B2."""
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
     verdicts = _full_scale(results, claims) if claims.accurate is not None else []
-    return [*verdicts, *(simulation_findings(results) if claims.moderate is not None else [])]
+    verdicts += simulation_findings(results) if claims.moderate is not None else []
+    roles = (claims.accurate, claims.inaccurate) if claims.moderate is None else (claims.moderate, claims.high)
+    physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
+    return [*verdicts, *band_findings(results, physics)] if verdicts else []
 
 
 def _full_scale(results: Results, claims: Claims) -> list[Finding]:

@@ -36,7 +36,7 @@ from scipy.special import stdtr
 from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
-from shipid.study.evidence import LEVEL, Contrasts, at_least, by_chance, contrasts
+from shipid.study.evidence import LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
@@ -118,7 +118,7 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
     claims, cells = results.plan.study.claims, judged_cells(results)
     assert claims is not None
     if not results.complete:
-        return f"{results.plan.cells - len(results.cells)} of {results.plan.cells} cells are not finished"
+        return results.missing
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
         return "pure data-driven has no result in every cell"
@@ -183,15 +183,8 @@ def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
     return [one.above for one in differences], [one.below for one in differences]
 
 
-def _slope(x: Array) -> Array:
-    """Weights of the slope by least squares over x, for a doubling of what x is the logarithm of."""
-    centred = x - x.mean()
-    weights: Array = np.log(2) * centred / np.square(centred).sum()
-    return weights
-
-
 def _S2(grid: Grid) -> Finding:
-    weights = -_slope(np.log(np.array(grid.amounts, dtype=float)))
+    weights = -doubling(np.log(np.array(grid.amounts, dtype=float)))
     models = [*grid.physics, NO_MODEL]
     places = range(len(grid.amounts))
     falls = grid.table.compare([[(float(weights[k]), model, k) for k in places] for model in models])
@@ -219,7 +212,7 @@ def _S3(grid: Grid) -> Finding:
     if len(models) < FEWEST_MODELS:
         return _finding("S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
-    weights = _slope(np.log(A))
+    weights = doubling(np.log(A))
     each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
     last = len(grid.amounts) - 1
     flatter = [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]

@@ -70,6 +70,11 @@ class Results:
         """Whether every cell of the plan is there."""
         return len(self.cells) == self.plan.cells
 
+    @property
+    def missing(self) -> str:
+        """How many cells are not finished, in words."""
+        return f"{self.plan.cells - len(self.cells)} of {self.plan.cells} cells are not finished"
+
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset` of the metrics [m, 1, s] over foundation, method, N_D and seed; needs xarray.
 

@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, cut_windows, run_folds
+from shipid.data.windows import Windows, run_folds
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.bands import Bands, Region, needed, track
 from shipid.hybrid.calibration import calibrated
@@ -32,75 +31,18 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.predictor import limits_of
-from shipid.simulation.truth import Truth, draw_manoeuvres, simulate
 from shipid.study.bands import share_interval
 from shipid.study.plan import Batch, read_plan
 from shipid.study.prepare import instants_of, obtain, partition, prepare
 from shipid.study.run import run_batch
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks import coverage
+from tests.benchmarks.worlds import World, world
 
 Array = np.ndarray
 SHARES = (0.5, 0.8, 0.9, 0.95)
 METHODS: dict[str, Method] = {"alone": Alone(), "drawn": PathDrawn(trials=8, units=48, averaged=4)}
 VESSEL = "gunnerus-28.9"
-KINDS = {
-    "turning": {"n_rpm": [50.0, 200.0], "alpha_deg": [-50.0, 50.0], "start_speed": [0.0, 2.5]},
-    "steps": {"n_rpm": [50.0, 200.0], "alpha_deg": [-40.0, 40.0], "hold": [8.0, 25.0]},
-    "zigzag": {
-        "n_rpm": [80.0, 160.0],
-        "angle_deg": [8.0, 30.0],
-        "side": ["starboard", "port"],
-        "execute_at": [1.0, 8.0],
-    },
-}
-
-
-@dataclass(frozen=True)
-class World:
-    """Windows of runs that may train, and of runs that no model sees; kind of manoeuvre by run; a wrong vessel."""
-
-    pool: Windows
-    fresh: Windows
-    kinds: dict[str, str]
-    physics: Physics
-    mixed: str
-
-
-def world(seed: int, fresh: int = 200, pool: int = 50) -> World:
-    """Draw a world: manoeuvres of one to three kinds, weather, horizon, and a model that is wrong by drawn factors."""
-    draw = np.random.default_rng([seed, 16])
-    names = sorted(draw.choice(sorted(KINDS), size=draw.integers(1, 4), replace=False))
-    horizon, interval = int(draw.integers(8, 21)), float(draw.integers(2, 6))
-    blocks = [{"kind": str(name), "share": float(draw.uniform(0.5, 2.0)), **KINDS[str(name)]} for name in names]
-    truth = Truth(
-        vessel=VESSEL,
-        manoeuvres=pool + fresh,
-        duration=horizon + float(draw.integers(20, 41)),
-        step=0.2,
-        seed=seed,
-        wind_speed=(0.0, float(draw.choice([0.0, 6.0, 12.0]))),
-        manoeuvre=blocks,
-    )
-    vessel = load_vessel(VESSEL)
-    frame = simulate(truth, vessel)
-    noise = float(draw.choice([0.0, 0.02, 0.05]))
-    for name, size in (("u", noise), ("v", noise), ("r", 0.1 * noise)):
-        frame[name] += size * draw.standard_normal(len(frame))
-    windows = cut_windows(Dataset(frame, {"clock": "run", "flags": []}), horizon=horizon, step=1.0, interval=interval)
-    runs = list(dict.fromkeys(map(str, frame["run"])))
-    kinds = {run: type(one).__name__ for run, one in zip(runs, draw_manoeuvres(truth), strict=True)}
-    train = np.isin(windows.run, runs[:pool])
-    physics = Physics(_wrong(vessel, draw), horizon, 1.0)
-    return World(windows.select(train), windows.select(~train), kinds, physics, "+".join(names))
-
-
-def _wrong(vessel: Vessel, draw: np.random.Generator) -> Vessel:
-    """The vessel with drawn factors on its numbers: nearly right to badly wrong."""
-    width = float(draw.choice([0.1, 0.4, 0.7]))
-    paths = [path for path in vessel.parameters if path.startswith("hull.derivatives.")]
-    paths += ["added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot"] * bool(draw.integers(2))
-    return vessel.with_values({p: vessel.parameters[p] * draw.uniform(1 - width, 1 + width) for p in sorted(paths)})
 
 
 @dataclass(frozen=True)
@@ -163,7 +105,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
     for level in SHARES:
         if not one.bands.promises(level):
             continue
-        region = one.bands.region(one.paths, fresh.columns, 1.0, level)
+        region = one.bands.region(one.paths, fresh.columns, fresh.step, level)
         reach = region.reach(errors).max(axis=0)
         row = {**keys, "runs": runs, "level": level, "width": float(region.radius.mean())}
         held = (reach <= 1).astype(float)
@@ -172,7 +114,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
             mine = kinds == kind
             row |= {f"{kind}": by_run(fresh.run[mine], held[mine]), f"{kind} runs": calibrated_kinds.count(kind)}
             if one.bands.promises(level, str(kind)):
-                known = one.bands.region(one.paths, fresh.columns, 1.0, level, kind=str(kind))
+                known = one.bands.region(one.paths, fresh.columns, fresh.step, level, kind=str(kind))
                 row[f"{kind} named"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
         yield row
 
@@ -196,8 +138,8 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
         return circle(scale * scores[place])
 
     regions = {
-        "band": one.bands.region(one.paths, columns, 1.0, level),
-        "each step alone": one.bands.region(one.paths, columns, 1.0, level, pointwise=True),
+        "band": one.bands.region(one.paths, columns, fresh.step, level),
+        "each step alone": one.bands.region(one.paths, columns, fresh.step, level, pointwise=True),
         "Bonferroni over steps": circle(np.quantile(off, 1 - (1 - level) / horizon, axis=1)[:, None]),
         "windows pooled": pooled(off),
         "windows pooled, training errors": pooled(inside),
@@ -215,16 +157,16 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
 def _proven(one: Cell, windows: Windows, level: float, columns: Any) -> Region:
     """The band with the quantile of Lee, Barber and Willett, which has a proof for any distribution."""
     paths = windows.future - one.left_out
-    reach = one.bands.region(paths, windows.columns, 1.0, 0.5).reach(one.left_out).max(axis=0)
+    reach = one.bands.region(paths, windows.columns, windows.step, 0.5).reach(one.left_out).max(axis=0)
     _, place, count = np.unique(windows.run, return_inverse=True, return_counts=True)
     order = np.argsort(reach)
     weights = np.cumsum((1 / (count[place] * (len(count) + 1)))[order])
     index = min(int(np.searchsorted(weights, level - 1e-12)), len(reach) - 1)
-    return one.bands.region(one.paths, columns, 1.0, 0.5).scaled(float(reach[order][index]))
+    return one.bands.region(one.paths, columns, windows.step, 0.5).scaled(float(reach[order][index]))
 
 
 def worlds(
-    count: int, *, amounts: Sequence[int] = (22,), every: int = 4, fresh: int = 200, first: int = 0, show: bool = False
+    count: int, *, amounts: Sequence[int] = (22,), every: int = 4, fresh: int = 1000, first: int = 0, show: bool = False
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Promises and rivals over seeded worlds; in every fourth world also with 5, 10 and 50 runs."""
     kept: list[dict[str, Any]] = []
@@ -238,8 +180,14 @@ def worlds(
                 if label == "drawn" and seed % 3 == 2:
                     physics, label = Physics(None, physics.horizon, physics.step), "drawn, no physics"
                 one = cell(made, runs[:size], method, physics, seed)
-                keys = {"world": seed, "mixed": made.mixed, "method": label, "horizon": made.pool.horizon}
-                if one is None:
+                keys = {
+                    "world": seed,
+                    "ship": made.ship,
+                    "mixed": made.mixed,
+                    "method": label,
+                    "horizon": made.pool.horizon,
+                }
+                if one is None:  # the wrong physics diverges
                     continue
                 kept += promised(made, one, size, keys)
                 if size == 22:
@@ -258,13 +206,14 @@ def mean_interval(values: pd.Series[float]) -> str:
 
 def figures(kept: pd.DataFrame, beside: pd.DataFrame) -> dict[str, Any]:
     """Tables of the docs as label -> text; the mean over the methods of a world counts once."""
-    summary: dict[str, Any] = {}
+    summary: dict[str, Any] = {"worlds": kept["world"].nunique()}
     for (runs, level), part in kept.groupby(["runs", "level"]):
         per = part.groupby("world")[["coverage", "ratio"]].mean()
         summary[f"{runs} runs, {level:.0%}: coverage"] = mean_interval(per["coverage"])
         summary[f"{runs} runs, {level:.0%}: width / ideal"] = mean_interval(per["ratio"])
-    for (method, level), part in kept[kept.runs == 22].groupby(["method", "level"]):
-        summary[f"22 runs, {method}, {level:.0%}: coverage"] = mean_interval(part["coverage"])
+    for key in ("method", "ship"):
+        for (one, level), part in kept[kept.runs == 22].groupby([key, "level"]):
+            summary[f"22 runs, {one}, {level:.0%}: coverage"] = mean_interval(part.groupby("world")["coverage"].mean())
     for kind in ("Turning", "Steps", "Zigzag"):
         for level, part in kept[kept.runs == 22].groupby("level"):
             if kind in part:

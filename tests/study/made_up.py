@@ -14,6 +14,7 @@ import numpy as np
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals
 from shipid.study.findings import judged as judged_rivals
+from shipid.study.findings_bands import Widths, narrower
 from shipid.study.findings_simulation import RULES, Grid, rough
 from shipid.study.findings_simulation import judged as judged_grid
 from shipid.study.plan import NO_MODEL
@@ -85,10 +86,10 @@ def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> tup
         H[model] = none * (1 - effect * (1 - level[k])) if case in ("S1", "S6") else none * level[k]
     for k, model in enumerate(high):
         H[model] = none * (0.6, 1.6)[k % 2] ** (effect if case == "S4" else 1.0)
-    if case == "S3":  # H without order in A, or along it, steeper where data are few
+    if case in ("S3", "B1"):  # H without order in A, or along it, steeper where data are few
         order = rng.permutation(len(names))
         for k, model in enumerate(names):
-            steep = 0.8 * share**-0.4
+            steep = 0.8 * share**-0.4 if case == "S3" else 0.4
             along = (1 - effect) * 0.05 * order[k] + effect * steep * np.log(A[model] / 8.0)
             H[model] = none * np.exp(along - 0.2)
     trained = {m: TRAINED * (1 + 4 * effect * (k % 2)) for k, m in enumerate(high)} if case == "S4" else None
@@ -140,6 +141,10 @@ SIMULATION, FULL_SCALE = ("S1", "S2", "S3", "S4", "S5", "S6"), ("R1", "R2", "R3"
 def rule(case: str) -> Callable[[np.random.Generator, Size, float], Verdict]:
     """Return the verdict that today's rule gives on a table drawn for a claim."""
 
+    def wide(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
+        grid = grids(rng, size, case, effect)[0]
+        return narrower(Widths(grid.table, grid.physics))["verdict"]
+
     def simulated(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
         both = grids(rng, size, case, effect)
         if case in RULES:
@@ -152,10 +157,12 @@ def rule(case: str) -> Callable[[np.random.Generator, Size, float], Verdict]:
     def smooth(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
         return rough(*roughness(rng, size, effect))[0]
 
+    if case == "B1":
+        return wide
     return smooth if case == "S7" else at_full_scale if case in FULL_SCALE else simulated
 
 
-CASES = (*SIMULATION, "S7", *FULL_SCALE)
+CASES = (*SIMULATION, "S7", *FULL_SCALE, "B1")
 
 
 def rates(case: str, size: Size, effect: float, tables: int, seed: int = 0) -> dict[str, float]:

@@ -18,6 +18,7 @@ from shipid.predictor import NO_BAND, NO_REFITS, Predictor
 from shipid.study import bands, store
 from shipid.study.apply import Band, along_run
 from shipid.study.compare import compare_bands
+from shipid.study.findings import findings
 from shipid.study.plan import read_plan
 from shipid.study.results import Results, border, read_results
 from tests.study.tiny import run_here, tiny_plan
@@ -28,7 +29,12 @@ LEVEL = 0.8  # the tiny study has 6 runs at most
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("bands")
-    run_here(tiny_plan(made, {"bands.level": LEVEL}), made / "run")
+    run_here(
+        tiny_plan(
+            made, {"bands.level": LEVEL, "family.1.members": 1, "claims": {"accurate": "right", "inaccurate": "wrong"}}
+        ),
+        made / "run",
+    )
     return made / "run"
 
 
@@ -92,6 +98,16 @@ def test_frames_agree_with_the_cells(results: Results) -> None:
     assert (groups["low"] <= groups["coverage"] + 1e-9).all()
     assert set(worst["run"]) == set(results.test.spans)
     assert bands.answer(results)[0][0].startswith("Bands of 80% held ")
+
+
+def test_findings_say_what_the_cells_hold(results: Results) -> None:
+    verdicts = {one["id"]: one for one in findings(results)}
+    top = results.cells[results.cells["N_D"] == results.cells["N_D"].max()].groupby("foundation")[["coverage", "width"]]
+    means = top.mean()
+    ratio = means.loc["wrong", "width"] / means.loc["right", "width"]
+    assert verdicts["B1"]["numbers"]["ratio of widths"] == pytest.approx(ratio)
+    assert verdicts["B2"]["numbers"]["share at 80%"] == pytest.approx(means["coverage"].mean())
+    assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
 
 
 def test_too_few_runs_are_reported(tiny_run: Path) -> None:

@@ -48,7 +48,7 @@ def judged(made: Any) -> Any:
     def judge(rows: Rows = H, *, seeds: int = 1, wobble: Mapping[str, float] | None = None, **options: Any) -> Any:
         made_up = cells(rows, seeds=seeds, wobble=wobble) if "none" in rows else rows
         options = {"family": FAMILY, "alone": ALONE, "claims": ROLES, "runs": 8, **options}
-        claims = findings(made(made_up, **options))
+        claims = [one for one in findings(made(made_up, **options)) if one["id"].startswith("S")]
         assert [finding["id"] for finding in claims] == list(CLAIMS)
         assert all("nan" not in finding["evidence"].split() for finding in claims)
         return {finding["id"]: finding for finding in claims}

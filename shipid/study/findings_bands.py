@@ -1,0 +1,142 @@
+"""Findings B1 and B2: what better physics is worth in the width of a band, and whether bands keep their promise.
+
+The width is the mean radius [m] of the band of the study's level over the horizon, a mean over windows of each test
+manoeuvre; it is judged as errors are (`shipid.study.evidence`).
+
+B1 : at every N_D that has bands the width rises along ln A over the physics models, and it would hardly do so if the
+    models had their A in any other order. At full scale, with one accurate and one inaccurate model: the band of the
+    inaccurate model is wider at the largest N_D.
+B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models.
+    Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.metrics import rank_correlation
+from shipid.study.bands import regions, share_interval
+from shipid.study.error_table import ALONE, ErrorTable, error_table
+from shipid.study.evidence import by_chance, doubling
+from shipid.study.plan import NO_MODEL
+from shipid.study.results import Results, judged_cells
+from shipid.study.verdict import (
+    Finding,
+    Verdict,
+    every,
+    manoeuvres,
+    measured,
+    metres,
+    some,
+    too_few,
+    undecided,
+    verdict,
+)
+
+Array = NDArray[np.float64]
+CLAIMS = {
+    "B1": "more accurate physics gives a narrower band",
+    "B2": "bands hold the share of whole paths that they promise",
+}
+FEWEST_MODELS = 5  # B1 over many models: an order of fewer comes by chance too often
+SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
+
+
+@dataclass(frozen=True)
+class Widths:
+    """What B1 compares: widths in place of H, at the amounts of data at which every model has a band.
+
+    physics : models with physics, the accurate one first where there are two.
+    """
+
+    table: ErrorTable
+    physics: tuple[str, ...]
+
+
+def band_findings(results: Results, physics: Sequence[str]) -> list[Finding]:
+    """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band."""
+    if not results.complete:
+        return undecided(CLAIMS, results.missing)
+    level, run = results.plan.study.bands.level, results.test.run
+    bands = {
+        str(row["cell"]): (region.radius.mean(axis=0), region.holds(e)) for row, region, e in regions(results, level)
+    }
+    table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
+    sound = tuple(name for name in physics if name in table.H and name in table.A)
+    if not table.amounts or len(sound) < 2:
+        return undecided(CLAIMS, f"no two models with physics have a band of {level:.0%}")
+    cells = judged_cells(results)
+    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
+    held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
+    shares = [float(np.mean(held[name])) for name in sound]
+    first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound))
+    first["evidence"] += f"; these bands hold {min(shares):.0%} to {max(shares):.0%} of whole paths"
+    second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
+    note = too_few(table.runs)
+    few = f"; {note}" if note else ""
+    return [Finding(**{**one, "evidence": one["evidence"] + few}) for one in (first, second)]
+
+
+def narrower(widths: Widths) -> Finding:
+    """Verdict on B1, without the shares that the bands hold."""
+    table, models = widths.table, widths.physics
+    last = len(table.amounts) - 1
+    if len(models) == 2:
+        good, bad = models
+        wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
+        evidence = (
+            f"at N_D = {table.amounts[last]} the mean radius of the band is {metres(table.mean(bad, last))} for {bad}, "
+            f"{metres(table.mean(good, last))} for {good}: {measured(wider, 0)} more"
+        )
+        ratio = table.mean(bad, last) / table.mean(good, last)
+        return _finding("B1", verdict(every(wider.above), some(wider.below)), evidence, **{"ratio of widths": ratio})
+    if len(models) < FEWEST_MODELS:
+        return _finding("B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
+    A = np.array([table.mean(model, ALONE) for model in models])
+    weights, places = doubling(np.log(A)), range(len(table.amounts))
+    slopes = table.compare([[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in places])
+    order = np.array([[table.mean(model, k) for model in models] for k in places])
+    rises = [rank_correlation(A, values) for values in order]
+    shown = (np.maximum(side, by_chance(A, sign * order)) for side, sign in ((slopes.above, 1), (slopes.below, -1)))
+    risen, fallen = shown
+    ends = [f"{measured(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
+    evidence = (
+        f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
+        f"{min(rises):.2f} to {max(rises):.2f} over N_D ({len(A)} models)"
+    )
+    numbers = {"least rank correlation of width and A": min(rises)}
+    numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}
+    return _finding("B1", verdict(every(risen), some(fallen)), evidence, **numbers)
+
+
+def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
+    """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
+    low, high = share_interval(held, run)
+    share, count = float(held.mean()), len(np.unique(run))
+    evidence = f"bands of {level:.0%} hold {share:.0%} [{low:.0%}, {high:.0%}] of whole paths ({manoeuvres(count)})"
+    decided = verdict(low >= level - SHORT, high < level)
+    return _finding("B2", decided if not too_few(count) else "undecided", evidence, **{f"share at {level:.0%}": share})
+
+
+def _finding(key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:
+    return Finding(id=key, claim=CLAIMS[key], verdict=decided, evidence=evidence, numbers=numbers)
+
+
+def _width_table(results: Results, physics: Sequence[str], widths: Mapping[str, Array]) -> ErrorTable:
+    """Widths of cells (S,) [m] in place of H, by test manoeuvre, at the amounts at which every judged cell has one."""
+    cells, errors = judged_cells(results), error_table(results, physics)
+    mine = cells[cells["foundation"].isin(errors.H)]
+    without = set(mine["N_D"][~mine["cell"].isin(widths)])
+    amounts = tuple(N for N in errors.amounts if N not in without)
+    run = results.test.run
+    known = {
+        (row.foundation, row.N_D, row.seed): [widths[str(row.cell)][run == one].mean() for one in np.unique(run)]
+        for row in mine[~mine["N_D"].isin(without)].itertuples()
+    }
+    seeds, names = sorted(set(cells["seed"])), sorted(set(mine["foundation"]))
+    H = {name: np.array([[known[name, N, seed] for seed in seeds] for N in amounts]) for name in names}
+    return replace(errors, amounts=amounts, H=H)

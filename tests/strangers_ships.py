@@ -1,0 +1,376 @@
+"""Ships of strangers and their tests: by ship type, with hulls, rudders and gear that a template does not have.
+
+Beside the types' ranges: hulls of MMG, cross-flow and Abkowitz kind, four rudder laws, gear with stops, a current that
+changes with the tide, gusts, and a programme of tests with what instruments could see of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+import pymap3d
+from numpy.typing import NDArray
+
+from shipid.simulation.gusts import Gusts, series
+from shipid.simulation.manoeuvre import (
+    CrashStop,
+    Excitation,
+    Manoeuvre,
+    PullOut,
+    Steps,
+    Timed,
+    TurningCircle,
+    Zigzag,
+)
+from shipid.simulation.perform import perform
+from shipid.units import RPM
+from shipid.vessel.load import Vessel
+from tests.strangers import TURN, _hull, _plain, _thrusters, _wetted, _wind
+
+Array = NDArray[np.float64]
+Random = np.random.Generator
+
+TYPES: dict[str, tuple[tuple[float, float], ...]] = {  # L [m], C_b, L/B, B/T, Froude number
+    "tanker": ((100, 320), (0.77, 0.85), (5.2, 6.4), (2.3, 3.1), (0.12, 0.165)),
+    "bulk": ((90, 290), (0.76, 0.86), (5.5, 6.8), (2.2, 3.0), (0.13, 0.175)),
+    "container": ((110, 320), (0.55, 0.70), (6.0, 7.6), (2.4, 3.4), (0.19, 0.25)),
+    "coaster": ((60, 130), (0.66, 0.80), (5.0, 6.6), (2.2, 3.1), (0.15, 0.22)),
+    "ferry": ((60, 200), (0.52, 0.64), (4.6, 6.8), (3.0, 4.8), (0.21, 0.28)),
+    "offshore": ((45, 100), (0.58, 0.72), (3.8, 4.9), (2.5, 3.6), (0.18, 0.26)),
+    "research": ((30, 110), (0.48, 0.64), (3.7, 5.6), (2.5, 3.7), (0.17, 0.25)),
+    "fishing": ((30, 70), (0.52, 0.64), (3.6, 4.6), (2.2, 2.9), (0.18, 0.27)),
+}
+OPTION = {"bulk": "cargo", "coaster": "cargo"}  # word of `--ship-type`, where it is another
+MERCHANT = ("tanker", "bulk", "container", "coaster", "fishing")
+DRIVES = ("screw", "screw and tunnel", "twin screw", "azimuth")
+RACE = ("race", "polynomial", "coefficients")
+
+
+class SpeedChange(Timed):
+    """The shaft goes from `n_rpm` to `to_rpm`, the helm amidships: acceleration, slowing down, coasting."""
+
+    to_rpm: float
+
+    def shaft(self, t: Array) -> Array:
+        return np.where(t >= self.execute_at - 1e-9, self.to_rpm, self.n_rpm) * RPM
+
+
+@dataclass(frozen=True)
+class Run:
+    """One test of the programme. speed : share of the service shaft speed."""
+
+    kind: str
+    angle: int = 0
+    other: int = 0
+    side: str = "starboard"
+    speed: float = 1.0
+
+
+def draw_ship(random: Random) -> dict[str, Any]:
+    """Sizes, speed and document of a ship or a model, by ship type."""
+    kind = str(random.choice(list(TYPES)))
+    length, block, slender, flat, froude = (float(random.uniform(*limits)) for limits in TYPES[kind])
+    model = bool(random.random() < 0.5)
+    scale = length / float(random.uniform(2.0, 7.0)) if model else 1.0
+    L = length / scale
+    B = L / slender
+    T = B / flat
+    U = froude * float(np.sqrt(9.81 * L))
+    rho = 1000.0 if model else 1025.0
+    drive = str(
+        random.choice(
+            DRIVES[:2] if kind in MERCHANT else DRIVES, p=None if kind in MERCHANT else (0.15, 0.2, 0.3, 0.35)
+        )
+    )
+    rudder = "azimuth" if drive == "azimuth" else str(random.choice([*RACE, "speed"]))
+    hull = str(random.choice(["cubic", "cross-flow", "abkowitz"]))
+    size: dict[str, Any] = {"L": L, "B": B, "T": T, "C_b": block, "U": U, "rho": rho, "scale": scale}
+    size["quick"] = float(np.sqrt(scale))
+
+    def f(low: float = 0.8, high: float = 1.25) -> float:
+        return float(random.uniform(low, high))
+
+    m, k = rho * block * L * B * T, 2 * T / L
+    lift = {  # Inoue et al. (1981), each with a factor
+        "Y_v": -(np.pi * k / 2 + 1.4 * block * B / L) * f(),
+        "Y_r": np.pi * k / 4 * f(0.5, 1.2),
+        "N_v": -k * f(0.75, 1.15),
+        "N_r": -(0.54 * k - k**2) * f(0.85, 1.5),
+    }
+    R = 0.5 * rho * U**2 * _wetted(size) * f(0.0026, 0.005)
+    I_z = m * (L * f(0.23, 0.27)) ** 2
+    document: dict[str, Any] = {
+        "name": f"Stranger of {L:.3g} m", "dof": 3, "source": "made up",
+        "particulars": {"L_pp": L, "B": B, "T": T, "C_b": block, "U_0": U},
+        "constants": {"rho": rho, "rho_a": 1.225},
+        "inertia": {"m": m, "I_z": I_z, "x_G": L * f(-0.025, 0.03)},
+        "added_mass": {
+            "coriolis": "mmg", "X_udot": -m * f(0.03, 0.09), "Y_vdot": -m * f(0.7, 1.1), "N_rdot": -I_z * f(0.5, 1.1)
+        },
+        "current": {"kind": "uniform"}, "wind": _wind(size, f),
+        "hull": _shape(hull, size, lift, R, f),
+        "thruster": _thrusters(drive, "race" if rudder in RACE else rudder, size, f, R),
+    }  # fmt: skip
+    _steering(document["thruster"], rudder, size, f, servo=model and random.random() < 0.5)
+    words = f"{kind} {'model' if model else 'ship'} of {L:.3g} m, {drive}, {hull} hull, rudder by {rudder}"
+    name = f"{random.choice(['MV', 'MS', 'RV', 'Hull', 'Model'])} {random.integers(100, 5000)}"
+    return size | {
+        "document": _plain(document), "words": words, "model": model, "drive": drive, "type": kind, "name": name
+    }  # fmt: skip
+
+
+def _shape(kind: str, size: Mapping[str, Any], lift: Mapping[str, float], R: float, f: Any) -> dict[str, Any]:
+    """Hull forces; Abkowitz: the cubic's terms about the service speed, their lift with the speed, resistance apart."""
+    terms = _hull("cross-flow" if kind == "cross-flow" else "cubic", size, lift, R, f)
+    if kind == "cross-flow":
+        terms["crossflow"] |= {"k_fwd": f(-0.3, 0.5), "k_ends": f(-0.4, 0.4)}
+    if kind != "abkowitz":
+        return terms
+    flat = {key: value * size["T"] / size["L"] for key, value in terms["mmg"].items() if key != "R_0"}
+    growing = {f"{key[:2]}u{key[2:]}": flat[key] * f(0.7, 1.2) for key in lift}
+    resistance = {"R_0": R * 0.8 / size["U"] ** 2, "R_1": R * 0.2 / size["U"] ** 3}
+    return {"abkowitz": flat | growing, "resistance": resistance}
+
+
+def _steering(thruster: dict[str, Any], rudder: str, size: Mapping[str, Any], f: Any, *, servo: bool) -> None:
+    """Other rudder laws in place of the rudder in the race; gear with stops; screws as large as the draught allows."""
+    quick = size["quick"]
+    rate = f(12, 45) if servo else f(2.32, 5.5) * quick
+    stop = float(np.radians(round(f(0.0, 2.99) // 1 * 5 + 35)))
+    limits = {"rate": np.radians(rate), "low": -stop, "high": stop}
+    gear: dict[str, Any] = (
+        {"kind": "rate_limit"} if f(0, 1) < 0.4 else {"kind": "first_order", "T": f(0.2, 1.5) / quick}
+    )
+    skew, loss = f(-0.08, 0.08), f(0.0, 0.4)
+    screw = f(0.58, 0.75) * size["T"] * (0.8 if "port" in thruster else 1.0)
+    for name, block in thruster.items():
+        if block["kind"] == "tunnel":
+            block["actuator"] = {"n": {"kind": "first_order", "T": f(1, 3) / quick, "rate": 1e3}}
+        elif block["kind"] == "propeller":
+            block["D_p"] = screw
+        if "rudder" not in block["kind"]:
+            continue
+        if rudder == "race":
+            block |= {"f_side": skew, "f_angle": -loss}
+        elif rudder == "polynomial":
+            kept = ("behind", "x", "y", "z", "A_R", "f_alpha", "epsilon", "t_R", "a_H", "x_H")
+            straight = block["gamma_R_plus"]
+            flow = {"v": -straight, "r": -straight * block["ell_R"] / size["L"], "rrr": f(0, 0.15), "vrr": f(-0.3, 0.3)}
+            block = {key: block[key] for key in kept if key in block} | {"k_x": f(0.3, 0.7), "v_R": flow}
+            thruster[name] = block | {"kind": "rudder_polynomial"}
+        elif rudder == "coefficients":
+            force = block["A_R"] / size["L"] ** 2 * block["f_alpha"] * (1 + block["a_H"])
+            straight = block["gamma_R_plus"]
+            side = {"cdelta": -1, "cdelta|delta|": 0.5 * loss, "c|delta|": -0.3 * skew, "cbeta": straight}
+            values = {f"{axis}_|c|{key}": lever * force * value
+                      for axis, lever in (("Y", 1.0), ("N", -0.5)) for key, value in side.items()}  # fmt: skip
+            thruster[name] = {
+                "kind": "rudder_coefficients", "behind": block["behind"], "kappa": block["kappa"],
+                "X_|c|cdeltadelta": -0.7 * force, **values,
+            }  # fmt: skip
+        thruster[name]["actuator"] = {"delta": gear | limits}
+
+
+def sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
+    """Whether it turns at 35 deg neither on the spot nor hardly, and a zigzag comes back; she may be unstable."""
+    pace = drawn["L"] / drawn["U"]
+    how: dict[str, Any] = {"n_rpm": 60 * n, "approach": "helmsman"}
+    turn = perform(vessel, [TurningCircle(duration=25 * pace, **how)], step=pace / 40)
+    across = (turn["east"].max() - turn["east"].min()) / drawn["L"]
+    zigzag = perform(vessel, [Zigzag(angle_deg=20, duration=20 * pace, **how)], step=pace / 40)
+    return bool(TURN[0] < across < TURN[1] and np.abs(zigzag["psi"]).max() < np.radians(80))
+
+
+def known_of(random: Random, drawn: Mapping[str, Any], n: float) -> dict[str, float | str | bool]:
+    """What people know, rounded as they say it; some know little, some much."""
+
+    def digits(value: float, count: int) -> float:
+        return float(f"{value:.{count}g}")
+
+    known: dict[str, float | str | bool] = {
+        "length": digits(drawn["L"], 4), "beam": digits(drawn["B"], 3), "draught": digits(drawn["T"], 3),
+        "block": digits(drawn["C_b"], int(random.integers(2, 4))),
+    }  # fmt: skip
+    blocks = drawn["document"]["thruster"].values()
+    screw = next(block for block in blocks if "D_p" in block)
+    fin = next((block for block in blocks if "A_R" in block), None)
+    if drawn["drive"] == "azimuth":
+        known["propulsor"] = "azimuth"
+    elif drawn["drive"] == "twin screw":
+        known["shafts"] = 2
+    elif "tunnel" in drawn["drive"]:
+        known["tunnel-thruster"] = True
+    steered = next(block for block in blocks if {"delta", "alpha"} & set(block.get("actuator", {})))["actuator"]
+    rate = np.degrees(steered.get("delta", steered.get("alpha"))["rate"])
+    wind = drawn["document"]["wind"]
+    more: dict[str, float | str] = {
+        "speed": digits(drawn["U"] * random.uniform(0.97, 1.03), 2), "rpm": digits(60 * n, 2),
+        "propeller-diameter": digits(screw["D_p"], 3), "rudder-rate": digits(rate, 2), "density": drawn["rho"],
+        "ship-type": OPTION.get(drawn["type"], drawn["type"]), "frontal-area": digits(wind["A_FW"], 2),
+        "lateral-area": digits(wind["A_LW"], 2),
+    }  # fmt: skip
+    if fin is not None:
+        more["rudder-area"] = digits(fin["A_R"], 2)
+        if "H_R" in fin:
+            more["rudder-span"] = digits(fin["H_R"], 2)
+    if drawn["model"]:
+        more["scale"] = digits(drawn["scale"], 3)
+    share = float(random.choice([0.25, 0.55, 0.9]))
+    first = ("speed", "rpm", "scale", "propeller-diameter")  # what most of them know
+    return known | {key: value for key, value in more.items() if random.random() < share + 0.3 * (key in first)}
+
+
+def programme_of(random: Random, count: int, style: Mapping[str, Any]) -> list[Run]:
+    """The tests in the order they were made: zigzags and circles to both sides, and others."""
+    zigzags = [
+        ((10, 10), (20, 20), (15, 15), (5, 5), (20, 10), (35, 20))[i] for i in (0, 1, *random.permutation(4) + 2)
+    ]
+    angles = (35, 20, 10, 25, 15, 30)
+    speeds = ((1.0,), (1.0, 0.75), (1.0, 0.8, 0.55))[int(random.integers(3))]
+    others = ["random", "acceleration", "coasting", "straight", "random", "crash stop", "pull-out", "slowing down"]
+    random.shuffle(others)
+    free = style["team"] == "autonomy" and random.random() < 0.5  # teams that drive about more than they test
+    runs: list[Run] = []
+    for place in range(count):
+        turn, side = divmod(place // (2 if free else 1), 2)
+        speed = speeds[turn // 3 % len(speeds)]
+        name = ("starboard", "port")[side]
+        if free and place % 2:
+            runs.append(Run("random", 20, 0, name, speed))
+        elif turn % 3 == 0:
+            runs.append(Run("zigzag", *zigzags[turn // 3 % len(zigzags)], name, speed))
+        elif turn % 3 == 1:
+            runs.append(Run("circle", angles[turn // 3 % len(angles)], 0, name, speed))
+        else:
+            kind = others[(2 * (turn // 3) + side) % len(others)]
+            runs.append(Run(kind, int(random.choice([10, 15, 20, 25])), 0, name, speed))
+    order = {"zigzag": 1, "circle": 0, "straight": -1}
+    return sorted(runs, key=lambda run: order.get(run.kind, 2)) if style["tidy"] else runs
+
+
+def _manoeuvre(random: Random, run: Run, name: str, n: float, pace: float, drawn: Mapping[str, Any]) -> Manoeuvre:
+    """A test as the simulation runs it."""
+    rpm = 60 * n * run.speed
+    slow = pace / run.speed
+    how: dict[str, Any] = {"name": name, "course_deg": float(random.uniform(0, 360)), "n_rpm": rpm}
+    how |= {"approach": "helmsman", "execute_at": slow * float(random.uniform(0.5, 4.0))}
+    length = how["execute_at"] + slow * float(random.uniform(16, 26))
+    turned: dict[str, Any] = {"angle_deg": run.angle, "side": run.side}
+    if run.kind == "zigzag":
+        return Zigzag(**turned, execute_heading_deg=run.other, duration=length, **how)
+    if run.kind == "circle":
+        return TurningCircle(**turned, duration=length, **how)
+    if run.kind == "pull-out":
+        return PullOut(**turned, turn=slow * 8, duration=length, **how)
+    if run.kind == "acceleration":
+        return SpeedChange(to_rpm=rpm, duration=length, **how | {"approach": "rest", "execute_at": 0.0})
+    if run.kind in ("coasting", "slowing down"):
+        return SpeedChange(to_rpm=0.0 if run.kind == "coasting" else 0.5 * rpm, duration=length, **how)
+    if run.kind == "crash stop":
+        return CrashStop(astern_rpm=0.6 * rpm, duration=length, **how)
+    seed = int(random.integers(1_000_000))
+    if run.kind == "straight":
+        return Excitation(signal="multisine", angle_deg=2.0, period=length, seed=seed, duration=0.7 * length, **how)
+    steps = drawn["drive"] != "screw" and random.random() < 0.5
+    if steps:
+        orders: dict[str, tuple[float, float]] = {"n_rpm": (0.4 * rpm, rpm)}
+        orders["alpha_deg" if drawn["drive"] == "azimuth" else "delta_deg"] = (-run.angle, run.angle)
+        if "tunnel" in drawn["drive"]:
+            most = 60 * 25.0 * drawn["quick"]
+            orders = orders | {"n_rpm": (0.2 * rpm, 0.5 * rpm), "bow.n_rpm": (-most, most)}
+        start = drawn["U"] * run.speed * 0.6
+        held = (1.5 * slow, 6 * slow)
+        return Steps(name=name, course_deg=how["course_deg"], orders=orders, hold=held, seed=seed,
+                     start_speed=start, duration=1.5 * length)  # fmt: skip
+    signal: Literal["aprbs", "multisine"] = "aprbs" if random.random() < 0.5 else "multisine"
+    return Excitation(
+        signal=signal, angle_deg=run.angle, amplitude_rpm=rpm * float(random.choice([0.0, 0.2])), seed=seed,
+        period=1.5 * length, harmonics=(1, 15), hold=(1.5 * slow, 5 * slow), duration=1.5 * length, **how,
+    )  # fmt: skip
+
+
+def record_of(
+    random: Random,
+    vessel: Vessel,
+    n: float,
+    drawn: Mapping[str, Any],
+    style: dict[str, Any],
+    programme: Sequence[Run],
+) -> tuple[pd.DataFrame, dict[str, datetime]]:
+    """True rows of all runs, with all that instruments can see; run -> time of its first row."""
+    pace, U = drawn["L"] / drawn["U"], drawn["U"]
+    interval = 1.0 / style["hz"]
+    step = interval / max(1, int(np.ceil(interval / (pace / 40))))
+    names = [f"R{place + 1:02d}" for place in range(len(programme))]
+    tests = [_manoeuvre(random, run, name, n, pace, drawn) for run, name in zip(programme, names, strict=True)]
+    count = len(tests)
+    rows = round(interval / step) * int(max(one.length for one in tests) / interval + 1e-9) + 1
+    weather: dict[str, Any] = {}
+    towards = random.uniform(-np.pi, np.pi)
+    flow = U * (random.uniform(0, 0.01) if style["team"] == "basin" else random.uniform(0, 0.07))
+    V_c = flow * np.cos(np.linspace(0, random.uniform(0, 2), count))  # the tide of the day
+    if style["team"] != "basin":
+        mean = np.full(count, random.uniform(0.5, 8) / drawn["quick"])
+        keys = [(int(random.integers(1_000_000)), run) for run in range(count)]
+        gusts = series(Gusts(kind="npd"), mean, step * np.arange(rows), keys)
+        weather = {"V_w": np.maximum(mean + gusts, 0.0), "beta_w": np.full((rows, count), random.uniform(-3, 3))}
+    weather |= {"V_c": V_c, "beta_c": np.full(count, towards)}
+    frame = perform(vessel, tests, step=step, interval=interval, environment=weather)
+    frame = frame.drop(columns=[name for name in ("V_c", "beta_c") if name in frame])
+    numbers = [name for name in frame if name not in ("run", "flags")]
+    frame = frame.astype({**dict.fromkeys(numbers, "float64"), "run": "str"})
+    which = pd.Index(names).get_indexer(pd.Index(frame["run"]))
+    area = 3 * drawn["L"] * (0 if style["team"] == "basin" else 4)
+    frame["north"] += random.uniform(-area - 1, area + 1, count)[which]
+    frame["east"] += random.uniform(-area - 1, area + 1, count)[which]
+    _see(random, frame, drawn, (V_c[which], towards))
+    moment = datetime(int(random.integers(2012, 2025)), int(random.integers(1, 13)), int(random.integers(1, 28)), 8)
+    starts: dict[str, datetime] = {}
+    for place, (name, one) in enumerate(zip(names, tests, strict=True)):
+        if place and place % style["a day"] == 0:
+            moment = (moment + timedelta(days=int(random.integers(1, 4)))).replace(hour=8, minute=0)
+        moment += timedelta(seconds=int(random.integers(60, 900)))
+        starts[name] = moment
+        moment += timedelta(seconds=int(one.length) + 1)
+    return frame, starts
+
+
+def _see(random: Random, frame: pd.DataFrame, drawn: Mapping[str, Any], current: tuple[Array, float]) -> None:
+    """Add columns that instruments show and datasets do not have."""
+    psi, u, v = (frame[name].to_numpy() for name in ("psi", "u", "v"))
+    frame["stw"] = u - current[0] * np.cos(current[1] - psi)
+    frame["wind_from"] = frame["beta_w"] + np.pi
+    felt_u = frame["V_w"] * np.cos(frame["beta_w"] - psi) - u
+    felt_v = frame["V_w"] * np.sin(frame["beta_w"] - psi) - v
+    frame["aws"], frame["awa"] = np.hypot(felt_u, felt_v), np.arctan2(-felt_v, -felt_u)
+    frame["phi"] = -random.uniform(0.1, 0.4) * frame["r"] * u / 9.81 * 10
+    frame["theta"] = random.uniform(-0.01, 0.01) + 0 * u
+    frame.attrs["origin"] = (float(random.uniform(25, 64)), float(random.uniform(-10, 140)))
+    for name, block in drawn["document"]["thruster"].items():
+        if block["kind"] != "propeller":
+            continue
+        n = frame[f"actual.{name}.n"].to_numpy()
+        J = np.clip(u * (1 - block["w_P0"]) / (np.maximum(np.abs(n), 1e-2) * block["D_p"]), -1, 1.5)
+        K = block["K_T"]["1"] + block["K_T"]["J"] * J + block["K_T"]["JJ"] * J**2
+        frame[f"thrust.{name}"] = drawn["rho"] * n * np.abs(n) * block["D_p"] ** 4 * K
+        frame[f"torque.{name}"] = frame[f"thrust.{name}"] * block["D_p"] * 0.16
+
+
+def true_values(frame: pd.DataFrame, signal: str, at: float = 0.0) -> Array:
+    """True values [SI] at a sensor `at` metres forward; latitude and longitude in rad."""
+    x, psi = at, frame["psi"].to_numpy()
+    u, v = frame["u"].to_numpy(), frame["v"].to_numpy() + x * frame["r"].to_numpy()
+    north, east = frame["north"].to_numpy() + x * np.cos(psi), frame["east"].to_numpy() + x * np.sin(psi)
+    place = {"lat": 0, "lon": 1}.get(signal)
+    if place is not None:
+        return np.asarray(np.radians(pymap3d.ned2geodetic(north, east, 0.0, *frame.attrs["origin"], 0.0)[place]))
+    computed = {
+        "north": north, "east": east, "v": v, "sog": np.hypot(u, v), "cog": psi + np.arctan2(v, u),
+        "vn": u * np.cos(psi) - v * np.sin(psi), "ve": u * np.sin(psi) + v * np.cos(psi),
+    }  # fmt: skip
+    return np.asarray(computed.get(signal, frame.get(signal, 0.0)))

@@ -1,0 +1,54 @@
+"""Findings B1 and B2: how often they err where the truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.study.findings_bands import Widths, kept_promise, narrower
+from shipid.study.verdict import Verdict
+from tests.study.made_up import Size, table
+
+LEVEL = 0.9
+
+
+def held(rng: np.random.Generator, share: float, runs: int = 20, windows: int = 50) -> Verdict:
+    """Verdict on B2 where bands hold a share of the paths, more in some manoeuvres than in others."""
+    each = rng.beta(4 * share, 4 * (1 - share), runs)
+    inside = rng.random((runs, windows)) < each[:, None]
+    return kept_promise(inside.ravel().astype(float), np.repeat(np.arange(runs).astype(str), windows), LEVEL)["verdict"]
+
+
+def test_a_kept_promise_is_refuted_and_a_broken_one_confirmed_in_at_most_5_percent() -> None:
+    rng, count = np.random.default_rng(3), 120
+    assert sum(held(rng, LEVEL) == "refuted" for _ in range(count)) <= 14  # 5 % of 120, but for 1 in 1,000
+    assert sum(held(rng, LEVEL - 0.05) == "confirmed" for _ in range(count)) <= 14
+
+
+def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
+    rng = np.random.default_rng(4)
+    assert [held(rng, 0.97, runs=60) for _ in range(20)].count("confirmed") >= 18
+    assert [held(rng, 0.6) for _ in range(20)].count("refuted") >= 18
+
+
+def test_few_test_manoeuvres_decide_nothing() -> None:
+    assert held(np.random.default_rng(5), 0.97, runs=4) == "undecided"
+
+
+@pytest.mark.parametrize(("bad", "expected"), [(2.0, "confirmed"), (0.5, "refuted")])
+def test_of_two_models_the_less_accurate_has_the_wider_band(bad: float, expected: str) -> None:
+    size = Size(runs=20, amounts=(5, 20))
+    widths = {"good": np.array([2.0, 1.0]), "bad": bad * np.array([2.0, 1.0])}
+    drawn = table(np.random.default_rng(1), size, {"good": 1.0, "bad": 2.0}, widths)
+    finding = narrower(Widths(drawn, ("good", "bad")))
+    assert finding["verdict"] == expected
+    assert finding["numbers"]["ratio of widths"] == pytest.approx(bad, rel=0.3)
+
+
+def test_fewer_models_than_an_order_needs_decide_nothing() -> None:
+    size = Size()
+    names = ("a", "b", "c")
+    drawn = table(
+        np.random.default_rng(1), size, dict.fromkeys(names, 1.0), dict.fromkeys(names, np.ones(len(size.amounts)))
+    )
+    assert narrower(Widths(drawn, names))["verdict"] == "undecided"
