@@ -34,9 +34,9 @@ class RawColumn:
     """What a column of the raw files truly is: raw = scale x SI + offset + zero, then wrapped, with noise, rounded.
 
     header : as written, with side and unit. signal : column of `RawStranger.record`; "time", "date", "run" or "" for
-    what means nothing. also : other signals with the same values. unit : true unit. written : where the unit is written,
+    what means nothing. also : other signals with the same values. unit : true unit. written : place of the unit,
     "header", "row" or "nowhere". scale : with the sign. offset : of the convention (zone of a map, frame). zero : error
-    of the instrument, which the log does not give. wrap : least and greatest value of an angle. late, held : s by which a value
+    of the instrument, not in the log. wrap : least and greatest value of an angle. late, held : s by which a value
     is old, and between new values. at : m forward of amidships, where the sensor is. noise, quantum : raw units.
     """
 

@@ -350,7 +350,7 @@ def _train(
     bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
     draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
     weights = torch.cat([draw.flatten() for draw in draws])[None]
-    pieces = weights[0].split([draw.numel() for draw in draws])
+    pieces = torch.split(weights[0], [draw.numel() for draw in draws])
     layers = {  # leaves in the memory of the flat weights
         name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
     }

@@ -301,14 +301,14 @@ class _Search:
 def _scale(J: Array) -> Array:
     """Norms (n,) of the columns of a Jacobian (m, n); 1 for a column of zeros."""
     size = np.linalg.norm(J, axis=0)
-    return np.where(size > 0, size, 1.0)
+    return np.asarray(np.where(size > 0, size, 1.0), dtype=float)
 
 
 def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
     """Scale (n,) of the columns, the scaled Gauss-Newton step (n,), and the fall of the squares that it promises."""
     scale = _scale(J)
     step = np.linalg.lstsq(J / scale, f, rcond=RANK)[0]
-    return scale, step, float(np.square(J / scale @ step).sum())
+    return scale, np.asarray(step, dtype=float), float(np.square(J / scale @ step).sum())
 
 
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
