@@ -164,7 +164,7 @@ def place_of(entries: list[Any], part: str) -> int:
 
 
 def _name_of(entry: Any) -> str | None:
-    """The name of an entry of a list; None where it has none by which it can be found."""
+    """The name of an entry of a list; None where it has none that can stand in a path."""
     name = entry.get("name") if isinstance(entry, Mapping) else None
     return name if isinstance(name, str) and name and '"' not in name and not name.isdecimal() else None
 

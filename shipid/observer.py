@@ -169,7 +169,7 @@ def _mass(vessel: Vessel) -> Array:
 
 @lru_cache(maxsize=16)
 def filter_function(model: Dynamics) -> ca.Function:
-    """One filter's step as a pure SX function; the motion goes on by the midpoint rule.
+    """One step of a filter as a pure SX function; the midpoint rule integrates the motion.
 
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
@@ -513,7 +513,7 @@ def observed_paths(
 
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
-    """Columns of windows with the estimates of the last row at or before each instant: `observer.*` (S,) added."""
+    """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant."""
     frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:
@@ -549,7 +549,7 @@ def tune_observer(
     def fades(given: Observer, label: str) -> Observer:
         estimates = observe(vessel, dataset, given)
         columns = at_windows(dataset, estimates, windows)
-        found = {}
+        best = {}
         for fade in (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None):
             one = given.model_copy(update={"fade": fade})
             paths, diverged = observed_paths(
@@ -560,8 +560,8 @@ def tune_observer(
                 errors = position_error(paths, windows.future).mean(axis=0)
             worst = float(errors[~diverged].max(initial=0.0))
             tried[f"{label}, fade {fade}"] = float(np.where(diverged, 2 * worst, errors).mean())
-            found[tried[f"{label}, fade {fade}"]] = one
-        return found[min(found)]
+            best[tried[f"{label}, fade {fade}"]] = one
+        return best[min(best)]
 
     for name, values in (("current", (best.current, 0.0)), ("change", (best.change, *((c,) for c in best.change)))):
         options = {f"{name} {value}": best.model_copy(update={name: value}) for value in dict.fromkeys(values)}

@@ -55,7 +55,7 @@ PATCHED: dict[str, tuple[str, Mapping[str, Any]]] = {
 }
 
 
-#: ships of public simulators, each for a range of speeds of its own: tests/vessel/test_published.py has their laws
+#: ships of public simulators, each for another range of speeds: tests/vessel/test_published.py has their laws
 SIMULATED = ("container-175", "cybership2", "esso-190k", "naval-51", "otter", "supply-vessel")
 OF_LAWS = [name for name in bundled("models") if name not in SIMULATED]
 

@@ -2,7 +2,7 @@
 
 The truth has a hull of cubic MMG terms, or linear lift with cross-flow drag; a rudder in the race, or one that knows
 the ship's speed alone; lags of shaft and steering gear; a current and gusts that nobody measured. Slopes are those of
-Inoue et al. (1981), each times a factor of its own; the template has Clarke's and Kijima's.
+Inoue et al. (1981), each times a separate factor; the template has Clarke's and Kijima's.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class Stranger:
     @property
     def options(self) -> list[str]:
         """What is known, as options of the command line."""
-        found: list[str] = []
+        words_: list[str] = []
         for name, value in self.known.items():
-            found += (
+            words_ += (
                 [f"--{name}"]
                 if value is True
                 else [f"--{name}", f"{value:g}" if isinstance(value, float) else str(value)]
             )
-        return found
+        return words_
 
 
 def stranger(seed: int, runs: int = 24) -> Stranger:
@@ -207,18 +207,18 @@ def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: fl
     area = f(0.015, 0.022) * L * T / (1 if len(sides) == 1 else 1.6)
     span = min(np.sqrt(f(1.3, 1.9) * area), 0.85 * T)
     slope = 2 * np.pi / (1 + 2 * area / span**2)
-    found: dict[str, Any] = {}
+    blocks: dict[str, Any] = {}
     fins = (f(0.3, 0.55), f(0.3, 0.55), f(0.9, 1.15), f(0.45, 0.65), f(0.6, 0.9), f(0.2, 0.4))
     for side, name in sides:
         y = {"y": side * 0.2 * B}
-        found[name or "propeller"] = {
+        blocks[name or "propeller"] = {
             "kind": "propeller", "x": -0.47 * L, **y, "z": 0.65 * T, "D_p": D, "k_astern": 0.7,
             "t_P": 0.12 + 0.2 * wake, "w_P0": wake, "C_1": 1.8, "C_2_plus": 1.4, "C_2_minus": 1.2,
             "K_T": {"1": 0.44 * pitch - 0.02, "J": -0.29, "JJ": -0.12}, "actuator": {"n": shaft},
         }  # fmt: skip
         steered = f"{name}_rudder" if name else "rudder"
         if rudder == "race":
-            found[steered] = {
+            blocks[steered] = {
                 "kind": "rudder", "behind": name or "propeller", "x": -0.5 * L, **y, "z": 0.6 * T,
                 "A_R": area, "H_R": float(span), "f_alpha": float(slope * 0.95), "epsilon": fins[2], "kappa": fins[3],
                 "gamma_R_plus": fins[0], "gamma_R_minus": fins[1], "ell_R": -fins[4] * L, "t_R": 0.3, "a_H": fins[5],
@@ -228,14 +228,14 @@ def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: fl
             force = area / L**2 * slope * (1 + fins[5]) * fins[2] ** 2
             odd = {"Y_delta": -force, "N_delta": 0.5 * force}
             fin = {"Y_vdeltadelta": force, "N_vdeltadelta": -0.5 * force}  # less lift on a rudder that is over
-            found[steered] = {
+            blocks[steered] = {
                 "kind": "rudder_derivatives", "X_deltadelta": -0.7 * force, "X_udeltadelta": -1.4 * force, **odd, **fin,
                 **{f"{key[0]}_u{key[2:]}": 2 * value for key, value in odd.items()},
                 **{f"{key[0]}_uu{key[2:]}": value for key, value in odd.items()}, "actuator": {"delta": gear},
             }  # fmt: skip
     if drive == "screw and tunnel":
         push = 0.15 * R
-        found["bow"] = {
+        blocks["bow"] = {
             "kind": "tunnel",
             "x": 0.38 * L,
             "z": 0.6 * T,
@@ -243,7 +243,7 @@ def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: fl
             "F_2": push / 25.0 / quick**2,
             "F_3": 0.0,
         }
-    return found
+    return blocks
 
 
 def _sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:

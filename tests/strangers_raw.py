@@ -34,9 +34,9 @@ class RawColumn:
     """What a column of the raw files truly is: raw = scale x SI + offset + zero, then wrapped, with noise, rounded.
 
     header : as written, with side and unit. signal : column of `RawStranger.record`; "time", "date", "run" or "" for
-    what means nothing. also : other signals with the same values. unit : true unit. said : where the unit is written,
+    what means nothing. also : other signals with the same values. unit : true unit. written : place of the unit,
     "header", "row" or "nowhere". scale : with the sign. offset : of the convention (zone of a map, frame). zero : error
-    of the instrument, which nobody told. wrap : least and greatest value of an angle. late, held : s by which a value
+    of the instrument, not in the log. wrap : least and greatest value of an angle. late, held : s by which a value
     is old, and between new values. at : m forward of amidships, where the sensor is. noise, quantum : raw units.
     """
 
@@ -53,7 +53,7 @@ class RawColumn:
     noise: float = 0.0
     decimals: int = 3
     also: tuple[str, ...] = ()
-    said: str = "nowhere"
+    written: str = "nowhere"
 
     @property
     def sign(self) -> int:
@@ -210,14 +210,14 @@ def _channels(
     at = float(drawn["L"] * random.choice([0.0, random.uniform(-0.4, 0.3)])) if gps else 0.0
     late = float(random.uniform(0.3, 1.5) if gps else random.choice([0.0, 0.05]))
     held = 1.0 if team in ("yard", "logger") and style["hz"] > 1 and random.random() < 0.5 else 0.0
-    found: list[RawColumn] = []
+    channels: list[RawColumn] = []
     digits: dict[str, float] = {}  # of one kind of channel: equal to port and starboard
 
     def add(word: str, signal: str, unit: str, noise: float, **more: Any) -> None:
         scale = UNITS[unit] * more.pop("sign", 1)
         coarse = digits.setdefault(word, float(random.uniform(0.5, 3.0)) * max(noise, 1e-12) * abs(scale))
         decimals = more.pop("decimals", int(np.clip(np.ceil(-np.log10(coarse)), 0, 8)))
-        found.append(RawColumn(word, signal, unit, scale, noise=noise * abs(scale), decimals=decimals, **more))
+        channels.append(RawColumn(word, signal, unit, scale, noise=noise * abs(scale), decimals=decimals, **more))
 
     turned = -1 if frame in ("zup", "ros") else 1  # z upwards: y, yaw and rate to port
     spot = float(random.choice([0.02, 0.5, 1.5])) if not model else float(random.choice([0.002, 0.01, 0.02]))
@@ -276,12 +276,12 @@ def _channels(
             add("theta", "theta", "deg", np.radians(0.03))
     for place in random.permutation(len(IDLE))[: int(random.integers(0, 6))]:
         word, unit, level, scatter = IDLE[place]
-        found.append(
+        channels.append(
             RawColumn(word, "", unit, 0.0, level, noise=scatter, decimals=0 if scatter <= 0 or scatter > 0.5 else 2)
         )
     if random.random() < 0.25:
-        random.shuffle(found)
-    return found
+        random.shuffle(channels)
+    return channels
 
 
 def _commands(
@@ -341,7 +341,7 @@ def _headers(random: Random, channels: list[RawColumn], style: Mapping[str, Any]
         time.insert(0, RawColumn("date", "date"))
     if style["layout"] in ("days", "one") and style["run column"]:
         time.append(RawColumn("run", "run"))
-    found: list[RawColumn] = []
+    headed: list[RawColumn] = []
     for column in [*time, *channels]:
         key, signal = column.header, column.signal
         words = WORDS.get(key, {"en": key})
@@ -358,19 +358,19 @@ def _headers(random: Random, channels: list[RawColumn], style: Mapping[str, Any]
         glue = "_" if blank or place == "joined" or language == "si" or "_" in word else " "
         text = glue.join(parts)
         text = {"lower": text.lower(), "UPPER": text.upper()}.get(style["case"], text)
-        unit, said = column.unit, "nowhere"
+        unit, written = column.unit, "nowhere"
         if unit and place == "brackets":
-            text, said = text + str(style["brackets"]).format(spelled.get(unit, unit)), "header"
+            text, written = text + str(style["brackets"]).format(spelled.get(unit, unit)), "header"
         elif unit and place == "joined":
-            text, said = f"{text}_{joined.get(unit, unit)}", "header"
+            text, written = f"{text}_{joined.get(unit, unit)}", "header"
         elif unit and place == "row":
-            said = "row"
+            written = "row"
         text = text.replace(" ", "_") if blank or place == "joined" else text
         if style["separator"] == "," or style["decimal"] == ",":
             text = text.replace(", ", " ")
-        taken = sum(other.header.rpartition("#")[0] == text or other.header == text for other in found)
-        found.append(replace(column, header=f"{text}#{taken + 1}" if taken else text, said=said))
-    return [replace(one, header=one.header.replace("#", "_")) for one in found]
+        taken = sum(other.header.rpartition("#")[0] == text or other.header == text for other in headed)
+        headed.append(replace(column, header=f"{text}#{taken + 1}" if taken else text, written=written))
+    return [replace(one, header=one.header.replace("#", "_")) for one in headed]
 
 
 def _orders(channels: Iterable[RawColumn]) -> set[str]:
@@ -402,8 +402,8 @@ def _measured(random: Random, rows: pd.DataFrame, column: RawColumn) -> Array:
 def _texts(values: Array, column: RawColumn, style: Mapping[str, Any]) -> list[str]:
     missing = "" if style["missing"] == "hold" else style["missing"]
     digits, comma = f"%.{column.decimals}f", style["decimal"] == ","
-    found = [digits % value if np.isfinite(value) else missing for value in values]
-    return [text.replace(".", ",") for text in found] if comma else found
+    texts = [digits % value if np.isfinite(value) else missing for value in values]
+    return [text.replace(".", ",") for text in texts] if comma else texts
 
 
 def _stamps(style: Mapping[str, Any], begin: datetime, first: datetime, t: Array) -> dict[str, list[str]]:
@@ -515,12 +515,12 @@ def _head(
 ) -> tuple[list[list[str]], int]:
     """Preamble lines, header and row of units; number of the header's line."""
     by = {",": ",", ";": ";"}.get(style["separator"], ": ")
-    told = (
+    words = (
         ("Project", style["job"]), ("File", Path(path).stem), ("Date", f"{moment:%d.%m.%Y}"),
         ("Sampling", f"{style['hz']} Hz"), ("Loading condition", "design draught"), ("Channels", len(columns)),
         ("Operator", "JK"), ("Remarks", ""), ("Data", "start"),
     )  # fmt: skip
-    head = [[f"{style['comment']} {word}{by}{value}".strip()] for word, value in told[: style["preamble"]]]
+    head = [[f"{style['comment']} {word}{by}{value}".strip()] for word, value in words[: style["preamble"]]]
     place = len(head)
     head.append([column.header for column in columns])
     if style["units"] == "row":
@@ -541,16 +541,16 @@ def _joined(lines: Sequence[Sequence[str]], separator: str) -> list[str]:
 
 def _notes(random: Random, drawn: Mapping[str, Any], columns: Sequence[RawColumn]) -> tuple[str, ...]:
     """What the team says of its conventions, if it is asked; never what it does not know."""
-    found: list[str] = []
+    notes: list[str] = []
     for column in columns:
         if column.signal.endswith((".delta", ".alpha")):
             port = column.sign < 0
-            found.append(f"{column.header}: positive to {'port' if port else 'starboard'}" + (
+            notes.append(f"{column.header}: positive to {'port' if port else 'starboard'}" + (
                 " turns the ship there" if column.signal.endswith("delta") else " (direction of thrust)"))  # fmt: skip
         if column.signal in ("sog", "lat", "axis x") and column.at:
-            found.append(f"GPS antenna {abs(column.at):.1f} m {'ahead' if column.at > 0 else 'aft'} of midship")
-        if column.unit and column.said == "nowhere" and column.signal and random.random() < 0.5:
-            found.append(f"{column.header} in {column.unit}")
+            notes.append(f"GPS antenna {abs(column.at):.1f} m {'ahead' if column.at > 0 else 'aft'} of midship")
+        if column.unit and column.written == "nowhere" and column.signal and random.random() < 0.5:
+            notes.append(f"{column.header} in {column.unit}")
         if column.signal in ("r", "v") and column.sign < 0:
-            found.append(f"{column.header}: positive to port")
-    return tuple(dict.fromkeys([*found, f"model scale 1:{drawn['scale']:.4g}"] if drawn["model"] else found))
+            notes.append(f"{column.header}: positive to port")
+    return tuple(dict.fromkeys([*notes, f"model scale 1:{drawn['scale']:.4g}"] if drawn["model"] else notes))

@@ -51,8 +51,8 @@ def test_a_promise_is_a_bound(better: Any, value: float, kept: bool) -> None:
 
 
 def test_only_groups_that_ran_are_held_against_theirs() -> None:
-    found = compare({"engine": {"speed-up": 9.0, "growth": 1.3, "time [s]": 3.0}, "other": {"x": 1.0}}, RECORDED)
-    assert [(one.label, one.regressed, one.kept) for one in found] == [
+    comparison = compare({"engine": {"speed-up": 9.0, "growth": 1.3, "time [s]": 3.0}, "other": {"x": 1.0}}, RECORDED)
+    assert [(one.label, one.regressed, one.kept) for one in comparison] == [
         ("speed-up", False, None),
         ("growth", True, False),
     ]
@@ -82,10 +82,10 @@ def test_the_verdict_names_what_regressed_and_how_to_accept_it(capsys: pytest.Ca
     assert verdict([good]) == 0
     assert capsys.readouterr().err == ""
     assert verdict([good, bad]) == 1
-    said = capsys.readouterr().err
-    assert "truth: growth: 14, recorded 10 (lower is better): worse by 40%, more than 20%" in said
-    assert "speed-up" not in said
-    assert "python -m tests.benchmarks truth --record" in said
+    output = capsys.readouterr().err
+    assert "truth: growth: 14, recorded 10 (lower is better): worse by 40%, more than 20%" in output
+    assert "speed-up" not in output
+    assert "python -m tests.benchmarks truth --record" in output
 
 
 def test_what_is_recorded_is_whole() -> None:

@@ -1,4 +1,4 @@
-"""The machine: its processor has a name, and memory that cannot be had is said in GiB."""
+"""The machine: its processor has a name, and memory that cannot be had is reported in GiB."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def test_what_fits_is_no_word() -> None:
     assert capacity.memory() > 2**20
 
 
-def test_what_does_not_fit_is_said_with_both_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_fit_is_reported_with_both_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capacity, "memory", lambda: 16 * 2**30)
     assert capacity.too_much(2**31) is None
     assert capacity.too_much(28 * 2**30) == "take 224 GiB of memory, and there are 16"

@@ -36,7 +36,7 @@ def test_replace_leaves_the_original_alone() -> None:
     assert NESTED == {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
 
-def test_entries_of_a_list_are_found_by_name() -> None:
+def test_entries_of_a_list_are_selected_by_name() -> None:
     """Where one entry alone has the name; a number, or a name with dots, is written so that it is read back."""
     families = [{"name": "high"}, {"name": "a.b", "perturb": [{"factor": [1, 2]}]}, {"name": "7"}, {"members": 3}]
     study = {"family": families}
@@ -59,7 +59,7 @@ def test_entries_of_a_list_are_found_by_name() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pattern", "found"),
+    ("pattern", "matches"),
     [
         ("hull.*", ["hull.Y_v", "hull.Y_v|v|"]),
         ("*.D_p", ["thruster.port.D_p", "thruster.starboard.D_p"]),
@@ -70,9 +70,9 @@ def test_entries_of_a_list_are_found_by_name() -> None:
         ("*", ["hull.Y_v", "hull.Y_v|v|", "thruster.port.D_p", "thruster.starboard.D_p"]),
     ],
 )
-def test_match_takes_names_literally_but_for_the_star(pattern: str, found: list[str]) -> None:
+def test_match_takes_names_literally_but_for_the_star(pattern: str, matches: list[str]) -> None:
     paths = ["hull.Y_v", "hull.Y_v|v|", "thruster.port.D_p", "thruster.starboard.D_p"]
-    assert documents.match(pattern, paths) == found
+    assert documents.match(pattern, paths) == matches
 
 
 def test_digest_does_not_depend_on_the_order_of_keys() -> None:
@@ -143,9 +143,9 @@ def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, mes
 
 
 def test_a_quoted_key_may_hold_dots() -> None:
-    found = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
-    assert found == {"sensors": {"port.n": {"noise": 0.1}}}
-    assert documents.get(found, 'sensors."port.n".noise') == 0.1
+    document = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
+    assert document == {"sensors": {"port.n": {"noise": 0.1}}}
+    assert documents.get(document, 'sensors."port.n".noise') == 0.1
 
 
 @pytest.mark.parametrize(

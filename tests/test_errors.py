@@ -11,28 +11,28 @@ ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError
 
 @ERRORS
 def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
-    found = error("first\n  second", file="a.toml", path="hull.x")
-    assert str(found) == "a.toml: hull.x: first second"
+    raised = error("first\n  second", file="a.toml", path="hull.x")
+    assert str(raised) == "a.toml: hull.x: first second"
     assert str(error("only this")) == "only this"
-    assert isinstance(found, ShipidError)
+    assert isinstance(raised, ShipidError)
 
 
 @ERRORS
 def test_several_errors_of_a_document_are_a_line_each(error: type[ShipidError]) -> None:
     others = [DataError("second\nof two", file="a.toml", path="y"), ShipidError("third")]
-    found = error("first", file="a.toml", path="x", others=others)
+    raised = error("first", file="a.toml", path="x", others=others)
     lines = ["a.toml: x: first", "a.toml: y: second of two", "third"]
-    assert str(found).split("\n") == lines
-    again = pickle.loads(pickle.dumps(found))
+    assert str(raised).split("\n") == lines
+    again = pickle.loads(pickle.dumps(raised))
     assert str(again).split("\n") == lines
     assert [type(one) for one in again.others] == [DataError, ShipidError]
 
 
 @ERRORS
 def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
-    found = pickle.loads(pickle.dumps(error("message", file="a.toml", path="hull.x")))
-    assert type(found) is error
-    assert (found.message, found.file, found.path) == ("message", "a.toml", "hull.x")
+    raised = pickle.loads(pickle.dumps(error("message", file="a.toml", path="hull.x")))
+    assert type(raised) is error
+    assert (raised.message, raised.file, raised.path) == ("message", "a.toml", "hull.x")
 
 
 def test_choices_suggest_what_is_close() -> None:

@@ -31,7 +31,7 @@ ALL = pytest.mark.parametrize("key", list(TERMS))
 DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
 
 VECTORS = ("eta", "nu", "nu_r")
-WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of what a rudder stands in
+WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of the flow at a rudder
 STATE = 0.5  # range of what a term remembers
 MOTION_RANGE = np.array([6.0, 1.5, 0.3, 0.1, 0.05, 0.15])  # m/s, rad/s; surge is drawn from -1/3 of it
 RANGES = {name: row.reach for name, row in SIGNALS.items()}
@@ -48,7 +48,7 @@ MIRROR_OF_A_TERM = {  # a tunnel's shaft drives sideways, so the mirrored unit t
 WHOLE_CIRCLE = {"beta_deg": [-180.0, -65.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
 EXAMPLES = {"thruster.quadratic": "naval-51"}  # a vessel other than the first that has the term
 SCALE_OF_STATES = {"radiation.heave_pitch": [1.0] * 6 + [0.0] * 6}  # metres, then radians
-DRAWN_COMPONENTS = ("waves.first_order", "waves.drift")  # forces of the sea: not zero at rest, no numbers of their own
+DRAWN_COMPONENTS = ("waves.first_order", "waves.drift")  # forces of the sea: not zero at rest, no numbers
 DISSIPATIVE = ("hull.crossflow", "hull.resistance")
 AT_REST = 0.1  # N: what the floor of the shaft speed (1e-3 rev/s) leaves of a thruster at n = 0
 
@@ -85,9 +85,9 @@ def example(key: str) -> Example:
     names = tuple(name for name in signals(term.function) if name not in columns)
     sizes = {**dict.fromkeys(VECTORS, 6), "wash": 3, "state": len(term.states(block)) if term.states else 0}
     inputs = {name: ca.SX.sym(name, sizes.get(name, 1)) for name in names}
-    own = {parameter.name for parameter in parameters(term.function)}
+    mine = {parameter.name for parameter in parameters(term.function)}
     others = [*term.gives.values(), *([term.rates] if term.rates else [])]
-    elsewhere = {parameter.name for function in others for parameter in parameters(function)} - own
+    elsewhere = {parameter.name for function in others for parameter in parameters(function)} - mine
     keywords = {keyword: _symbols(target, value_of) for keyword, target in binding.items() if keyword not in elsewhere}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] or [{}]
     wrench = sum((term.function(**inputs, **row, **keywords) for row in rows), ca.SX(6, 1))
@@ -99,7 +99,7 @@ def example(key: str) -> Example:
 
 
 def _columns(key: str, block: Mapping[str, Any]) -> dict[str, Any]:
-    """Component argument -> its values: the term's own, or two wave components as drawn for one ship."""
+    """Component argument -> its values: those of the term, or two wave components as drawn for one ship."""
     term = TERMS[key]
     keys = {name: block[name] for name in structural(term)}
     if term.components:
@@ -126,8 +126,8 @@ def _with_term(key: str) -> tuple[Vessel, str]:
     """A vessel that has this term, switched on, and where; made up if no bundled vessel has one."""
     for name in sorted(documents.bundled("models"), key=lambda name: name != EXAMPLES.get(key)):
         vessel = _all_on(name)
-        for path, found, _ in term_blocks(vessel.document):
-            if found == key:
+        for path, term_key, _ in term_blocks(vessel.document):
+            if term_key == key:
                 return vessel, path
     group, kind = key.split(".")
     path = {"hull": key, "wind": "wind"}.get(group, f"{group}.{kind}")
@@ -177,11 +177,11 @@ def _symbols(target: Any, value_of: Mapping[str, ca.SX]) -> Any:
     return {k: value_of[path] for k, path in target.items()} if isinstance(target, dict) else target
 
 
-def rest(found: Example) -> dict[str, Any]:
-    return {name: np.zeros(found.sizes[name]) if name in found.sizes else 0.0 for name in found.signals}
+def rest(case: Example) -> dict[str, Any]:
+    return {name: np.zeros(case.sizes[name]) if name in case.sizes else 0.0 for name in case.signals}
 
 
-def random_signals(found: Example, seed: int) -> dict[str, Any]:
+def random_signals(case: Example, seed: int) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     low = MOTION_RANGE * [-1 / 3, -1, -1, -1, -1, -1]
 
@@ -190,24 +190,24 @@ def random_signals(found: Example, seed: int) -> dict[str, Any]:
             return rng.uniform(low, MOTION_RANGE)
         if name == "wash":
             return rng.uniform(*WASH)
-        return rng.uniform(-STATE, STATE, found.sizes[name]) if name == "state" else rng.uniform(*RANGES[name])
+        return rng.uniform(-STATE, STATE, case.sizes[name]) if name == "state" else rng.uniform(*RANGES[name])
 
-    return {name: one(name) for name in found.signals}
+    return {name: one(name) for name in case.signals}
 
 
 @st.composite
-def envelope(draw: st.DrawFn, found: Example) -> dict[str, Any]:
+def envelope(draw: st.DrawFn, case: Example) -> dict[str, Any]:
     """Signals anywhere in the envelope; hypothesis likes its corners and zeros."""
 
     def one(name: str) -> Any:
         if name == "wash":
             return np.array([draw(st.floats(*limits)) for limits in WASH.T])
-        if name in found.sizes:
-            limits = MOTION_RANGE if name in VECTORS else np.full(found.sizes[name], STATE)
+        if name in case.sizes:
+            limits = MOTION_RANGE if name in VECTORS else np.full(case.sizes[name], STATE)
             return np.array([draw(st.floats(-limit, limit)) for limit in limits])
         return draw(st.floats(*RANGES[name]))
 
-    return {name: one(name) for name in found.signals}
+    return {name: one(name) for name in case.signals}
 
 
 @cache
@@ -219,8 +219,8 @@ def jacobian(key: str) -> ca.Function:
 
 
 def jacobian_at(key: str, drawn: Mapping[str, Any]) -> np.ndarray:
-    found = example(key)
-    return np.array(jacobian(key)(*(drawn[name] for name in found.signals), found.values))
+    case = example(key)
+    return np.array(jacobian(key)(*(drawn[name] for name in case.signals), case.values))
 
 
 def test_the_signals_of_every_term_are_declared() -> None:
@@ -307,57 +307,57 @@ CALM = pytest.mark.parametrize("key", [key for key in TERMS if key not in DRAWN_
 @CALM
 @pytest.mark.parametrize("seed", range(5))
 def test_mirror_port_starboard(key: str, seed: int) -> None:
-    found = example(key)
-    drawn = random_signals(found, seed)
+    case = example(key)
+    drawn = random_signals(case, seed)
     signs = {**MIRROR, **MIRROR_OF_A_TERM.get(key, {})}
     mirrored = {name: value * signs.get(name, 1) for name, value in drawn.items()}
-    sideways = [path.endswith(".y") and unit == "m" for path, unit in zip(found.paths, found.units, strict=True)]
-    flipped = np.where(sideways, -found.values, found.values)[[_other_side(path, found.paths) for path in found.paths]]
-    wrench = found.wrench(drawn)
+    sideways = [path.endswith(".y") and unit == "m" for path, unit in zip(case.paths, case.units, strict=True)]
+    flipped = np.where(sideways, -case.values, case.values)[[_other_side(path, case.paths) for path in case.paths]]
+    wrench = case.wrench(drawn)
     assert np.abs(wrench).max() > 0
     expected = MIRRORED_WRENCH * wrench
-    np.testing.assert_allclose(found.wrench(mirrored, flipped), expected, rtol=1e-9, atol=1e-9 * np.abs(wrench).max())
+    np.testing.assert_allclose(case.wrench(mirrored, flipped), expected, rtol=1e-9, atol=1e-9 * np.abs(wrench).max())
 
 
 def _other_side(path: str, paths: tuple[str, ...]) -> int:
-    """Where the number of the other side stands: a screw that turns the other way has its wake and flow mirrored."""
+    """Place of the number of the other side: a screw that turns the other way has its wake and flow mirrored."""
     turned = re.sub("_plus$|_minus$", lambda end: "_minus" if end[0] == "_plus" else "_plus", path)
     return paths.index(turned)
 
 
 @CALM
 def test_zero_at_rest(key: str) -> None:
-    found = example(key)
-    assert np.abs(found.wrench(rest(found))).max() < AT_REST
+    case = example(key)
+    assert np.abs(case.wrench(rest(case))).max() < AT_REST
 
 
 @ALL
 def test_finite_at_rest(key: str) -> None:
-    found = example(key)
-    assert np.isfinite(found.wrench(rest(found))).all()
-    assert np.isfinite(jacobian_at(key, rest(found))).all()
+    case = example(key)
+    assert np.isfinite(case.wrench(rest(case))).all()
+    assert np.isfinite(jacobian_at(key, rest(case))).all()
 
 
 @ALL
 @DRAWN
 @given(data=st.data())
 def test_finite_everywhere(key: str, data: st.DataObject) -> None:
-    found = example(key)
-    drawn = data.draw(envelope(found))
-    assert np.isfinite(found.wrench(drawn)).all()
+    case = example(key)
+    drawn = data.draw(envelope(case))
+    assert np.isfinite(case.wrench(drawn)).all()
     assert np.isfinite(jacobian_at(key, drawn)).all()
 
 
 @ALL
 @pytest.mark.parametrize("seed", range(5))
 def test_derivative_is_finite_difference(key: str, seed: int) -> None:
-    found = example(key)
-    drawn = random_signals(found, seed)
-    point = np.concatenate([*(np.atleast_1d(drawn[name]) for name in found.signals), found.values])
-    sizes = np.cumsum([found.function.size1_in(i) for i in range(found.function.n_in() - 1)])
+    case = example(key)
+    drawn = random_signals(case, seed)
+    point = np.concatenate([*(np.atleast_1d(drawn[name]) for name in case.signals), case.values])
+    sizes = np.cumsum([case.function.size1_in(i) for i in range(case.function.n_in() - 1)])
 
     def wrench(at: np.ndarray) -> np.ndarray:
-        return np.array(found.function(*np.split(at, sizes))).ravel()
+        return np.array(case.function(*np.split(at, sizes))).ravel()
 
     exact = jacobian_at(key, drawn)
     for column, value in enumerate(point):
@@ -374,9 +374,9 @@ def test_derivative_is_finite_difference(key: str, seed: int) -> None:
 @DRAWN
 @given(data=st.data())
 def test_drag_takes_energy(key: str, data: st.DataObject) -> None:
-    found = example(key)
-    drawn = data.draw(envelope(found))
-    assert found.wrench(drawn) @ drawn["nu_r"] <= 1e-9
+    case = example(key)
+    drawn = data.draw(envelope(case))
+    assert case.wrench(drawn) @ drawn["nu_r"] <= 1e-9
 
 
 def _powers(unit: str) -> tuple[float, float, float]:
@@ -393,41 +393,41 @@ def _powers(unit: str) -> tuple[float, float, float]:
 @pytest.mark.parametrize("seed", range(3))
 def test_froude_scaling(key: str, seed: int) -> None:
     """A ship scaled by 25 in length, by the units that its parameters claim: forces 25^3, moments 25^4."""
-    scale, found = 25.0, example(key)
+    scale, case = 25.0, example(key)
 
     def factor(mass: float, length: float, time: float) -> float:
         return float(scale ** (3 * mass + length + time / 2))
 
-    values = found.values * [factor(*_powers(unit)) for unit in found.units]
+    values = case.values * [factor(*_powers(unit)) for unit in case.units]
     motion = np.array([scale**0.5] * 3 + [scale**-0.5] * 3)
     signal = {"n": scale**-0.5, "V_w": scale**0.5, "V_c": scale**0.5, "nu": motion, "nu_r": motion}
     signal |= {"wash": np.array([scale**0.5, scale**0.5, scale])}
     signal |= {"eta": scale ** np.array([1, 1, 1, 0, 0, 0]), "state": scale ** np.array(SCALE_OF_STATES.get(key, 0.0))}
-    drawn = random_signals(found, seed)
+    drawn = random_signals(case, seed)
     for name in VECTORS:
         if name in drawn:
             drawn[name][0] = abs(drawn[name][0]) + 2.0  # far above the floors of speed, which do not scale
     if "wash" in drawn:
         drawn["wash"][:2] = np.abs(drawn["wash"][:2]) + 2.0
     scaled = {name: value * signal.get(name, 1.0) for name, value in drawn.items()}
-    expected = found.wrench(drawn) * scale ** np.array([3, 3, 3, 4, 4, 4])
-    np.testing.assert_allclose(found.wrench(scaled, values), expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())
+    expected = case.wrench(drawn) * scale ** np.array([3, 3, 3, 4, 4, 4])
+    np.testing.assert_allclose(case.wrench(scaled, values), expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())
 
 
 @ALL
 def test_lowered_equals_casadi(key: str) -> None:
     """Values to rounding, and PyTorch's gradient against CasADi's, for a batch with rest and corners in it."""
-    found = example(key)
-    batch = [rest(found), *(random_signals(found, seed) for seed in range(20))]
-    lowered = lower(found.function)
+    case = example(key)
+    batch = [rest(case), *(random_signals(case, seed) for seed in range(20))]
+    lowered = lower(case.function)
     signal_tensors = [
         torch.tensor(np.stack([np.atleast_1d(drawn[name]) for drawn in batch], axis=-1)).requires_grad_()
-        for name in found.signals
+        for name in case.signals
     ]
-    parameter_tensor = torch.tensor(found.values)[:, None]
+    parameter_tensor = torch.tensor(case.values)[:, None]
     channels = lowered(*signal_tensors, parameter_tensor)
     wrench = torch.stack([torch.as_tensor(c, dtype=torch.float64).expand(len(batch)) for c in channels])
-    expected = np.stack([found.wrench(drawn) for drawn in batch], axis=-1)
+    expected = np.stack([case.wrench(drawn) for drawn in batch], axis=-1)
     scale = np.abs(expected).max()
     np.testing.assert_allclose(wrench.detach().numpy(), expected, rtol=1e-12, atol=1e-12 * scale)
 
@@ -435,6 +435,6 @@ def test_lowered_equals_casadi(key: str) -> None:
     for row in np.flatnonzero([c.requires_grad for c in wrench]):
         gradients = torch.autograd.grad(wrench[row].sum(), signal_tensors, retain_graph=True, allow_unused=True)
         pairs = zip(gradients, signal_tensors, strict=True)
-        own = np.concatenate([(torch.zeros_like(x) if g is None else g).numpy() for g, x in pairs])
-        columns = exact[row, : len(own), 1:]  # at rest kinks have no one derivative
-        np.testing.assert_allclose(own[:, 1:], columns, rtol=1e-9, atol=1e-9 * np.abs(columns).max())
+        derivatives = np.concatenate([(torch.zeros_like(x) if g is None else g).numpy() for g, x in pairs])
+        columns = exact[row, : len(derivatives), 1:]  # at rest kinks have no one derivative
+        np.testing.assert_allclose(derivatives[:, 1:], columns, rtol=1e-9, atol=1e-9 * np.abs(columns).max())

@@ -41,7 +41,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def refused(package: Path) -> str:
-    """What is said of the copy with a file more for everything that is forbidden."""
+    """The report on the copy with a file more for everything that is forbidden."""
     files = []
     for name, (folder, text) in FORBIDDEN.items():
         files.append(package / "shipid" / folder / f"{PLANTED[name]}.py")

@@ -37,7 +37,7 @@ def test_summary_by_hand():
     }
 
 
-def test_a_diverged_window_is_said_and_not_averaged_away():
+def test_a_diverged_window_is_reported_and_not_averaged_away():
     error = np.ones((3, 8))
     error[2, 5] = np.inf
     error[1:, 6] = np.nan
@@ -119,12 +119,12 @@ def test_quantiles_of_a_tally(share: float, count: int) -> None:
     """Within the width of a bin of the quantile of the errors themselves, as `summary` takes it."""
     rng = np.random.default_rng(count)
     errors = rng.gamma(2.0, 3.0, (3, count))
-    found = tally_quantile(np.array([tally(own) for own in errors]), share)
+    quantiles = tally_quantile(np.array([tally(one) for one in errors]), share)
     low, high = (np.quantile(errors, share, axis=1, method=end) for end in ("lower", "higher"))
-    assert (found >= low * (1 - 1 / 512)).all()
-    assert (found <= high * (1 + 1 / 512)).all()
+    assert (quantiles >= low * (1 - 1 / 512)).all()
+    assert (quantiles <= high * (1 + 1 / 512)).all()
     if count == 5000:
-        np.testing.assert_allclose(found, np.quantile(errors, share, axis=1), rtol=2e-3)
+        np.testing.assert_allclose(quantiles, np.quantile(errors, share, axis=1), rtol=2e-3)
 
 
 @pytest.mark.parametrize(("angle", "speed"), [(0.0, 1.0), (-0.4, 0.3), (1.7, 8.0), (3.0, 2.0)])

@@ -75,15 +75,15 @@ def test_one_step_is_finite_and_leaves_a_covariance(bundled_vessel: Vessel) -> N
             values = np.array(list(bundled_vessel.parameters.values()))
             weather = np.zeros(len(model.environment))
             inputs = states, orders, weather, values, measured, filters.noise, filters.numbers.T, 0.5
-            found = observer_function(model, count)(*inputs)
-            states = np.array(found[0])
+            outputs = observer_function(model, count)(*inputs)
+            states = np.array(outputs[0])
             assert np.isfinite(states).all()
         for column in states.T:
             covariance = column[n : n + n * n].reshape(n, n)
             np.testing.assert_allclose(covariance, covariance.T)
             scale = np.sqrt(np.diag(covariance)) + 1e-30
             assert np.linalg.eigvalsh(covariance / np.outer(scale, scale)).min() > -1e-6
-        assert np.array(found[4]).sum() == pytest.approx(1.0)
+        assert np.array(outputs[4]).sum() == pytest.approx(1.0)
 
 
 def test_it_never_looks_ahead() -> None:
@@ -121,17 +121,17 @@ WRONG = ["nominal", "moderate-3", "moderate-10", "high-4"]
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("known", [True, False])
 def test_in_waves_and_current_half_of_the_avoidable_error_goes(name: str, known: bool) -> None:
-    found = errors(physics((name,))[name], sea(), known=known, estimates=estimated(name, sea))
-    assert found["alone"] - found["observer"] >= 0.5 * (found["alone"] - found["floor"])
-    assert found["observer"] < found["alone"]
+    rms = errors(physics((name,))[name], sea(), known=known, estimates=estimated(name, sea))
+    assert rms["alone"] - rms["observer"] >= 0.5 * (rms["alone"] - rms["floor"])
+    assert rms["observer"] < rms["alone"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("known", [True, False])
 def test_in_calm_water_it_costs_two_per_cent_at_most(name: str, known: bool) -> None:
-    found = errors(physics((name,))[name], calm(), known=known, estimates=estimated(name, calm))
-    assert found["observer"] <= 1.02 * found["alone"]
+    rms = errors(physics((name,))[name], calm(), known=known, estimates=estimated(name, calm))
+    assert rms["observer"] <= 1.02 * rms["alone"]
 
 
 def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
@@ -180,8 +180,8 @@ def test_interpolated_rows_hold_the_last_known_value() -> None:
 
 def test_causal_columns_leaves_the_others() -> None:
     data = calm().data
-    found = causal_columns(data)
+    causal = causal_columns(data)
     for name in ("north", "psi", "r", "port.n"):
-        assert found.frame[name].equals(data.frame[name])
-    assert found.metadata["causal"] == ["u", "v"]
-    assert set(MEASURED) <= set(found.frame)
+        assert causal.frame[name].equals(data.frame[name])
+    assert causal.metadata["causal"] == ["u", "v"]
+    assert set(MEASURED) <= set(causal.frame)

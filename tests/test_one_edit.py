@@ -131,10 +131,10 @@ def test_the_importer_the_checks_and_windows_take_it(tmp_path: Path) -> None:
 def test_a_guess_knows_its_name_and_unit(tmp_path: Path, unit: str) -> None:
     log = as_bridge(si_log()).rename(columns={"rudder": "flap"})
     log.assign(flap=log["flap"] * (1.0 if unit == "deg" else DEGREE)).to_csv(tmp_path / "log.csv", index=False)
-    found = guess(tmp_path / "log.csv").column("flap.flap")
-    assert found is not None
-    assert (found.source, found.unit, found.confidence) == ("flap", unit, 0.95)
-    assert "turns the ship to starboard" in found.evidence
+    proposal = guess(tmp_path / "log.csv").column("flap.flap")
+    assert proposal is not None
+    assert (proposal.source, proposal.unit, proposal.confidence) == ("flap", unit, 0.95)
+    assert "turns the ship to starboard" in proposal.evidence
 
 
 @pytest.mark.usefixtures("flap")
@@ -235,9 +235,9 @@ def test_a_mapping_names_the_reader(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("toy")
 def test_a_guess_recognises_it(tmp_path: Path) -> None:
-    found = guess(as_toy(as_bridge(si_log()).round(4), tmp_path / "log.toy"))
-    assert found.sniffed.form == {"kind": "toy"}
-    assert {column.name for column in found.columns} >= {"north", "east", "psi", "u", "v", "r", "rudder.delta"}
+    proposal = guess(as_toy(as_bridge(si_log()).round(4), tmp_path / "log.toy"))
+    assert proposal.sniffed.form == {"kind": "toy"}
+    assert {column.name for column in proposal.columns} >= {"north", "east", "psi", "u", "v", "r", "rudder.delta"}
 
 
 SHIFT = Rule(
@@ -285,7 +285,7 @@ def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert (shifts[0] == shifts[1]) == (least == most)
 
 
-def test_a_rule_refuses_a_value_at_its_own_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rule_refuses_a_value_at_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
     with pytest.raises(DocumentError) as caught:
         shifted(tmp_path, {"shift": "far"})

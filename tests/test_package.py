@@ -24,7 +24,7 @@ def test_a_wheel_has_no_link_into_the_repository(tmp_path: Path) -> None:
         metadata = email.message_from_bytes(archive.read(name))
         files = archive.namelist()
     readme = metadata.get_payload(decode=True).decode()
-    assert "## Your own study" in readme
+    assert "## A study of your ship" in readme
     links = re.findall(r"\]\(([^)]*)\)", readme)
     assert links
     assert all(link.startswith("https://") for link in links)

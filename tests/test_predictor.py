@@ -69,13 +69,13 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
 def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
     predictor = Predictor.load(cell_file(tiny_run, CELL))
     instants = read_test(tiny_run)[0].instants()
-    found = predictor.predict(instants, level=0.7)
-    np.testing.assert_array_equal(found.paths, predictor.predict(instants))
-    assert found.region.along.shape == found.paths.shape[:2]
-    assert (found.region.radius > 0).all()
-    np.testing.assert_array_equal(found.outside, predictor.outside(instants.columns))
+    prediction = predictor.predict(instants, level=0.7)
+    np.testing.assert_array_equal(prediction.paths, predictor.predict(instants))
+    assert prediction.region.along.shape == prediction.paths.shape[:2]
+    assert (prediction.region.radius > 0).all()
+    np.testing.assert_array_equal(prediction.outside, predictor.outside(instants.columns))
     alone = predictor.predict(instants, level=0.7, pointwise=True)
-    assert alone.region.radius.mean() < found.region.radius.mean()
+    assert alone.region.radius.mean() < prediction.region.radius.mean()
     with pytest.raises(DataError, match="a band of 90 % needs 9 runs or more to calibrate it: there are"):
         predictor.predict(instants, level=0.9)
     with pytest.raises(DataError, match="this predictor has no band: it was made without"):
@@ -172,7 +172,7 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"format": FORMAT + 1}, f"written in format {FORMAT + 1}, this shipid reads {FORMAT}"),
         ({"format": None}, "written in format None"),
@@ -187,9 +187,9 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "damaged"),
     ],
 )
-def test_foreign_contents_are_one_line(tmp_path: Path, tiny_run: Path, changes: dict[str, Any], said: str) -> None:
+def test_foreign_contents_are_one_line(tmp_path: Path, tiny_run: Path, changes: dict[str, Any], message: str) -> None:
     file = rewritten(cell_file(tiny_run, CELL), tmp_path / "foreign.npz", **changes)
-    with pytest.raises(ShipidError, match=said) as caught:
+    with pytest.raises(ShipidError, match=message) as caught:
         Predictor.load(file)
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ResultError)
@@ -213,12 +213,12 @@ def test_files_of_other_kinds_are_one_line(tmp_path: Path, tiny_run: Path) -> No
         with pytest.raises(ResultError, match="not a predictor"):
             Predictor.load(file)
     np.save(tmp_path / "array.npy", np.zeros(3))
-    for file, said in (
+    for file, message in (
         (tmp_path / "array.npy", "not a predictor"),
         (tmp_path, "a folder: name one"),
         (tmp_path / "x", "No such"),
     ):
-        with pytest.raises(ResultError, match=said):
+        with pytest.raises(ResultError, match=message):
             Predictor.load(file)
 
 
@@ -281,7 +281,7 @@ def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) ->
     assert frame[["cooperative_north", "cooperative_east"]].notna().all(axis=None)
 
 
-def test_outside_is_told_of_the_instant_that_it_is_of(tmp_path: Path, tiny_run: Path) -> None:
+def test_outside_is_reported_for_its_instant(tmp_path: Path, tiny_run: Path) -> None:
     dataset = read_dataset(tiny_run / DATASET)
     at = (dataset.frame["run"] == "M001") & (dataset.frame["t"] == 7.0)
     faster = dataset.frame.assign(u=np.where(at, 50.0, dataset.frame["u"]))
@@ -306,11 +306,11 @@ def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path
     with pytest.raises(DataError, match="cannot be read"):
         predict_log(tiny_run, CELL, tmp_path / "gone.parquet", None, out)
     dataset = read_dataset(log)
-    for missing, said in (("port.n", "needs this command"), ("V_w", "measure wind")):
+    for missing, message in (("port.n", "needs this command"), ("V_w", "measure wind")):
         columns = ["V_w", "beta_w"] if missing == "V_w" else [missing]
         fewer = Dataset(dataset.frame.drop(columns=columns), {**dataset.metadata, "units": {}})
         file = write_dataset(fewer, tmp_path / "fewer.parquet")
-        with pytest.raises(DataError, match=said):
+        with pytest.raises(DataError, match=message):
             predict_log(tiny_run, CELL, file, None, out)
     assert not out.exists()
 

@@ -127,7 +127,7 @@ def test_one_run_is_split_in_time() -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "physics", "runs", "said"),
+    ("method", "physics", "runs", "message"),
     [
         (SMALL, Physics(None, 4, 1.0), None, "the physics has 4 steps of 1 s, the windows have 5 steps of 1 s"),
         (PathDrawn(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
@@ -137,8 +137,8 @@ def test_one_run_is_split_in_time() -> None:
         (SMALL, NONE, WINDOWS.spans, "no training window is left"),
     ],
 )
-def test_what_does_not_fit_is_one_sentence(method: Method, physics: Physics, runs: list[str], said: str) -> None:
-    with pytest.raises(DataError, match=said):
+def test_what_does_not_fit_is_one_sentence(method: Method, physics: Physics, runs: list[str], message: str) -> None:
+    with pytest.raises(DataError, match=message):
         fit(method, physics, WINDOWS, validation_runs=runs)
 
 

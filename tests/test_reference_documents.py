@@ -140,8 +140,8 @@ def test_every_key_of_a_term_is_named_where_its_kind_is(key: str) -> None:
     here = section(text, f"[{key}]" if group in FIXED else f"[{group}")
     shared = named(section(text, "[particulars]")) | named(section(text, "[constants]")) | {"off", "kind", "actuator"}
     wanted = keys(term_model(key)) - shared
-    said = named(here) | set(re.findall(r"\b[A-Z]_\d\b", here))  # coefficients of a formula that is written out
-    assert not wanted - said, f"{key}: {', '.join(sorted(wanted - said))}"
+    documented = named(here) | set(re.findall(r"\b[A-Z]_\d\b", here))  # coefficients of a formula that is written out
+    assert not wanted - documented, f"{key}: {', '.join(sorted(wanted - documented))}"
     assert group in FIXED or f'kind = "{kind}"' in here
 
 
@@ -186,9 +186,9 @@ def test_every_key_of_a_mapping_is_in_the_section_of_its_block(path: str, model:
 @pytest.mark.parametrize("kind", READERS)
 def test_every_key_of_a_format_is_named(kind: str) -> None:
     text = page("reference-mapping-document")
-    said = named(section(text, "[format]")) | named(section(text, "NMEA"))
-    assert not keys(READERS[kind].options) - said
-    assert kind in {word.lower() for word in said}
+    documented = named(section(text, "[format]")) | named(section(text, "NMEA"))
+    assert not keys(READERS[kind].options) - documented
+    assert kind in {word.lower() for word in documented}
 
 
 @pytest.mark.parametrize("kind", REPAIRS)

@@ -113,10 +113,10 @@ def spoilt(document: dict[str, Any], rng: np.random.Generator) -> tuple[dict[str
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_a_schema_is_one(name: str) -> None:
-    found = schema(name)
-    jsonschema.Draft7Validator.check_schema(found)
-    assert json.loads(json.dumps(found)) == found
-    text = json.dumps(found)
+    document = schema(name)
+    jsonschema.Draft7Validator.check_schema(document)
+    assert json.loads(json.dumps(document)) == document
+    text = json.dumps(document)
     assert '"null"' not in text, "TOML has no null"
     assert "prefixItems" not in text, "no draft that editors know has it"
     with pytest.raises(DocumentError, match="no such document: did you mean 'vessel'"):
@@ -141,11 +141,11 @@ def agree(kind: str, name: str, count: int, seed: int, models: Path, validators:
         one, how, path = spoilt(document, rng)
         table = [part for part in path[:-1] if isinstance(part, str)]
         renamed = how == "rename" and bool(table) and table[-1] in NAMED
-        said, valid = refusal(kind, name, one, models, known), validators[kind].is_valid(one)
-        if said is None:
+        error, valid = refusal(kind, name, one, models, known), validators[kind].is_valid(one)
+        if error is None:
             assert valid, (how, path, next(validators[kind].iter_errors(one)).message)
         elif how not in ("delete", "negative") and not renamed and not OPEN & {str(part) for part in path}:
-            assert not valid, (how, path, said)
+            assert not valid, (how, path, error)
             refused += 1
     return refused
 

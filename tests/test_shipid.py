@@ -51,7 +51,7 @@ def test_public_names_load() -> None:
     assert np.isfinite(len(shipid.__all__))
 
 
-def test_names_can_be_found_by_typing() -> None:
+def test_names_are_listed_while_typing() -> None:
     """What `dir` lists, what is imported on first use and what a type checker sees are the same names."""
     assert set(shipid.__all__) <= set(dir(shipid))
     tree = ast.parse(Path(shipid.__file__).read_text(encoding="utf-8"))
@@ -143,7 +143,7 @@ def test_a_method_in_a_users_script_is_known_to_every_command(tmp_path: Path) ->
     for name in ("one", "two"):
         script("study", "run", TINY, "--set", mine, "--workers", 2, "--out", name, folder=tmp_path)
     assert "mine" in script("study", "compare", "one", "two", folder=tmp_path)
-    with pytest.raises(ShipidError, match="one of your own needs the script"):
+    with pytest.raises(ShipidError, match="a method that you wrote needs the script"):
         shipid.read_cells(tmp_path / "one")
 
 

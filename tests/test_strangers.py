@@ -35,11 +35,11 @@ def test_its_first_guess_is_judged_by_its_log(ship: Stranger) -> None:
     given = Particulars(*sizes, speed=float(known["speed"]), rpm=float(known["rpm"]), scale=float(known["scale"]))
     guess = first_guess(given, "guess", "guess.toml").vessel
     pace = sizes[0] / float(known["speed"])
-    found = first_look(guess, ship.dataset, ship.dataset.runs, ahead=2.5 * pace, step=pace / 4)
-    assert np.isfinite([found.alone, found.constant]).all()
-    assert found.wrong == (bool(found.changes) or found.alone >= found.constant)
-    assert found.corrected <= found.alone
-    assert f"{found.constant:.3g} m" in found.sentence
+    view = first_look(guess, ship.dataset, ship.dataset.runs, ahead=2.5 * pace, step=pace / 4)
+    assert np.isfinite([view.alone, view.constant]).all()
+    assert view.wrong == (bool(view.changes) or view.alone >= view.constant)
+    assert view.corrected <= view.alone
+    assert f"{view.constant:.3g} m" in view.sentence
 
 
 @pytest.mark.slow

@@ -35,20 +35,20 @@ def cells(ship: RawStranger, file: RawFile) -> list[list[str]]:
 
 
 def numbers(ship: RawStranger, texts: list[str]) -> Array:
-    found = [text.replace(ship.style["decimal"], ".") for text in texts]
-    return np.array([float(text) if text not in ("", "NaN", "-999") else np.nan for text in found])
+    plain = [text.replace(ship.style["decimal"], ".") for text in texts]
+    return np.array([float(text) if text not in ("", "NaN", "-999") else np.nan for text in plain])
 
 
 def late_and_held(ship: RawStranger, column: RawColumn) -> Array:
     """True values (rows of the record,) [SI], late as the column's sensor is, for sensors that are not held."""
-    found = np.empty(len(ship.record))
+    held = np.empty(len(ship.record))
     for rows in ship.record.groupby("run", sort=False).indices.values():
         frame = ship.record.iloc[rows]
         true = true_values(frame, column.signal, column.at)
         true = np.unwrap(true) if column.wrap else true
         t = frame["t"].to_numpy()
-        found[rows] = np.interp(t - column.late, t, true)
-    return found
+        held[rows] = np.interp(t - column.late, t, true)
+    return held
 
 
 @pytest.fixture(scope="module")

@@ -66,15 +66,15 @@ def _before(
 
 def _of(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
     """Build the command line of some commands and groups; hollow groups only say what they are for."""
-    found = typer.Typer(**OPTIONS)
-    found.callback(invoke_without_command=True)(_before)
+    app = typer.Typer(**OPTIONS)
+    app.callback(invoke_without_command=True)(_before)
     for name, command in COMMANDS.items():
         if name in names:
-            found.command(name)(command)
+            app.command(name)(command)
     for name, group in GROUPS.items():
         if name in names:
-            found.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
-    return found
+            app.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
+    return app
 
 
 def _named(arguments: Sequence[str]) -> typer.Typer:

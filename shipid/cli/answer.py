@@ -28,19 +28,19 @@ class Answer:
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
-        self.found: dict[str, Any] = {}
+        self.contents: dict[str, Any] = {}
 
     def say(self, text: str = "", **values: Any) -> None:
         """Print a line, if it is not empty; for programs only its values, by name."""
         if self.as_json:
-            self.found.update(values)
+            self.contents.update(values)
         elif text:
             typer.echo(text)
 
     def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: Table | None) -> None:
         """Print a table, if there is one to be shown; for programs its rows under a name, SI and not rounded."""
         if self.as_json:
-            self.found[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
+            self.contents[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
         elif shown is not None:
             show(shown)
 
@@ -61,4 +61,4 @@ def _write(answer: Answer) -> None:
     if answer.as_json:
         from shipid.files import json_text
 
-        sys.stdout.write(json_text(answer.found) + "\n")
+        sys.stdout.write(json_text(answer.contents) + "\n")

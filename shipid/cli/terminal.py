@@ -217,9 +217,9 @@ class Quiet:
 
     def look(self) -> None:
         """Print the search that moved last, if it is time to."""
-        if time.monotonic() - self.last >= SILENCE and (found := self.watch.look()):
-            more = f" ({len(found)} searches are running)" if len(found) > 1 else ""
-            self.say(f"... {found[0].words}{more}")
+        if time.monotonic() - self.last >= SILENCE and (searches := self.watch.look()):
+            more = f" ({len(searches)} searches are running)" if len(searches) > 1 else ""
+            self.say(f"... {searches[0].words}{more}")
 
 
 def draw(events: Iterable[Event], watch: Watch) -> Event | None:

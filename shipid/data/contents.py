@@ -21,7 +21,7 @@ def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent
         repairs=pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"]),
         provenance={
             "log": words,
-            "vessel": str(log.metadata.get("vessel") or "not said"),
+            "vessel": str(log.metadata.get("vessel") or "not given"),
             "rows": str(len(log.frame)),
         },
     )

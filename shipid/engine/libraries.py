@@ -118,10 +118,10 @@ def stranger(place: Path) -> str | None:
     user or the system, and may be open to all only where nobody can rename what is another's (as in /tmp).
     FileNotFoundError if there is no such file.
     """
-    found = os.lstat(place)
+    entry = os.lstat(place)
     if not hasattr(os, "geteuid"):
         return None
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(entry.st_mode):
         return f"{place} is no file"
     user, trusted = os.geteuid(), {0, os.geteuid(), os.stat("/").st_uid}
     for part in (place, place.parent):

@@ -679,7 +679,7 @@ def _chain(lines: Sequence[str], given: Sequence[str], name: str) -> str:
         target = _TARGET.match(line)
         used = [key for key in dict.fromkeys(_VALUE.findall(line)) if target is None or key != target[1]]
         text = line if target is None else line[target.end() :]
-        text = _VALUE.sub(lambda found: f"w[{slots[found[0]]}]", text)
+        text = _VALUE.sub(lambda match: f"w[{slots[match[0]]}]", text)
         free += [slots[key] for key in used if last[key] == number]
         if target is not None:
             if not free:

@@ -935,7 +935,7 @@ def _observing(filters: Bank, filtering: str, row: Sequence[str], precision: Pre
     arguments += ["commands"] if nc else []
     arguments += ["environment"] if weather else []
     arguments += ["parameters"] if model.parameters else []
-    arguments += ["measured", f"numbers + k * {filters.numbers.shape[1]}", "&dt", "found"]
+    arguments += ["measured", f"numbers + k * {filters.numbers.shape[1]}", "&dt", "filtered"]
     return f"""static void begin_filters(real *states, const real *row, real *estimates)
 {{
     static const int measured[6] = {{{_whole(measured)}}};
@@ -973,14 +973,14 @@ static void go_filters(real *states, const real *last, const real *row, real dt,
     (void)commands;
     (void)parameters;
     for (k = 0; k < {count}; ++k) {{
-        real found[{n + LOW}];
+        real filtered[{n + LOW}];
         {filtering}({", ".join(arguments)});
         sound[k] = 1;
         for (i = 0; i < {n}; ++i) {{
-            if (!(M(fabs)(found[i]) < most)) sound[k] = 0;
-            states[k * {n} + i] = M(fmin)(M(fmax)(found[i], -most), most);
+            if (!(M(fabs)(filtered[i]) < most)) sound[k] = 0;
+            states[k * {n} + i] = M(fmin)(M(fmax)(filtered[i], -most), most);
         }}
-        for (i = 0; i < {LOW}; ++i) each[k][i] = M(fmin)(M(fmax)(found[{n} + i], -most), most);
+        for (i = 0; i < {LOW}; ++i) each[k][i] = M(fmin)(M(fmax)(filtered[{n} + i], -most), most);
         likelihood[k] = sound[k] ? states[k * {n} + {n - 1}] : -most;
         if (likelihood[k] > best) best = likelihood[k];
     }}

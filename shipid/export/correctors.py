@@ -478,10 +478,10 @@ def hankel(known: Known, corrector: HankelCorrector) -> Value:
                 row = law.delays - ago
                 more[f"{component}{dot}past-{ago}.{signal}"] = symbol[row * len(kept) + place]
         x = _features(step, known, at, law.commands, law.normaliser.names, more, (symbol, before))
-        found = step.call(Dense(law.weights[:-1], law.weights[-1]), step.call(z_score(law.normaliser), x))
+        residual = step.call(Dense(law.weights[:-1], law.weights[-1]), step.call(z_score(law.normaliser), x))
         orders = [at["commands"][names.commands.index(name)] for name in law.commands]
-        newest = [at["carry"][:3], *orders, *([found] if physical else [])]
-        return found, step.pack(before[len(kept) :], *newest)
+        newest = [at["carry"][:3], *orders, *([residual] if physical else [])]
+        return residual, step.pack(before[len(kept) :], *newest)
 
     return stepped(known, graph.pack(*rows), build)
 
@@ -502,8 +502,8 @@ def _missed_before(known: Known, first: int, delays: int) -> Value:
     }
     parameters = body.input("parameters", len(names.parameters))
     alone_, _ = _free(body, known, known.equations, parameters, at)
-    true, said = SX.sym("true", 3), SX.sym("said", 3)
-    block = formula("missing", [("true", true), ("said", said)], (true - said) / known.physics.step)
+    true, predicted = SX.sym("true", 3), SX.sym("predicted", 3)
+    block = formula("missing", [("true", true), ("predicted", predicted)], (true - predicted) / known.physics.step)
     body.finish(body.call(block, after, alone_))
     later = [known.of("past", MOTIONS, first + k) for k in range(1, delays)]
     each = [

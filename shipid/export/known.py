@@ -131,7 +131,7 @@ class Known:
         return self.graph.pack(*parts) if parts else value[0:0]
 
     def rows(self, group: str, names: Sequence[str], first: int, count: int) -> Value:
-        """Rows of the past or of the plan, one after the other, with some of their entries."""
+        """Entries `names` of `count` rows of the past or of the plan, concatenated; 0 where a row lacks one."""
         parts = [self.of(group, names, row) for row in range(first, first + count)]
         return self.graph.pack(*parts) if names else self.values[group][0:0]
 

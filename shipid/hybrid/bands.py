@@ -277,8 +277,10 @@ def nearest(points: Array, centres: Array) -> Array:
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle  # else large coordinates would cost digits
     which = ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).argmin(axis=0)
-    found: Array = np.sqrt(((points - centres[which]) ** 2).mean(axis=1))  # anew: sums of squares leave half the digits
-    return found
+    distances: Array = np.sqrt(
+        ((points - centres[which]) ** 2).mean(axis=1)
+    )  # anew: sums of squares leave half the digits
+    return distances
 
 
 class Adaptive(NamedTuple):

@@ -135,8 +135,8 @@ def radii(scores: Array, place: NDArray[np.int64]) -> Array:
     weights = runs.weight[order]
     at = np.cumsum(weights) - weights / 2
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
-    found: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
-    return found
+    rising: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
+    return rising
 
 
 def _ranks(scores: Array, runs: _Runs) -> Array:

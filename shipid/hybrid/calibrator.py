@@ -38,16 +38,16 @@ class TrajectoryInputs(Inputs):
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives; a trajectory that diverged gives zeros."""
-        found = super().of_physics(physics, instants)
+        inputs = super().of_physics(physics, instants)
         if physics.vessel is None:
-            return found
+            return inputs
         states = physics.states(instants)
         with np.errstate(invalid="ignore"):
             sound = np.isfinite(np.stack([states[name] for name in SEEN])).all(axis=(0, 1))
         for k in np.unique(np.round(np.linspace(0, physics.horizon, self.moments + 1)[1:]).astype(int)):
             label = f"physics-{k * physics.step:g}"
-            found |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
-        return found
+            inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
+        return inputs
 
     def header(self) -> dict[str, Any]:
         """Return the inputs as plain JSON."""
@@ -94,11 +94,11 @@ class Calibrator(PathDrawn):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        return {name: _calibrated(found) for name, found in super().fit(task).items()}
+        return {name: _calibrated(fitted) for name, fitted in super().fit(task).items()}
 
 
-def _calibrated(found: Fitted) -> Fitted:
-    plain = found.corrector
+def _calibrated(fitted: Fitted) -> Fitted:
+    plain = fitted.corrector
     if not isinstance(plain, Compensator):
-        return found
-    return replace(found, corrector=Calibrated(plain.inputs, plain.networks, plain.hyperparameters))
+        return fitted
+    return replace(fitted, corrector=Calibrated(plain.inputs, plain.networks, plain.hyperparameters))

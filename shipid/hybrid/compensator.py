@@ -44,7 +44,7 @@ class Normaliser:
         return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
 
     def apply(self, table: Mapping[str, Array]) -> Array:
-        """Return normalised inputs (S, d) of features (S,), found by name."""
+        """Return normalised inputs (S, d) of features (S,), selected by name."""
         return (np.stack([table[name] for name in self.names], axis=1) - self.mean) / self.std
 
 
@@ -56,7 +56,7 @@ class Network:
     ----------
     features : name of each input -> the columns that were equal to it in training.
     normaliser : z-score of those inputs.
-    basis : (T, r) shapes over the horizon [m] that the outputs weigh; the identity where each step has its own output.
+    basis : (T, r) shapes over the horizon [m] that the outputs weigh; the identity where each step has an output.
     layers : (weight (i, o), bias (o,)) of each layer; outputs are x_1 ... x_r, y_1 ... y_r.
     """
 

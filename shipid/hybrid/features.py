@@ -130,16 +130,16 @@ class Inputs:
         return table
 
     def _history(self, instants: Instants, step: float) -> dict[str, Array]:
-        found: dict[str, Array] = {}
+        columns: dict[str, Array] = {}
         for seconds in self.memory.history:
             for name in (*MOTIONS, *self.commands):
                 component, dot, signal = name.rpartition(".")
                 label = f"{component}{dot}past-{seconds:g}.{signal}"
-                found[label] = self._before(instants, name, seconds, step) - instants.columns[name]
+                columns[label] = self._before(instants, name, seconds, step) - instants.columns[name]
         for seconds in self.memory.turned:
             before = self._before(instants, "psi", seconds, step)
-            found[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
-        return found
+            columns[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
+        return columns
 
     @staticmethod
     def _before(instants: Instants, name: str, seconds: float, step: float) -> Array:
@@ -196,7 +196,7 @@ def steps_of(seconds: float, step: float) -> int:
 
 
 def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str, Array]:
-    """What the physics, started so long ago with the commands then given, gets wrong by now, (S,) each.
+    """Errors (S,) at the instants of a prediction by the physics from `seconds` before, with the commands given since.
 
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
     velocities [m/s, rad/s]. A prediction that diverged gives zeros.
@@ -209,13 +209,13 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     then = {name: values[-steps] for name, values in past.items()}
     given = {name: values[-steps:] for name, values in past.items() if "." in name}
     before = replace(physics, horizon=steps)
-    found = {name: values[-1] for name, values in before.states(Instants(then, planned=given)).items()}
+    ends = {name: values[-1] for name, values in before.states(Instants(then, planned=given)).items()}
     turned = columns["psi"] - then["psi"]
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
-    dx, dy = x0 - found["x"], y0 - found["y"]
+    dx, dy = x0 - ends["x"], y0 - ends["y"]
     c, s = np.cos(turned), np.sin(turned)
     errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
-    errors |= {name: columns[name] - found[name] for name in MOTIONS}
+    errors |= {name: columns[name] - ends[name] for name in MOTIONS}
     sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
 

@@ -106,8 +106,8 @@ class ForestCorrector:
         missing = next((name for name in self.names if name not in table), None)
         if missing is not None:
             raise DataError("the method was trained with this input; measure wind (V_w, beta_w)", path=missing)
-        found = self.trees.predict(np.stack([table[name] for name in self.names], axis=1))
-        return np.asarray(paths + np.tensordot(self.basis, unflatten(found), 1))
+        weights = self.trees.predict(np.stack([table[name] for name in self.names], axis=1))
+        return np.asarray(paths + np.tensordot(self.basis, unflatten(weights), 1))
 
     def header(self) -> dict[str, Any]:
         """Return names and hyperparameters."""

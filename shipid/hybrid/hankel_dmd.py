@@ -102,14 +102,14 @@ def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Ar
     given = {name: values for name, values in past.items() if "." in name}
     then = Instants({name: values[0] for name, values in past.items()}, planned=given)
     stepper = Stepper(replace(physics, horizon=delays), then)
-    found = []
+    residuals = []
     for k in range(delays):
         motion = {name: past[name][k] for name in (*MOTIONS, "psi")}
         source = past if k + 1 < delays else None
         after = [instants.columns[name] if source is None else source[name][k + 1] for name in MOTIONS]
         alone = free(replace(physics, horizon=delays), stepper.at(k, motion))
-        found.append((np.stack(after, axis=1) - alone) / physics.step)
-    return [np.stack([step[:, axis] for step in found]) for axis in range(3)]
+        residuals.append((np.stack(after, axis=1) - alone) / physics.step)
+    return [np.stack([step[:, axis] for step in residuals]) for axis in range(3)]
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,9 @@ class HankelCorrector:
         history = _History(physics, instants, law.delays, law.commands)
 
         def acceleration(at: Instants, _: int, __: Array) -> Array:
-            found = law(delayed(at.columns, history.before(), law.delays, law.commands))
-            history.move(at, found)
-            return found
+            residual = law(delayed(at.columns, history.before(), law.delays, law.commands))
+            history.move(at, residual)
+            return residual
 
         return stepped_paths(physics, instants, acceleration)
 

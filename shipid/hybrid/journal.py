@@ -54,16 +54,16 @@ class Journal:
     def rows(self, cell: str) -> list[Row]:
         """Return the trials of a search that ended, in order."""
         trials = self._study(cell).trials if cell in self._known else []
-        found: list[Row] = []
+        numbered: list[Row] = []
         for trial in trials:
             if FIXED not in trial.user_attrs:  # someone else has put it in
                 continue
-            if trial.user_attrs.get(NUMBER, len(found)) == len(found):
-                found.append(_row(len(found), trial))
-        return found
+            if trial.user_attrs.get(NUMBER, len(numbered)) == len(numbered):
+                numbered.append(_row(len(numbered), trial))
+        return numbered
 
     def count(self, cell: str) -> int | None:
-        """Return how many trials a search by budget was found to have."""
+        """Return how many trials the budget of a search allowed; None before that is decided."""
         return self._study(cell).user_attrs.get(COUNT) if cell in self._known else None
 
     def decide(self, cells: Sequence[str], count: int) -> None:
@@ -88,15 +88,15 @@ class Journal:
 
 def distributions(space: Space) -> dict[str, BaseDistribution]:
     """What Optuna calls the spans and the choices of a method."""
-    found: dict[str, BaseDistribution] = {}
+    drawn: dict[str, BaseDistribution] = {}
     for name, where in space.items():
         if isinstance(where, tuple):
-            found[name] = CategoricalDistribution(where)
+            drawn[name] = CategoricalDistribution(where)
         elif where.whole:
-            found[name] = IntDistribution(int(where.low), int(where.high))
+            drawn[name] = IntDistribution(int(where.low), int(where.high))
         else:
-            found[name] = FloatDistribution(where.low, where.high, log=where.log)
-    return found
+            drawn[name] = FloatDistribution(where.low, where.high, log=where.log)
+    return drawn
 
 
 def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:

@@ -183,11 +183,11 @@ def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing:
     across = weights[1] * v + weights[2] * r
     one, other = np.tanh(along + across).T, np.tanh(along - across).T
     even, odd = (one + other) / 2 - np.tanh(block["w_0"]), (one - other) / 2
-    found = dict(block)
+    initial = dict(block)
     for key, limit, axis, features in zip(OUTPUT, LIMITS, range(3), (even, odd, odd), strict=True):
         goal = np.arctanh(np.clip(force[:, axis] / block[limit], -MOST, MOST))
-        found[key] = solve(features, goal[:, None], [START_RIDGE])[0, :, 0]
-    return found
+        initial[key] = solve(features, goal[:, None], [START_RIDGE])[0, :, 0]
+    return initial
 
 
 def mass(physics: Physics, at: Instants) -> Array:
@@ -250,14 +250,14 @@ class _Trainer:
             apart = weights - np.where(np.arange(len(weights)) < self.num_hidden, self.start, 0.0)
             return value + ridge * float((apart**2).mean()), slope + 2 * ridge * apart / len(weights)
 
-        found = minimize(
+        optimum = minimize(
             loss,
             self.start if start is None else start,
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": self.iterations},
         )
-        return np.asarray(found.x), int(found.nit)
+        return np.asarray(optimum.x), int(optimum.nit)
 
     def error(self, weights: Array, instants: Instants, future: Array) -> float:
         """Mean squared position error [m^2] on other windows."""

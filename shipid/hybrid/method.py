@@ -72,7 +72,7 @@ class Journal(Protocol):
         """Return the trials of a search that ended, in order."""
 
     def count(self, cell: str) -> int | None:
-        """Return how many trials a search by budget was found to have."""
+        """Return how many trials the budget of a search allowed; None before that is decided."""
 
     def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
         """Append trials to searches: cell -> rows, each with the next number."""

@@ -38,10 +38,10 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     if kind not in METHODS:
         hint = choices(kind, METHODS)
         if "did you mean" not in hint:
-            hint += "; one of your own needs the script that puts it into METHODS"
+            hint += "; a method that you wrote needs the script that puts it into METHODS"
         raise DocumentError(f"no such kind of method: {hint}", path=f"{path}.kind")
-    found: Method = parse(METHODS[kind], dict(settings), None, path)
-    return found
+    method: Method = parse(METHODS[kind], dict(settings), None, path)
+    return method
 
 
 def kind_of(method: Method) -> str:

@@ -41,24 +41,24 @@ ORDER = ("rudders", "thrusters", "hull")  # in which modules are switched off: a
 
 def modules_of(physics: Physics) -> dict[str, tuple[str, ...]]:
     """Module -> dotted paths of its blocks, in the order in which they are switched off; none without a vessel."""
-    found: dict[str, list[str]] = {name: [] for name in ORDER}
+    modules: dict[str, list[str]] = {name: [] for name in ORDER}
     for path, key, _ in () if physics.vessel is None else term_blocks(physics.vessel.document):
         if key.startswith("hull."):
-            found["hull"].append(path)
+            modules["hull"].append(path)
         elif key.startswith("thruster."):
             rudder = key.startswith("thruster.rudder") or bool(behind(TERMS[key]))
-            found["rudders" if rudder else "thrusters"].append(path)
-    return {name: tuple(paths) for name, paths in found.items() if paths}
+            modules["rudders" if rudder else "thrusters"].append(path)
+    return {name: tuple(paths) for name, paths in modules.items() if paths}
 
 
 def without(physics: Physics) -> list[Physics]:
     """The physics without the first module, without the first two, ... of `modules_of`."""
-    found: list[Physics] = []
+    reduced: list[Physics] = []
     off: dict[str, bool] = {}
     for paths in modules_of(physics).values():
         off |= {f"{path}.off": True for path in paths}
-        found.append(physics.with_values(off))
-    return found
+        reduced.append(physics.with_values(off))
+    return reduced
 
 
 def shares(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
@@ -96,8 +96,8 @@ class Alarm:
     def weight(self, table: Mapping[str, Array], fade: float) -> Array:
         """1 within the radius of a centre, falling to 0 at `fade` (in standard deviations) beyond it, (S,)."""
         z = self.normaliser.apply(table)
-        found = np.clip(1 - (nearest(z, self.centres) - self.radius) / fade, 0.0, 1.0)
-        return np.where(np.isfinite(found), found, 0.0)
+        weights = np.clip(1 - (nearest(z, self.centres) - self.radius) / fade, 0.0, 1.0)
+        return np.where(np.isfinite(weights), weights, 0.0)
 
 
 def nearest(z: Array, centres: Array) -> Array:
@@ -145,8 +145,8 @@ class ModulesCorrector:
         count = 1 if self.weights.ndim == 2 else len(self.weights)
         weights = self.weights.reshape(count, *self.weights.shape[-2:]).swapaxes(1, 2)
         raw = (even.reshape(count, -1, even.shape[1]) @ weights).reshape(len(even), -1)
-        found: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
-        return found
+        scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
+        return scale
 
     def header(self) -> dict[str, Any]:
         """Return names, limits and hyperparameters."""
@@ -248,8 +248,8 @@ class Modules(Searched):
         row = best_of(rows)[0]
         params = row["params"]
         everything = steps.of(used(task))
-        found = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
-        return Fitted(found, rows, search.seconds)
+        corrector = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
+        return Fitted(corrector, rows, search.seconds)
 
     def _solved(
         self,

@@ -82,11 +82,11 @@ class OneStepCorrector:
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by flat names: `0.weight`, `0.surge`, ..."""
-        found: dict[str, Array] = {}
+        stored: dict[str, Array] = {}
         for i, head in enumerate(self.heads):
             parts = {**head.units.arrays(), "surge": head.surge, "sway_yaw": head.sway_yaw}
-            found |= {f"{i}.{name}": values for name, values in parts.items()}
-        return found
+            stored |= {f"{i}.{name}": values for name, values in parts.items()}
+        return stored
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:

@@ -92,7 +92,7 @@ class Physics:
         """
         assert self.vessel is not None
         start, commands, environment, slow, drift = self._inputs(instants)
-        found = rollout_gradient(
+        gradients = rollout_gradient(
             self.vessel,
             start,
             commands,
@@ -106,10 +106,10 @@ class Physics:
             memory=instants.hidden,
             tau_extra=slow,
         )
-        sound = ~found.diverged
+        sound = ~gradients.diverged
         if not sound.any():
             return float("inf"), np.zeros(len(names))
-        return float(found.loss[sound].mean()), np.asarray(found.parameters[sound].mean(axis=0))
+        return float(gradients.loss[sound].mean()), np.asarray(gradients.parameters[sound].mean(axis=0))
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""
@@ -212,7 +212,7 @@ def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Arr
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
-    """States and weather that a vessel has and the columns do not hold: they are taken as zero and must be said."""
+    """States and weather that a vessel has and the columns lack: they are taken as zero, and the report names them."""
     model = dynamics(vessel)
     return [name for name in (*model.state, *model.environment) if name not in columns]
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import cos, pi
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -109,8 +110,8 @@ class GatedNetwork:
             gate = _sigmoid(update + update_h)
             hidden = (1 - gate) * np.tanh(fresh + _sigmoid(reset + reset_h) * fresh_h) + gate * hidden
         full = np.concatenate([hidden, seen.now], axis=1)
-        found: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-        return found
+        outputs: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        return outputs
 
 
 def _sigmoid(values: Array) -> Array:
@@ -129,8 +130,8 @@ class RecurrentCorrector:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         table = self.inputs.table(physics, instants)
-        found = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
-        return np.asarray(paths + np.mean(found, axis=0))
+        corrections = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
+        return np.asarray(paths + np.mean(corrections, axis=0))
 
     def header(self) -> dict[str, Any]:
         """Return names and hyperparameters."""
@@ -152,15 +153,15 @@ class RecurrentCorrector:
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by flat names: `0.W_i`, `0.past.mean`, ..."""
-        found: dict[str, Array] = {}
+        stored: dict[str, Array] = {}
         for i, network in enumerate(self.networks):
             parts = {**network.layers, "basis": network.basis}
             for name, normaliser in (("past", network.reader.past), ("now", network.reader.now)):
                 parts |= {f"{name}.mean": normaliser.mean, f"{name}.std": normaliser.std}
             if network.reader.mirrors is not None:
                 parts |= dict(zip(("past.mirror", "now.mirror"), network.reader.mirrors, strict=True))
-            found |= {f"{i}.{name}": values for name, values in parts.items()}
-        return found
+            stored |= {f"{i}.{name}": values for name, values in parts.items()}
+        return stored
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
@@ -187,7 +188,7 @@ class Recurrent(Searched):
 
     Parameters
     ----------
-    trials : networks tried per foundation and fold, each with a start of its own; the best by validation is taken.
+    trials : networks tried per foundation and fold, each from other initial weights; the best by validation is taken.
     seconds : length of the past that it reads.
     units : of the recurrent state, and of the layer after it.
     learning_rate : of AdamW at the start, falling to 0 by half a cosine; a range is searched by its logarithm.
@@ -235,11 +236,11 @@ class Recurrent(Searched):
 
         def networks_of(number: int, point: Mapping[str, float]) -> tuple[tuple[GatedNetwork, ...], int]:
             """A network of each fold, and the most epochs that one took."""
-            found = []
+            trained = []
             for fold, (training, validation) in enumerate(task.folds):
                 seed = seed_of(task.seed, name, number, fold)
-                found.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
-            return tuple(network for network, _ in found), max(epochs for _, epochs in found)
+                trained.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
+            return tuple(network for network, _ in trained), max(epochs for _, epochs in trained)
 
         for number, point in search.left(points_of(self)):
             start, losses = time.process_time(), []
@@ -329,6 +330,8 @@ def _train(
 ) -> tuple[dict[str, Array], int]:
     import torch
 
+    from shipid.hybrid.training import Adam
+
     def tensor(values: Array) -> torch.Tensor:
         return torch.as_tensor(values, dtype=torch.float32)
 
@@ -345,9 +348,11 @@ def _train(
         "c_2": (data[0][2].shape[1],),
     }
     bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
-    layers = {
-        name: ((torch.rand(shape, generator=generator) * 2 - 1) * bounds[name]).requires_grad_()
-        for name, shape in shapes.items()
+    draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
+    weights = torch.cat([draw.flatten() for draw in draws])[None]
+    pieces = torch.split(weights[0], [draw.numel() for draw in draws])
+    layers = {  # leaves in the memory of the flat weights
+        name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
     }
     parts = [
         ([(tensor(s.past), tensor(s.now)) for s in (seen, image) if s is not None], tensor(outputs))
@@ -361,25 +366,24 @@ def _train(
         flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
         _, hidden = torch.gru(past, torch.zeros(1, now.shape[0], units), flat, True, 1, 0.0, False, False, False)
         full = torch.cat([hidden[0], now], dim=1)
-        found: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+        outputs: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
         if len(seen) == 1:
-            return found
-        plain, image = found.chunk(2)
+            return outputs
+        plain, image = outputs.chunk(2)
         both: torch.Tensor = (plain + sign * image) / 2
         return both
 
-    optimiser = torch.optim.AdamW(layers.values(), lr=learning_rate, weight_decay=method.weight_decay)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, method.epochs)
+    adam = Adam(weights, [method.weight_decay])
     seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
-    for epoch in range(1, method.epochs + 1):  # noqa: B007 the number of the last epoch is reported
+    for epoch in range(1, method.epochs + 1):
+        rate = torch.tensor([[learning_rate * (1 + cos(pi * (epoch - 1) / method.epochs)) / 2]])
         order = torch.randperm(len(outputs), generator=generator)
         for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
-            optimiser.zero_grad()
             loss = (forward([(past[:, rows], now[rows]) for past, now in seen]) - outputs[rows]).square().mean()
-            loss.backward()  # type: ignore[no-untyped-call]
-            optimiser.step()
-        schedule.step()
+            gradients = torch.autograd.grad(loss, list(layers.values()))
+            with torch.no_grad():
+                adam.step(torch.cat([gradient.flatten() for gradient in gradients])[None], rate)
         with torch.no_grad():
             value = float((forward(parts[1][0]) - parts[1][1]).square().mean())
         since += 1

@@ -107,11 +107,11 @@ class _Best:
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
         others = np.stack([one.others for _, one in self.left_out])  # (trials, F)
-        found = np.full_like(np.asarray(self.left_out[0][1].errors), np.nan)
+        errors = np.full_like(np.asarray(self.left_out[0][1].errors), np.nan)
         best = np.argsort(others, axis=0, kind="stable")[: self.most]
         for fold, rows in enumerate(folds):
-            found[:, rows] = np.mean([self.left_out[i][1].errors[:, rows].numpy() for i in best[:, fold]], axis=0)
-        return found
+            errors[:, rows] = np.mean([self.left_out[i][1].errors[:, rows].numpy() for i in best[:, fold]], axis=0)
+        return errors
 
 
 @dataclass(frozen=True)
@@ -180,16 +180,16 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     search.write()
     if not names and task.on_trial is not None:
         task.on_trial(method.trials, method.trials)
-    found, folds = {}, [row.cpu().numpy() for block in blocks for row in block.rows]
+    fitted, folds = {}, [row.cpu().numpy() for block in blocks for row in block.rows]
     for key in targets:
         if key not in best:
-            found[key] = diverged(method, method.points())
+            fitted[key] = diverged(method, method.points())
             continue
         missed = np.tensordot(basis, best[key].without(folds), (1, 2)).transpose(0, 2, 1)
         errors = np.full_like(targets[key], np.nan)
         errors[:, windows] = targets[key][:, windows] - np.tensordot(basis, paths[key], 1) + missed
-        found[key] = best[key].fitted(inputs, search.rows[key], errors)
-    return found
+        fitted[key] = best[key].fitted(inputs, search.rows[key], errors)
+    return fitted
 
 
 def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
@@ -215,12 +215,12 @@ def _groups(
         taken = {name: values for name, values in table.items() if group_of(name) not in left_out}
         alike.setdefault(same_table(taken), []).append(key)
         seen[same_table(taken)] = taken
-    found = []
+    groups = []
     for table_key, keys in alike.items():
         outputs = [_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
         table = seen[table_key]
-        found.append(_Group(tuple(keys), outputs, _inputs(table, device), _mirrored(table, device)))
-    return found
+        groups.append(_Group(tuple(keys), outputs, _inputs(table, device), _mirrored(table, device)))
+    return groups
 
 
 def smooth_basis(horizon: int, terms: int) -> Array:
@@ -321,22 +321,22 @@ class _Errors:
 
     def __init__(self, shape: tuple[int, int], num_ridges: int) -> None:
         self.shape = shape  # (S, K r)
-        self.found: list[list[tuple[slice, Tensor, tuple[int, ...], Tensor]]] = [[] for _ in range(num_ridges)]
+        self.blocks: list[list[tuple[slice, Tensor, tuple[int, ...], Tensor]]] = [[] for _ in range(num_ridges)]
 
     def keep(self, ridge: int, folds: slice, rows: Tensor, sides: tuple[int, ...], errors: Tensor) -> None:
         """Keep the errors (folds, j, sides x K r) on some rows (folds, j) of the windows."""
-        self.found[ridge].append((folds, rows, sides, errors.float()))
+        self.blocks[ridge].append((folds, rows, sides, errors.float()))
 
     def of(self, ridges: Array, columns: slice) -> Tensor:
         """Errors (2, S, r) on some columns, each fold by the ridge of this number; not numbers where none judges."""
         width = len(range(self.shape[1])[columns])
-        found = torch.full((2, self.shape[0], width), torch.nan, dtype=torch.float32)
+        selected = torch.full((2, self.shape[0], width), torch.nan, dtype=torch.float32)
         for ridge in np.unique(ridges):
-            for folds, rows, sides, errors in self.found[ridge]:
+            for folds, rows, sides, errors in self.blocks[ridge]:
                 mine = torch.as_tensor(ridges[folds] == ridge, device=errors.device)
                 for place, side in enumerate(sides):
-                    found[side, rows[mine].cpu()] = errors.chunk(len(sides), dim=2)[place][..., columns][mine].cpu()
-        return found
+                    selected[side, rows[mine].cpu()] = errors.chunk(len(sides), dim=2)[place][..., columns][mine].cpu()
+        return selected
 
 
 def _left_out(
@@ -364,8 +364,8 @@ def _left_out(
                 by_fold[i, folds] += squares.sum(dim=(1, 3))
                 errors.keep(i, folds, rows, sides, error)
             first += len(block.out)
-    found = by_fold.cpu().numpy()
-    return found.sum(axis=1), found, errors
+    sums = by_fold.cpu().numpy()
+    return sums.sum(axis=1), sums, errors
 
 
 def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
@@ -400,9 +400,9 @@ class _FewRows:
         self.unit = torch.eye(self.shape[1], device=out.device)
 
     def __call__(self, diagonal: Tensor) -> Tensor:
-        found = self._single(diagonal) if self.sound else None
-        self.sound = found is not None
-        return self._double(diagonal) if found is None else found
+        single = self._single(diagonal) if self.sound else None
+        self.sound = single is not None
+        return self._double(diagonal) if single is None else single
 
     def _single(self, diagonal: Tensor) -> Tensor | None:
         """By Cholesky's factors of I - H_bb; None where a squared pivot is below `SOUND`, which limits the digits."""

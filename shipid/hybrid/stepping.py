@@ -62,15 +62,15 @@ def free(physics: Physics, at: Instants) -> Array:
 
 
 def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
-    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not said well."""
+    """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
     engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO
-    found = replace(physics, horizon=1).states(at, engine=engine)
-    after = np.stack([found[name][0] for name in MOTIONS], axis=1)
+    states = replace(physics, horizon=1).states(at, engine=engine)
+    after = np.stack([states[name][0] for name in MOTIONS], axis=1)
     if physics.integrator == "euler":
         return after, None
-    return after, np.stack([found["x"][0], found["y"][0], found["psi"][0] - at.columns["psi"]], axis=1)
+    return after, np.stack([states["x"][0], states["y"][0], states["psi"][0] - at.columns["psi"]], axis=1)
 
 
 def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
@@ -82,7 +82,7 @@ def stepped_paths(physics: Physics, instants: Instants, acceleration: Accelerati
     stepper, step = Stepper(physics, instants), physics.step
     nu = np.stack([np.asarray(instants.columns[name], dtype=float) for name in MOTIONS], axis=1)
     first = np.asarray(instants.columns["psi"], dtype=float)
-    psi, place, found = first, np.zeros((len(nu), 2)), []
+    psi, place, places = first, np.zeros((len(nu), 2)), []
     with np.errstate(all="ignore"):  # a diverged path is not finite, and no news to the caller
         for k in range(physics.horizon):
             at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
@@ -98,8 +98,8 @@ def stepped_paths(physics: Physics, instants: Instants, acceleration: Accelerati
                 psi_after = psi + way[:, 2]
                 place = place + _turned(way, psi - first)
             nu, psi = after, psi_after
-            found.append(place)
-    return np.stack(found)
+            places.append(place)
+    return np.stack(places)
 
 
 def _turned(nu: Array, angle: Array) -> Array:

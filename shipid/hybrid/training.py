@@ -1,6 +1,6 @@
 """The one training loop: K small networks of one architecture, trained at once on the same inputs.
 
-The members share inputs, batches and structure; each has its own targets, initial weights, learning rate, weight decay
+The members share inputs, batches and structure; each has separate targets, initial weights, learning rate, weight decay
 and drop-out, and nothing it computes depends on who else is in the stack. One small network leaves a core waiting;
 nineteen of them as one batched product do not.
 """

@@ -27,8 +27,8 @@ def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> 
     most = None if method.budget else method.trials
     for shares in spread(max(len(ranges), 1), most if ranges else 1):
         logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
-        found = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
-        yield {**fixed, **found}
+        point = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
+        yield {**fixed, **point}
 
 
 def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:

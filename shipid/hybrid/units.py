@@ -78,8 +78,13 @@ class Units:
 
     def arrays(self) -> dict[str, Array]:
         """Return the arrays by name."""
-        found = {"mean": self.normaliser.mean, "std": self.normaliser.std, "weight": self.weight, "offset": self.offset}
-        return found if self.reflection is None else found | {"reflection": self.reflection}
+        stored = {
+            "mean": self.normaliser.mean,
+            "std": self.normaliser.std,
+            "weight": self.weight,
+            "offset": self.offset,
+        }
+        return stored if self.reflection is None else stored | {"reflection": self.reflection}
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:

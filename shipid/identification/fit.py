@@ -31,6 +31,9 @@ TOLERANCE = 1e-10  # relative change of objective and factors at which the searc
 MOST_EVALUATIONS = 200
 MOST_RESTARTS, STRIDES = 40, 8  # searches after the first; halvings of the Gauss-Newton step between them
 LEFT, RANK = 1e-6, 1e-9  # relative fall of the objective that is worth another search; relative rank of a Jacobian
+SAMPLES, AROUND = 6, 1e-2  # points around a kink; rise of the objective, relative, at their mean distance
+CROSSINGS, ROUNDS, MISSES = 4, 40, 4  # searches across kinks, steps of one, and those in turn that fail
+FALL = 1e-3  # relative fall of the objective that is worth a search across a kink
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
 NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
@@ -175,42 +178,86 @@ class _Search:
 
         Kinks of the equations (|v|, |r|) stop the short steps of a region that has become small, though a long
         Gauss-Newton step along the valley still goes down. Where one does, the search goes on from there with a fresh
-        region and scale.
+        region and scale. Where none does, a step from the derivatives around the kink may.
         """
         if self.stops():
             return "stopped"
         if not self.free.any():
             return "ok"
         word = self._minimise(tolerance, most)
+        if word != "ok":
+            return word
+        crossings = 0
         for _ in range(MOST_RESTARTS):
-            if word != "ok" or not self._stride():
-                break
-            word = self._minimise(tolerance, most)
-        return word
+            if not self._stride():
+                crossings += 1
+                if crossings > CROSSINGS or not self._across():
+                    break
+            if self._minimise(tolerance, most) == "stopped" or self.stops():
+                return "stopped"
+        return "stopped" if self.stops() else "ok"
 
     def _stride(self) -> bool:
-        """Take the longest Gauss-Newton step, halved again and again, that lowers the objective; False where none does.
-
-        The step is over the free factors that no bound stops. A fall of less than `LEFT` of the objective is none.
-        """
-        begin = self.best
+        """Take the Gauss-Newton step from the best point; False where it lowers the objective by less than `LEFT`."""
         free = self.free & ~self.pushed()
-        J = begin.J[:, free]
-        scale = np.linalg.norm(J, axis=0)
-        scale = np.where(scale > 0, scale, 1.0)
-        step = np.linalg.lstsq(J / scale, begin.f, rcond=RANK)[0]
-        worth = LEFT * begin.objective
-        if float(np.square(J / scale @ step).sum()) <= worth:
-            return False
+        scale, step, fall = _gauss_newton(self.best.J[:, free], self.best.f)
+        return fall > LEFT * self.best.objective and self._taken(free, step / scale, LEFT)
+
+    def _taken(self, free: NDArray[np.bool_], step: Array, least: float) -> bool:
+        """Take the longest of a step's halves that lowers the objective by the share `least`; False where none does."""
+        begin = self.best
         for halved in range(STRIDES):
             factors = begin.factors.copy()
-            factors[free] -= 0.5**halved * step / scale
-            factors = np.clip(factors, self.problem.unknown.low, self.problem.unknown.high)
-            there = evaluate(self.problem, factors, Point(begin.at.nuisances, begin.at.away))
-            if there.objective < begin.objective - worth:
+            factors[free] -= 0.5**halved * step
+            there = self._beside(begin, factors)
+            if there.objective < begin.objective * (1 - least):
                 self.last = self.best = there
                 return True
         return False
+
+    def _beside(self, begin: _Value, factors: Array) -> _Value:
+        """The evaluation at other factors, clipped to their bounds."""
+        factors = np.clip(factors, self.problem.unknown.low, self.problem.unknown.high)
+        return evaluate(self.problem, factors, Point(begin.at.nuisances, begin.at.away))
+
+    def _across(self) -> bool:
+        """Take steps where the best point is in a kink; True if they lower the objective by the share `FALL`.
+
+        In a kink the derivatives of one side promise a fall that the other side takes back. Each step is a
+        Gauss-Newton step for the residuals linearised at the best point and at `SAMPLES` points drawn around it.
+        Source: Burke, Lewis, Overton, SIAM Journal on Optimization 15 (2005) 751 (gradient sampling).
+        """
+        draw, around, misses, first = np.random.default_rng(0), AROUND, 0, self.best.objective
+        for _ in range(ROUNDS):
+            free = self.free & ~self.pushed()
+            if misses == MISSES or self.stops() or not self._promises(free):
+                break
+            if self._taken(free, self._sampled(free, draw, around), FALL / ROUNDS):
+                around, misses = min(3 * around, AROUND), 0
+            else:
+                around, misses = around / 10, misses + 1
+        return self.best.objective < first * (1 - FALL)
+
+    def _promises(self, free: NDArray[np.bool_]) -> bool:
+        """Whether the derivatives at the best point promise a fall by the share `FALL`, as they do in a kink."""
+        return _gauss_newton(self.best.J[:, free], self.best.f)[2] > FALL * self.best.objective
+
+    def _sampled(self, free: NDArray[np.bool_], draw: np.random.Generator, around: float) -> Array:
+        """Gauss-Newton step (free,) for the sum of the squares linearised at the best point and at points around it."""
+        begin = self.best
+        scale = _scale(begin.J[:, free])
+        _, s, axes = np.linalg.svd(begin.J[:, free] / scale, full_matrices=False)
+        s, axes = s[s > RANK * s[0]], axes[s > RANK * s[0]]
+        J, f = [begin.J[:, free] / scale], [begin.f]
+        for _ in range(SAMPLES):
+            factors = begin.factors.copy()
+            length = np.sqrt(around * begin.objective / len(s))
+            factors[free] += axes.T @ (length * draw.standard_normal(len(s)) / s) / scale
+            there = self._beside(begin, factors)
+            if np.isfinite(there.objective):
+                J.append(there.J[:, free] / scale)
+                f.append(there.f - there.J[:, free] @ (there.factors - begin.factors)[free])
+        return np.asarray(np.linalg.lstsq(np.vstack(J), np.concatenate(f), rcond=RANK)[0] / scale)
 
     def _minimise(self, tolerance: float, most: int) -> str:
         low, high = self.problem.unknown.low[self.free], self.problem.unknown.high[self.free]
@@ -249,6 +296,19 @@ class _Search:
         self.free = self.free & ~at_bound
         self.last = self.best = there
         return self.minimise(tolerance, most)
+
+
+def _scale(J: Array) -> Array:
+    """Norms (n,) of the columns of a Jacobian (m, n); 1 for a column of zeros."""
+    size = np.linalg.norm(J, axis=0)
+    return np.asarray(np.where(size > 0, size, 1.0), dtype=float)
+
+
+def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
+    """Scale (n,) of the columns, the scaled Gauss-Newton step (n,), and the fall of the squares that it promises."""
+    scale = _scale(J)
+    step = np.linalg.lstsq(J / scale, f, rcond=RANK)[0]
+    return scale, np.asarray(step, dtype=float), float(np.square(J / scale @ step).sum())
 
 
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:

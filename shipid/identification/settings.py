@@ -118,7 +118,7 @@ class Identify(documents.Checked, BaseModel):
 
     @property
     def signals(self) -> dict[str, float]:
-        """Fitted column -> standard deviation."""
+        """Fitted column -> standard deviation of its residuals, in the unit of the column."""
         return {column: width for name, width in self.weights.items() for column in columns_of(name)}
 
     @property

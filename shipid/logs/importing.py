@@ -39,7 +39,7 @@ Channel = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Imported:
-    """One log in SI units and the body's frame: what was repaired, how many rows were read, and the origin [deg]."""
+    """One log in SI units and body-fixed axes, with its repairs, the number of rows read and the origin [deg]."""
 
     rows: pd.DataFrame
     records: Records

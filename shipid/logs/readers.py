@@ -450,7 +450,7 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
             continue
         try:
             sentence = pynmea2.parse(dollar + body.strip(), check=True) if dollar else None
-            values = _said(sentence)
+            values = _values_of(sentence)
         except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError):
             sentence = None
         if sentence is None:
@@ -506,7 +506,7 @@ def _stamp(text: str, file: Path, row: int) -> float:
             raise DataError(message, file=file, path=f"row {row}") from None
 
 
-def _said(sentence: Any) -> dict[str, float]:
+def _values_of(sentence: Any) -> dict[str, float]:
     """Return the values of a sentence by column; none for an invalid fix (RMC, GLL: V; GGA: quality 0)."""
     kind = getattr(sentence, "sentence_type", "")
     if getattr(sentence, "status", "A") == "V" or str(getattr(sentence, "gps_qual", 1)) == "0":

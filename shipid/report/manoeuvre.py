@@ -63,8 +63,8 @@ class ManoeuvreContent(PageContent):
         if len(judged):
             met = int((judged["verdict"] == "met").sum())
             notes = {str(note) for note in judged["note"]}
-            said_of_all = f"; {notes.pop()}" if len(notes) == 1 and "" not in notes else ""
-            words = f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met{said_of_all}."
+            common = f"; {notes.pop()}" if len(notes) == 1 and "" not in notes else ""
+            words = f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met{common}."
             sentences.append(Sentence(words, "criteria"))
         return sentences
 

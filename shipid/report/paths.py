@@ -343,8 +343,8 @@ def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> 
         alone = _mean_end_error([window], {(name, "physics", 0)})
         text = f"{name} {', '.join(number(end) for end in ends)} m"
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
-    sizes_said = listed([str(size) for size in counts])
-    return f"Distance from the true place at the end, with N_D = {sizes_said}: {'; '.join(parts)}."
+    numbers = listed([str(size) for size in counts])
+    return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."
 
 
 SECTION = Section(

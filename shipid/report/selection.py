@@ -25,7 +25,7 @@ def spread(items: Sequence[str], count: int) -> list[str]:
 def families(content: ReportContent) -> pd.DataFrame:
     """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last.
 
-    The frame is shared by all who ask: not to be changed.
+    The frame is cached and shared: do not change it.
     """
     known = content.models[["model", "family", "A"]]
     trained = content.cells[["model", "family", "A"]]

@@ -140,7 +140,7 @@ class Ordered(Manoeuvre):
 
 
 class Turning(Ordered):
-    """Constant orders: a turn, unless the angle is zero."""
+    """Constant orders: a turn, or a straight run where the angle is zero."""
 
     orders: Annotated[dict[str, FiniteFloat], Field(description="key -> order, in the unit of the key")] = {}
 

@@ -58,7 +58,7 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
 
 def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
     """The manoeuvres of a document, which this vessel can perform."""
-    controls, found = Controls(vessel), []
+    controls, manoeuvres = Controls(vessel), []
     for place, block in enumerate(script.manoeuvre):
         kind, where = str(block.get("kind", "")), f"manoeuvre.{place}"
         if kind not in KINDS:
@@ -70,5 +70,5 @@ def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
         except DocumentError as error:
             key = (error.path or "").removeprefix("manoeuvre").removeprefix(".")
             raise DocumentError(error.message, path=f"{where}.{key}".rstrip(".")) from None
-        found.append(one)
-    return found
+        manoeuvres.append(one)
+    return manoeuvres

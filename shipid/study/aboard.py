@@ -170,8 +170,8 @@ def known_at(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame) -> Inst
         along = states_along(predictor.vessel, dataset.commands, seen.frame)
         hidden = along and {name: values[-1:] for name, values in along.items()}
         if physics.observer is not None:
-            found = observe(predictor.vessel, seen, physics.observer).columns
-            estimates = {name: values[-1:] for name, values in found.items()}
+            observed = observe(predictor.vessel, seen, physics.observer).columns
+            estimates = {name: values[-1:] for name, values in observed.items()}
     planned = None
     if predictor.commands == "known":
         planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
@@ -280,8 +280,8 @@ def _promise(played: Played) -> list[str]:
                 wider = float(at_level(bands.table(band.kind), level) / usual)
                 shares.append((level, float((reach[promised] <= wider).mean()) if promised.any() else np.nan))
         if shares and promised.any():
-            said = ", ".join(f"{level:.0%} held {share:.0%}" for level, share in sorted(dict(shares).items()))
-            lines.append(f"  by level, without alarm: {said}")
+            levels = ", ".join(f"{level:.0%} held {share:.0%}" for level, share in sorted(dict(shares).items()))
+            lines.append(f"  by level, without alarm: {levels}")
     else:
         lines.append(f"band of {band.level:.0%}: no whole path can be judged, the log ends before")
     if band.rate is not None:

@@ -94,7 +94,7 @@ class Case:
         return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
 
     def place(self, amount: int) -> int:
-        """Place of an amount in the table."""
+        """Index of an amount of data in the error table; ValueError if it is not there."""
         return self.table.amounts.index(amount)
 
     def H(self, model: str, amount: int) -> str:
@@ -141,7 +141,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     best = best_model(results)
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
-        return [*sentences, (f"No cell with physics has a result{where}, so nothing can be said yet.", "cells")]
+        return [*sentences, (f"No cell with physics has a result{where}, so there is no conclusion yet.", "cells")]
     case = Case(results, rows, best)
     chart = "map" if _has_map(rows) else "gain"
     pure = rows[rows["family"] == NO_MODEL]
@@ -215,7 +215,7 @@ def _limit(estimate: Estimate) -> str:
     if np.isfinite(estimate.low):
         low = f"under {_length(least)}" if estimate.low <= least else _length(estimate.low)
         bounds = f" [{low}, {f'over {_length(most)}' if estimate.high >= most else _length(estimate.high)}]"
-    return f"physics pays if its own error A is below about {_length(estimate.value)} m{bounds}"
+    return f"physics pays if its error A is below about {_length(estimate.value)} m{bounds}"
 
 
 def _length(value: float) -> str:
@@ -274,7 +274,7 @@ def _headline(case: Case) -> str:
     alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
     chosen = "" if case.smallest < case.largest else "best in validation; "
     text = (
-        f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error on its own) "
+        f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error alone) "
         f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
         f"below {metres(worst)}"
     )

@@ -131,7 +131,7 @@ class _Watch:
     """
 
     def __init__(self, client: Any) -> None:
-        self._client, self._alone, self._said = client, time.monotonic(), False
+        self._client, self._alone, self._warned = client, time.monotonic(), False
         self._looked, self.threads = float("-inf"), 1
 
     def look(self) -> None:
@@ -144,10 +144,10 @@ class _Watch:
         self._looked = time.monotonic()
         self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
         if workers:
-            self._alone, self._said = time.monotonic(), False
-        elif not self._said and time.monotonic() - self._alone > PATIENCE:
+            self._alone, self._warned = time.monotonic(), False
+        elif not self._warned and time.monotonic() - self._alone > PATIENCE:
             log.warning("the Dask scheduler has no workers: waiting for one")
-            self._said = True
+            self._warned = True
 
 
 @contextmanager

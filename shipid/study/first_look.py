@@ -41,7 +41,7 @@ FAR = (0.15, 0.4, 2.5, 7.0)  # of what may be off by more: lags and rates
 FINER = (0.82, 0.93, 1.07, 1.22)
 SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
-SAID = 0.15  # of the error that all groups together must save, else nothing is reported
+SAVING = 0.15  # of the error that all groups together must save, else nothing is reported
 PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
@@ -190,7 +190,7 @@ def first_look(
     alone = trial.errors([{}])[0]
     facts = tuple(_facts(vessel, windows, trial.instants()))
     changes = _explained(trial, alone)
-    if changes and changes[-1].error > (1 - SAID) * alone:
+    if changes and changes[-1].error > (1 - SAVING) * alone:
         changes = []
     return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
 

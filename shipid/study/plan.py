@@ -703,10 +703,10 @@ def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vesse
     """A vessel that the study names at a path: one that is known, or read now and known from now on."""
     if name not in known:
         try:
-            found = documents.find(name, "models", file.parent)
+            document = documents.find(name, "models", file.parent)
         except DocumentError as error:
             raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-        known[name] = load_vessel(str(found))
+        known[name] = load_vessel(str(document))
     return known[name]
 
 
@@ -737,10 +737,10 @@ def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
     families = document.get("family")
     for index, family in enumerate(families if isinstance(families, list) else []):
         if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():
-            yield f"family.{index}.identify", _family_of_its_own(str(family.get("name", "")), "identify")
+            yield f"family.{index}.identify", _separate_family(str(family.get("name", "")), "identify")
 
 
-def _family_of_its_own(name: str, block: str) -> str:
+def _separate_family(name: str, block: str) -> str:
     return (
         "an identified or observed family must be a separate family: remove the block here and add "
         f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
@@ -790,7 +790,7 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
-            raise DocumentError(_family_of_its_own(one.name, block), file=file, path=f"family.{index}.{block}")
+            raise DocumentError(_separate_family(one.name, block), file=file, path=f"family.{index}.{block}")
         index = by_name[one.extends]
     return index
 

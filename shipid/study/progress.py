@@ -51,7 +51,7 @@ class Watch:
         }
         self._ends: dict[Path, int] = {}
         self._cells: dict[Path, list[str]] = {}
-        self._found: dict[Path, dict[str, Searching]] = {}  # parts of a study have cells of the same names
+        self._searches: dict[Path, dict[str, Searching]] = {}  # parts of a study have cells of the same names
         self._last: dict[tuple[Path, str], int] = {}
         self._looks = 0
 
@@ -65,7 +65,7 @@ class Watch:
                 if file.stem in finished:
                     continue
                 self._read(file, trials)
-                known = self._found.get(file, {})
+                known = self._searches.get(file, {})
                 left += [(self._last[file, one.cell], one) for one in known.values() if one.done != one.count]
         return [one for _, one in sorted(left, key=lambda pair: -pair[0])]
 
@@ -96,7 +96,7 @@ class Watch:
 
     def _known(self, file: Path, cell: str, trials: Mapping[str, int | None]) -> Searching:
         method = next((name for name in trials if f"{WITH}{name}-N" in cell), "")
-        return self._found.get(file, {}).get(cell) or Searching(cell, 0, trials.get(method), inf)
+        return self._searches.get(file, {}).get(cell) or Searching(cell, 0, trials.get(method), inf)
 
     def _count(self, file: Path, cell: str, count: int, trials: Mapping[str, int | None]) -> None:
         self._keep(file, replace(self._known(file, cell, trials), count=count))
@@ -106,5 +106,5 @@ class Watch:
         self._keep(file, replace(known, done=known.done + 1, best=min(known.best, inf if value is None else value)))
 
     def _keep(self, file: Path, now: Searching) -> None:
-        self._found.setdefault(file, {})[now.cell] = now
+        self._searches.setdefault(file, {})[now.cell] = now
         self._last[file, now.cell] = self._looks

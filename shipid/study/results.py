@@ -286,9 +286,9 @@ def kinds_frame(results: Results) -> pd.DataFrame:
     for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
         mask = (kinds == kind) | (kind == ALL_KINDS)
         runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
-        for (model, source, N_D), found in errors.items():
-            mean = float(np.mean([error[:, mask].mean() for error in found]))
-            end = float(np.mean([error[-1, mask].mean() for error in found]))
+        for (model, source, N_D), distances in errors.items():
+            mean = float(np.mean([error[:, mask].mean() for error in distances]))
+            end = float(np.mean([error[-1, mask].mean() for error in distances]))
             rows.append(
                 {"kind": kind, "runs": runs, "model": model, "source": source, "N_D": N_D, "mean": mean, "end": end}
             )

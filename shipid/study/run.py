@@ -134,7 +134,7 @@ def run_study(
 def _run_parts(
     plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool
 ) -> Iterator[Event]:
-    """Run every part of a study in a folder of its own, one after the other; events count the cells of all.
+    """Run the parts of a study one after the other, each in its folder; events count the cells of all parts.
 
     What others work on is left to the end.
     """
@@ -215,10 +215,10 @@ def _other_session(folder: Path, claims: Claims, device: str) -> Iterator[str]:
 
 def session_on(device: str) -> dict[str, Any]:
     """What results depend on beside the plan, to the last digit: versions, engine, processor and device."""
-    found = machine()
-    packages = found["packages"]
-    session = {"shipid": packages.pop("shipid"), "engine": engine(), "processor": found["processor"]}
-    return {**session, "python": found["python"], "device": device, "packages": packages}
+    computer = machine()
+    packages = computer["packages"]
+    session = {"shipid": packages.pop("shipid"), "engine": engine(), "processor": computer["processor"]}
+    return {**session, "python": computer["python"], "device": device, "packages": packages}
 
 
 def _shared(
@@ -344,7 +344,7 @@ def refitted(
     refits = plan.study.bands.refits
     if not refits or not pairs:
         return {}
-    found = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
+    left_out = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
     names = {name for name, _ in pairs}
     data = apart(prepared.data, prepared.test)
     place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
@@ -365,14 +365,14 @@ def refitted(
                 continue
             again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
             for name in mine:
-                one, result, (errors, seconds) = known[name], again[name], found[name, way.name]
-                found[name, way.name] = errors, seconds + result.seconds + one.seconds
+                one, result, (errors, seconds) = known[name], again[name], left_out[name, way.name]
+                left_out[name, way.name] = errors, seconds + result.seconds + one.seconds
                 if result.corrector is None:
                     continue
                 predictor = _predictor(plan, inside, one.foundation, way, batch, result.corrector, rest)
                 instants = instants_of(plan, predictor.vessel, inside.data, part, one.estimates)
                 errors[:, judged] = part.future - predictor.predict(instants, one.test_paths)
-    return found
+    return left_out
 
 
 def _fitted(
@@ -470,8 +470,8 @@ def _accuracy(foundation: Foundation, prepared: Prepared) -> dict[str, Any]:
     """A, A_90, A_rms [m] of a foundation; not a number without physics, and where it depends on the batch."""
     if foundation.base is None or foundation.identify is not None:
         return dict.fromkeys(ACCURACY, np.nan)
-    found: Mapping[str, Any] = prepared.accuracy(foundation.name)
-    return {key: found[name] for key, name in ACCURACY.items()}
+    accuracy: Mapping[str, Any] = prepared.accuracy(foundation.name)
+    return {key: accuracy[name] for key, name in ACCURACY.items()}
 
 
 def _predictor(

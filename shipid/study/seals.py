@@ -95,16 +95,16 @@ def mend(folder: Path) -> Iterator[str]:
 
     Raises ResultError, before anything is removed, for a file that can be read and is not what was written.
     """
-    if found := faults(folder):
+    if damaged := faults(folder):
         again = faults(folder)  # another process may just have written some of these files
-        found = [fault for fault in found if fault in again]
-    for fault in found:
+        damaged = [fault for fault in damaged if fault in again]
+    for fault in damaged:
         if fault.kind == "edited":
             raise wrong(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
-    for name in dict.fromkeys(fault.seal for fault in found):
-        these = [fault for fault in found if fault.seal == name]
+    for name in dict.fromkeys(fault.seal for fault in damaged):
+        these = [fault for fault in damaged if fault.seal == name]
         for fault in these:
             (folder / fault.file).unlink(missing_ok=True)
         remove(folder, name)

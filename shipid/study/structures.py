@@ -43,7 +43,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 Array = NDArray[np.float64]
-Said = Callable[[str], object]
+Report = Callable[[str], object]
 FOLDS = 3
 SIDES = ("starboard", "port")
 MEASURES = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
@@ -164,7 +164,7 @@ def compare_structures(
     ahead: float | None = None,
     folds: int = FOLDS,
     level: float | None = LEVEL,
-    say: Said | None = None,
+    say: Report | None = None,
 ) -> Compared:
     """Compare structures of the hull on the same runs.
 
@@ -253,7 +253,7 @@ def _judged(
     fitted: Sequence[str],
     tested: Sequence[str],
     ahead: float,
-    report: Said,
+    report: Report,
 ) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 

@@ -342,7 +342,7 @@ def wind(given: Particulars) -> Values:
 class Screw:
     """A screw that drives the ship at its service speed.
 
-    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was found.
+    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was estimated.
     """
 
     D: float
@@ -427,21 +427,21 @@ def _bisect(function: Callable[[float], float], low: float, high: float) -> floa
 def propeller(given: Particulars, side: int = 0) -> Values:
     """One screw behind the hull; side -1 is that to port of two."""
     L, B, T = given.length, given.beam, given.draught
-    found, (w_P0, wake), drift = screw(given), _wake(given), "KVLCC2, mean of both sides"
-    t_P, deduction = _deduction(given, found.D)
-    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {found.notes['K_T']}"
+    chosen, (w_P0, wake), drift = screw(given), _wake(given), "KVLCC2, mean of both sides"
+    t_P, deduction = _deduction(given, chosen.D)
+    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {chosen.notes['K_T']}"
     return {
         "x": Value(-0.48 * L, "m", "-0.48 L"),
         **({"y": Value(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
         "z": Value(0.65 * T, "m", "0.65 T below the waterline: a guess"),
-        "D_p": Value(found.D, "m", found.notes["D_p"]),
+        "D_p": Value(chosen.D, "m", chosen.notes["D_p"]),
         "k_astern": Value(0.7, "-", "thrust astern over ahead of a fixed screw: a guess"),
         "t_P": Value(t_P, "-", deduction),
         "w_P0": Value(w_P0, "-", wake),
         "C_1": Value(2.0, "-", "KVLCC2, Yasukawa and Yoshimura (2015)"),
         "C_2_plus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
         "C_2_minus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
-        **{f'K_T."{name}"': Value(k, "-", series) for name, k in zip(("1", "J", "JJ"), found.K_T, strict=True)},
+        **{f'K_T."{name}"': Value(k, "-", series) for name, k in zip(("1", "J", "JJ"), chosen.K_T, strict=True)},
     }
 
 

@@ -115,7 +115,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
             row |= {f"{kind}": by_run(fresh.run[mine], held[mine]), f"{kind} runs": calibrated_kinds.count(kind)}
             if one.bands.promises(level, str(kind)):
                 known = one.bands.region(one.paths, fresh.columns, fresh.step, level, kind=str(kind))
-                row[f"{kind} said"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
+                row[f"{kind} named"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
         yield row
 
 
@@ -137,7 +137,7 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
         place = min(int(np.ceil(level * (len(scores) + 1))) - 1, len(scores) - 1)
         return circle(scale * scores[place])
 
-    found = {
+    regions = {
         "band": one.bands.region(one.paths, columns, fresh.step, level),
         "each step alone": one.bands.region(one.paths, columns, fresh.step, level, pointwise=True),
         "Bonferroni over steps": circle(np.quantile(off, 1 - (1 - level) / horizon, axis=1)[:, None]),
@@ -147,8 +147,8 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
     }
     if one.spread is not None:
         z = float(np.sqrt(stats.chi2.ppf(level, 2)))
-        found["spread of the ensemble"] = Region(ahead, *(np.maximum(z * one.spread[..., i], 1e-9) for i in (0, 1)))
-    for name, region in found.items():
+        regions["spread of the ensemble"] = Region(ahead, *(np.maximum(z * one.spread[..., i], 1e-9) for i in (0, 1)))
+    for name, region in regions.items():
         held = region.holds(errors).astype(float)
         row = {**keys, "runs": len(windows.spans), "level": level, "rival": name}
         yield {**row, "coverage": by_run(fresh.run, held), "width": float(region.radius.mean())}
@@ -206,26 +206,26 @@ def mean_interval(values: pd.Series[float]) -> str:
 
 def figures(kept: pd.DataFrame, beside: pd.DataFrame) -> dict[str, Any]:
     """Tables of the docs as label -> text; the mean over the methods of a world counts once."""
-    found: dict[str, Any] = {"worlds": kept["world"].nunique()}
+    summary: dict[str, Any] = {"worlds": kept["world"].nunique()}
     for (runs, level), part in kept.groupby(["runs", "level"]):
         per = part.groupby("world")[["coverage", "ratio"]].mean()
-        found[f"{runs} runs, {level:.0%}: coverage"] = mean_interval(per["coverage"])
-        found[f"{runs} runs, {level:.0%}: width / ideal"] = mean_interval(per["ratio"])
+        summary[f"{runs} runs, {level:.0%}: coverage"] = mean_interval(per["coverage"])
+        summary[f"{runs} runs, {level:.0%}: width / ideal"] = mean_interval(per["ratio"])
     for key in ("method", "ship"):
         for (one, level), part in kept[kept.runs == 22].groupby([key, "level"]):
-            found[f"22 runs, {one}, {level:.0%}: coverage"] = mean_interval(part.groupby("world")["coverage"].mean())
+            summary[f"22 runs, {one}, {level:.0%}: coverage"] = mean_interval(part.groupby("world")["coverage"].mean())
     for kind in ("Turning", "Steps", "Zigzag"):
         for level, part in kept[kept.runs == 22].groupby("level"):
             if kind in part:
                 enough = part[part[f"{kind} runs"] >= needed(float(str(level)))]
                 label = f"22 runs, {kind}, {level:.0%}: coverage"
-                found[label] = mean_interval(enough.groupby("world")[kind].mean())
-                found[f"{label}, kind said"] = mean_interval(enough.groupby("world")[f"{kind} said"].mean())
+                summary[label] = mean_interval(enough.groupby("world")[kind].mean())
+                summary[f"{label}, kind named"] = mean_interval(enough.groupby("world")[f"{kind} named"].mean())
     for rival, part in beside.groupby("rival"):
         width = part.width.to_numpy() / _of_band(beside, part)
-        found[f"22 runs, 90%, {rival}: coverage"] = mean_interval(part["coverage"])
-        found[f"22 runs, 90%, {rival}: width / band"] = mean_interval(pd.Series(width))
-    return found
+        summary[f"22 runs, 90%, {rival}: coverage"] = mean_interval(part["coverage"])
+        summary[f"22 runs, 90%, {rival}: width / band"] = mean_interval(pd.Series(width))
+    return summary
 
 
 def _of_band(beside: pd.DataFrame, part: pd.DataFrame) -> Array:
@@ -264,16 +264,16 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
             frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},
                                  index=range(len(prepared.test)))  # fmt: skip
             for level in (0.8, 0.9):
-                found = predictor.predict(instants, level=level)
-                frame[f"held {level}"] = found.region.holds(prepared.test.future - found.paths)
-                frame[f"end {level}"] = found.region.radius[-1]
+                prediction = predictor.predict(instants, level=level)
+                frame[f"held {level}"] = prediction.region.holds(prepared.test.future - prediction.paths)
+                frame[f"end {level}"] = prediction.region.radius[-1]
             parts.append(frame)
     return pd.concat(parts, ignore_index=True)
 
 
 def recorded_figures(folder: Path) -> dict[str, Any]:
     """Coverage over the zigzags with its exact interval, clustered by run, and the radius 15 s ahead."""
-    found: dict[str, Any] = {}
+    summary: dict[str, Any] = {}
     for commands in ("held", "known"):
         for model, part in recorded(folder, commands).groupby("model", sort=False):
             for level in (0.8, 0.9):
@@ -283,8 +283,8 @@ def recorded_figures(folder: Path) -> dict[str, Any]:
                 words = (
                     f"{held.mean():.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
                 )
-                found[f"real log, {commands}, {model}, {level:.0%}"] = words
-    return found
+                summary[f"real log, {commands}, {model}, {level:.0%}"] = words
+    return summary
 
 
 def identified_figures(replicates: int = 30) -> dict[str, Any]:
@@ -300,7 +300,7 @@ def identified_figures(replicates: int = 30) -> dict[str, Any]:
         away = np.array([one.parameters[path] / ship.parameters[path] - 1 for path in paths])
         return {name: truth[name] + float(slope @ away) for name, slope in slopes.items()}
 
-    found: dict[str, Any] = {}
+    summary: dict[str, Any] = {}
     for label, strength, horizon in (("white noise", 0.0, 0.0), ("process noise", 1.0, 0.0), ("doubled", 2.0, 0.0),
                                      ("doubled, 20 s", 2.0, 20.0), ("doubled, 10 s", 2.0, 10.0)):  # fmt: skip
         held: list[Array] = []
@@ -318,22 +318,22 @@ def identified_figures(replicates: int = 30) -> dict[str, Any]:
             right = rows["measure"].map(truth)
             held.append(((rows["low"] <= right) & (right <= rows["high"])).to_numpy())
         text = f"{np.mean(held):.3f}, worst measure {np.mean(held, axis=0).min():.3f}" if held else "-"
-        found[f"identified, {label}: coverage of 90%"] = text
-        found[f"identified, {label}: refused"] = f"{refused} of {replicates}"
-    return found
+        summary[f"identified, {label}: coverage of 90%"] = text
+        summary[f"identified, {label}: refused"] = f"{refused} of {replicates}"
+    return summary
 
 
 def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[str, float]]:
     """Change of each measure with each factor, and the measures of the truth."""
 
     def measure(one: Vessel) -> dict[str, float]:
-        found = {}
+        slopes = {}
         for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
             rows = _measured(one, kind, angles)
-            found |= {
+            slopes |= {
                 name: float(rows[name]["value"]) for name in (label.replace("_", " ") for label in COMPARED[kind])
             }
-        return found
+        return slopes
 
     truth = measure(ship)
     ends = [[measure(ship.with_values({path: ship.parameters[path] * (1 + side)})) for side in (0.02, -0.02)]
@@ -344,10 +344,10 @@ def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[
 def run(replicates: int = 200) -> dict[str, Any]:
     """Everything that docs/bands.md shows."""
     begun = time.perf_counter()
-    found = figures(*worlds(replicates, show=True))
-    found |= identified_figures()
+    results = figures(*worlds(replicates, show=True))
+    results |= identified_figures()
     data = os.environ.get("SHIPID_DATA")
     if data:
-        found |= recorded_figures(Path(data))
-    found["seconds"] = round(time.perf_counter() - begun, 1)
-    return found
+        results |= recorded_figures(Path(data))
+    results["seconds"] = round(time.perf_counter() - begun, 1)
+    return results

@@ -90,21 +90,21 @@ class Model:
     def motion(self, start: np.ndarray, orders: np.ndarray, theta: np.ndarray, step: float) -> np.ndarray:
         """u, v, r (N, 3) after every step with orders (N, 2) held over each; nan where it cannot go on."""
         count = len(orders)
-        found = solve_ivp(
+        solution = solve_ivp(
             lambda t, nu: self.rates(nu, orders[min(int(t / step), count - 1)], theta),
             (0.0, count * step),
             start,
             t_eval=step * np.arange(1, count + 1),
             rtol=FINENESS,
         )
-        return found.y.T if found.success else np.full((count, 3), np.nan)
+        return solution.y.T if solution.success else np.full((count, 3), np.nan)
 
 
 def _factors(name: str) -> list[str]:
     """`Y_v|r|` -> v, |r|, 1: three factors."""
-    rest, found = name.split("_", 1)[1], []
+    rest, factors = name.split("_", 1)[1], []
     while rest:
         size = 3 if rest[0] == "|" else 1
-        found.append(rest[:size])
+        factors.append(rest[:size])
         rest = rest[size:]
-    return [*found, "1", "1"][:3]
+    return [*factors, "1", "1"][:3]

@@ -24,7 +24,7 @@ class Ratio:
 
     Parameters
     ----------
-    group, label : where the figure stands.
+    group, label : where the figure is.
     value : measured now.
     recorded : measured when it was accepted; None if never.
     better : whether `higher` or `lower` is better.
@@ -61,8 +61,8 @@ class Ratio:
 
 def read_recorded() -> dict[str, dict[str, dict[str, Any]]]:
     """Read group -> label -> entry."""
-    found: dict[str, dict[str, dict[str, Any]]] = json.loads(RECORDED.read_text())
-    return found
+    document: dict[str, dict[str, dict[str, Any]]] = json.loads(RECORDED.read_text())
+    return document
 
 
 def compare(figures: Figures, recorded: Figures) -> list[Ratio]:

@@ -1,7 +1,7 @@
 """Whether the 95 % intervals cover: replicates of trials with noise whose truth is known, each fitted and judged.
 
 The 28.9 m Gunnerus, 20 runs of 80 s at 1 Hz, eight hull derivatives; the moment of inertia and its added part as well,
-which act as one sum and so cannot be told apart. Every fit starts from factors off by up to 20 %.
+which act as one sum and so cannot be separated. Every fit starts from factors off by up to 20 %.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ def run(replicates: int = REPLICATES) -> dict[str, Any]:
                 judged[horizon].append(_judged(vessel, data, horizon))
         for horizon in horizons:
             case = f"{noise}, {f'{horizon:g} s' if horizon else 'whole runs'}"
-            found = [one for one in judged[horizon] if one is not None]
-            result |= {f"{case}: {label}": value for label, value in _figures(found).items()}
-            result[f"{case}: did not converge"] = replicates - len(found)
+            converged = [one for one in judged[horizon] if one is not None]
+            result |= {f"{case}: {label}": value for label, value in _figures(converged).items()}
+            result[f"{case}: did not converge"] = replicates - len(converged)
     return result
 
 
 def _noisy(vessel: Vessel, seed: int, strength: float) -> Dataset:
-    """The same orders each time, with noise of their own, shaken by forces that many times as strong as declared."""
+    """The same orders each time, with other noise, shaken by forces that many times as strong as declared."""
     data, rng = trials(vessel, RUNS, STEPS), np.random.default_rng([seed, 5])
     columns = _shaken(vessel, data, rng, strength)
     return changed(data, **{name: columns[name] + rng.normal(0, s, len(data.frame)) for name, s in NOISE.items()})
@@ -96,8 +96,8 @@ def _judged(vessel: Vessel, data: Dataset, horizon: float) -> Statistics | None:
         start="base",
     )
     begin = dict(zip(paths, (1 + 0.2 * np.sin(np.arange(len(paths)))).tolist(), strict=True))
-    found = identify(vessel, data, data.runs, settings, start=begin)
-    return statistics(LinearFit.of(found)) if found.status == "ok" else None
+    solution = identify(vessel, data, data.runs, settings, start=begin)
+    return statistics(LinearFit.of(solution)) if solution.status == "ok" else None
 
 
 def _figures(judged: list[Statistics]) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def _figures(judged: list[Statistics]) -> dict[str, Any]:
     worst = min(free, key=lambda j: float(covered[j]))
     others = [j for j in range(len(paths)) if j not in free]
     named = [
-        any(set(PAIR) <= set(own.paths) for own in one.collinearity.combinations)
+        any(set(PAIR) <= set(combination.paths) for combination in one.collinearity.combinations)
         and not any(one.identifiable[paths.index(path)] for path in PAIR)
         for one in judged
     ]

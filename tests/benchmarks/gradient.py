@@ -47,10 +47,10 @@ def run() -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
             patch.setenv("XDG_CACHE_HOME", folder)
             begun = time.perf_counter()
-            found = gradient("native")
+            slopes = gradient("native")
             figures["compile [s]"] = round(time.perf_counter() - begun, 1)
         exact = gradient("torch")
-        assert np.allclose(found, exact, rtol=1e-8, atol=1e-9 * np.abs(exact).max())
+        assert np.allclose(slopes, exact, rtol=1e-8, atol=1e-9 * np.abs(exact).max())
     seconds = best_of(ways, ROUNDS)
     figures |= {f"{name} [ms]": round(1e3 * value, 2) for name, value in seconds.items()}
     return figures | {"gradient / rollout": round(seconds["gradient"] / seconds["rollout"], 2)}

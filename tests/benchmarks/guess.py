@@ -1,4 +1,4 @@
-"""Guesses on logs drawn by seed: share right, wrong and said, wrong and silent."""
+"""Guesses on logs drawn by seed: share right, wrong and reported, wrong and silent."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ def run(logs: int = 400, seed: int = SEED) -> dict[str, Any]:
         if verdict.word != "right" and words.total() - words["right"] <= WORST:
             drawn_as = {key: drawn.story[key] for key in ("style", "layout", "velocity", "length", "step", "time")}
             print(f"{number}: {verdict.word}: {'; '.join(verdict.reasons)} {drawn_as}", file=sys.stderr, flush=True)
-    shares = {"right": words["right"], "wrong and said": words["said"], "wrong and silent": words["silent"]}
+    shares = {"right": words["right"], "wrong and reported": words["reported"], "wrong and silent": words["silent"]}
     return {"logs": logs, "seed": seed} | {name: round(count / logs, 4) for name, count in shares.items()}

@@ -83,11 +83,11 @@ def command(runs: int = VOYAGES) -> dict[str, Any]:
         code = "from shipid.cli import main; main()"
         line = [sys.executable, "-c", code, "identify", "guess.toml", "log.parquet", "--settings", "settings.toml"]
         begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
-        said = subprocess.run(line, cwd=folder, check=True, capture_output=True, text=True).stdout
+        output = subprocess.run(line, cwd=folder, check=True, capture_output=True, text=True).stdout
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         processor = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
     return {
-        f"the command, {runs} runs: what it says": said.splitlines()[0],
+        f"the command, {runs} runs: what it says": output.splitlines()[0],
         f"the command, {runs} runs [s]": round(time.perf_counter() - begun, 1),
         f"the command, {runs} runs: processor [s]": round(processor, 1),
         f"the command, {runs} runs: memory [GB]": round(used.ru_maxrss / 1e6, 2),
@@ -108,32 +108,34 @@ def _noisy(vessel: Vessel, runs: int, steps: int = STEPS) -> Dataset:
 
 def _differences(vessel: Vessel, data: Dataset, fit: Problem, theta: np.ndarray) -> np.ndarray:
     """Weighted residuals of the model by hand."""
-    model, found = Model(vessel), []
+    model, differences = Model(vessel), []
     for _, rows in data.frame.groupby("run", sort=False):
         measured = rows[["u", "v", "r"]].to_numpy()
         orders = rows[["port.n", "port.alpha"]].to_numpy()[:-1]
-        found.append((model.motion(measured[0], orders, theta, 1.0) - measured[1:]) / fit.deviations)
-    return np.concatenate(found).ravel()
+        differences.append((model.motion(measured[0], orders, theta, 1.0) - measured[1:]) / fit.deviations)
+    return np.concatenate(differences).ravel()
 
 
 def by_hand(vessel: Vessel, data: Dataset, fit: Problem, begin: np.ndarray) -> Any:
     """`least_squares` (trf, defaults) with finite differences; its model is checked against shipid's first."""
-    model, own = Model(vessel), dynamics(vessel)
+    model, model_equations = Model(vessel), dynamics(vessel)
     nu, orders = np.array([3.0, 0.4, -0.03]), (2.0, 0.3)
-    told = [orders[name.endswith("alpha")] for name in own.commands]
+    commands = [orders[name.endswith("alpha")] for name in model_equations.commands]
     state = [0, 0, 0, *nu]
-    rates = own.rates(state, [], told, np.zeros(len(own.environment)), list(vessel.parameters.values()), np.zeros(3))
+    rates = model_equations.rates(
+        state, [], commands, np.zeros(len(model_equations.environment)), list(vessel.parameters.values()), np.zeros(3)
+    )
     assert np.allclose(model.rates(nu, orders, np.ones(fit.num_factors)), np.array(rates).ravel()[3:], rtol=1e-9)
     begun, best = time.perf_counter(), SimpleNamespace(x=begin, cost=np.inf, nfev=0, njev=0)
 
     def residuals(theta: np.ndarray) -> np.ndarray:
-        found = _differences(vessel, data, fit, theta)
+        differences = _differences(vessel, data, fit, theta)
         best.nfev += 1
-        if (found**2).sum() / 2 < best.cost:
-            best.x, best.cost = theta.copy(), float((found**2).sum() / 2)
+        if (differences**2).sum() / 2 < best.cost:
+            best.x, best.cost = theta.copy(), float((differences**2).sum() / 2)
         if time.perf_counter() - begun > PATIENCE:
             raise TimeoutError
-        return found
+        return differences
 
     try:
         return least_squares(residuals, begin)

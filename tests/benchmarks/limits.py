@@ -82,9 +82,9 @@ def bounds(figures: dict[str, float]) -> dict[str, float]:
 
 def shares() -> dict[str, Any]:
     """Share of each operation in the time that trials spend inside PyTorch's operations, the six greatest."""
-    with profile(activities=[ProfilerActivity.CPU]) as found:
+    with profile(activities=[ProfilerActivity.CPU]) as profiler:
         _tuning()()
-    spent = {event.key.removeprefix("aten::"): event.self_cpu_time_total for event in found.key_averages()}
+    spent = {event.key.removeprefix("aten::"): event.self_cpu_time_total for event in profiler.key_averages()}
     most = sorted(spent, key=spent.__getitem__, reverse=True)[:6]
     return {f"share of {name}": round(spent[name] / sum(spent.values()), 3) for name in most}
 

@@ -158,9 +158,9 @@ def run() -> dict[str, float]:
         made = world("gunnerus-28.9-6dof", 11, **given)  # type: ignore[arg-type]
         for name, vessel in vessels.items():
             for known in (True, False):
-                found = errors(vessel, made, known=known)
+                rms = errors(vessel, made, known=known)
                 text = f"{label}, {name}, {'known' if known else 'held'}"
-                figures |= {f"{text}: {key} [m]": round(value, 2) for key, value in found.items()}
+                figures |= {f"{text}: {key} [m]": round(value, 2) for key, value in rms.items()}
         begun = time.perf_counter()
         observe(vessels["nominal"], made.data)
         figures[f"{label}: update [ms]"] = round(1e3 * (time.perf_counter() - begun) / len(made.data.frame), 2)

@@ -79,11 +79,11 @@ def known_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: 
 
 def _known_tune(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     begun = time.thread_time()
-    found = tune_ridge(task, method.model_copy(update=LIGHT))
+    tuned = tune_ridge(task, method.model_copy(update=LIGHT))
     a = np.ones((64, 64))
     while time.thread_time() - begun < CELL * len(task.cases):
         a @ a
-    return found
+    return tuned
 
 
 def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:

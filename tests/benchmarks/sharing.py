@@ -35,12 +35,12 @@ TRAINED = {"method": [{"name": "trained", "kind": "path-trained", "trials": 1, "
 
 def run() -> dict[str, Any]:
     """Milliseconds a cell, and how they grow from 1,000 cells with 50 workers to 10,000 with 500."""
-    found = {cells: played(cells, workers) for cells, workers in SIZES.items()}
-    few, many = sorted(found)
+    costs = {cells: played(cells, workers) for cells, workers in SIZES.items()}
+    few, many = sorted(costs)
     result: dict[str, Any] = {}
-    for name in found[few]:
-        result |= {f"{name}, {cells} cells [ms a cell]": round(found[cells][name] / cells * 1e3, 3) for cells in found}
-        growth = found[many][name] / found[few][name] * few / many
+    for name in costs[few]:
+        result |= {f"{name}, {cells} cells [ms a cell]": round(costs[cells][name] / cells * 1e3, 3) for cells in costs}
+        growth = costs[many][name] / costs[few][name] * few / many
         result[f"{name}: time a cell, {many} / {few}"] = round(growth, 3)
     return result
 

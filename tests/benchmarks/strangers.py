@@ -41,7 +41,7 @@ def run(ships: int = SHIPS, first: int = FIRST) -> dict[str, Any]:
     passed = [0, 0]
     for seed in range(first, first + ships):
         try:
-            found = one(seed)
+            outcome = one(seed)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
                 raise
@@ -49,15 +49,15 @@ def run(ships: int = SHIPS, first: int = FIRST) -> dict[str, Any]:
             print(f"{seed}: {type(error).__name__}: {error}", file=sys.stderr)
             continue
         for place, far in enumerate(("1x", "2x")):
-            numbers = found[far]
+            numbers = outcome[far]
             passed[place] += numbers["passed"]
             figures[f"{seed} {far}"] = (
-                f"{found['words']}; {numbers['ahead']:g} s; alone {numbers['alone']:.2f}, corrected "
+                f"{outcome['words']}; {numbers['ahead']:g} s; alone {numbers['alone']:.2f}, corrected "
                 f"{numbers['corrected']:.2f}, compensated {numbers['compensated']:.2f}, true vessel "
                 f"{numbers['true']:.2f} of {numbers['constant']:.3g} m{'' if numbers['passed'] else ' MISSED'}"
             )
-        figures[f"{seed} said"] = found["said"][:400]
-        print(figures[f"{seed} 1x"], figures[f"{seed} 2x"], found["said"], sep="\n", file=sys.stderr, flush=True)
+        figures[f"{seed} warning"] = outcome["warning"][:400]
+        print(figures[f"{seed} 1x"], figures[f"{seed} 2x"], outcome["warning"], sep="\n", file=sys.stderr, flush=True)
     figures["within the goal at the proposed horizon, at twice that"] = f"{passed[0]}, {passed[1]} of {ships}"
     return figures
 
@@ -67,11 +67,11 @@ def one(seed: int, runs: int = 18) -> dict[str, Any]:
     ship, begun = stranger(seed, runs), time.perf_counter()
     with tempfile.TemporaryDirectory() as name, chdir(name):
         write_dataset(ship.dataset, Path("log.parquet"))
-        said = command("vessel", "new", *ship.options, "--out", "ship.toml")
-        said = command("study", "new", "--vessel", "./ship.toml", "--data", "log.parquet", "--out", "study.toml")
+        output = command("vessel", "new", *ship.options, "--out", "ship.toml")
+        output = command("study", "new", "--vessel", "./ship.toml", "--data", "log.parquet", "--out", "study.toml")
         document = tomllib.loads(Path("study.toml").read_text())
         ahead, most = document["prediction"]["ahead"], document["grid"]["N_D"][-1]
-        result: dict[str, Any] = {"words": ship.words, "said": _warning(said)}
+        result: dict[str, Any] = {"words": ship.words, "warning": _warning(output)}
         for times, far in ((1, "1x"), (2, "2x")):
             changes = SHORT | {"prediction.ahead": times * ahead, "grid.N_D": [most]}
             changes |= {"prediction.interval": FEWER * document["prediction"]["interval"]}
@@ -86,10 +86,10 @@ def one(seed: int, runs: int = 18) -> dict[str, Any]:
 
 def command(*words: str) -> str:
     """Output of a command; RuntimeError with its message where it fails."""
-    found = CliRunner().invoke(app, list(words))
-    if found.exit_code:
-        raise RuntimeError(f"{' '.join(words[:2])}: {found.exception or found.output}")
-    return found.output
+    result = CliRunner().invoke(app, list(words))
+    if result.exit_code:
+        raise RuntimeError(f"{' '.join(words[:2])}: {result.exception or result.output}")
+    return result.output
 
 
 def figures_of(ship: Stranger, plan: Any, folder: Path) -> dict[str, Any]:
@@ -116,9 +116,9 @@ def figures_of(ship: Stranger, plan: Any, folder: Path) -> dict[str, Any]:
     return numbers | {"passed": bool(numbers["compensated"] <= bound)}
 
 
-def _warning(said: str) -> str:
+def _warning(message: str) -> str:
     return " ".join(
-        line for line in said.splitlines() if "would explain" in line or "agree" in line or "constant u" in line
+        line for line in message.splitlines() if "would explain" in line or "agree" in line or "constant u" in line
     )
 
 

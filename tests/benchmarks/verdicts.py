@@ -27,8 +27,8 @@ def before(case: str) -> Rule:
         both = grids(rng, size, case, effect)
         if case == "S5":
             return by_seeds.S5(*both)
-        found: Verdict = getattr(by_seeds, case)(both[0])
-        return found
+        verdict: Verdict = getattr(by_seeds, case)(both[0])
+        return verdict
 
     return judge
 

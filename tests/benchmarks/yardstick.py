@@ -35,7 +35,7 @@ PIECES = Path("results/yardstick")
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the study `simulation` in a world of its own (top-level `seed`)."""
+    """A cell of the study `simulation` in another world (top-level `seed`)."""
 
     world: int
     N_D: int
@@ -73,16 +73,16 @@ def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, method: Method) -> dic
     folds = prepared.folds(plan, batch, windows, method.validation)
     case = Case(physics, prepared.pool_paths[cell.model][:, mask])
     start = time.process_time()
-    found = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
+    fit = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
     seconds = time.process_time() - start
-    assert found.corrector is not None
+    assert fit.corrector is not None
     instants = instants_of(plan, vessel, prepared.data, prepared.test)
-    paths = found.corrector.predict(physics, instants, prepared.test_paths[cell.model])
+    paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
     error = summary(position_error(paths, prepared.test.future))
     alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
     row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
-    chosen = dict(found.corrector.hyperparameters)
-    return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": found.trials}
+    chosen = dict(fit.corrector.hyperparameters)
+    return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": fit.trials}
 
 
 def main() -> None:

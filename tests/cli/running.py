@@ -17,7 +17,7 @@ from shipid.cli import app, main
 BAD = Path(__file__).parents[1] / "bad"
 
 
-def said(*arguments: object) -> str:
+def output_of(*arguments: object) -> str:
     """Output of a command that must succeed."""
     result = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if result.exception is not None and not isinstance(result.exception, SystemExit):
@@ -36,6 +36,6 @@ def ended(*arguments: object) -> tuple[object, str, str]:
 
 
 def shell(*arguments: object, code: str = "from shipid.cli import main; main()") -> subprocess.CompletedProcess[str]:
-    """Run the command as a user would, in a process of its own."""
+    """Run the command as a user would, in a new process."""
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

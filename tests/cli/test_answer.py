@@ -28,8 +28,8 @@ def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     assert result.exit_code == code, result.output
-    found: dict[str, Any] = json.loads(result.stdout, parse_constant=pytest.fail)  # NaN is no JSON
-    return found
+    document: dict[str, Any] = json.loads(result.stdout, parse_constant=pytest.fail)  # NaN is no JSON
+    return document
 
 
 def test_lists_and_one_vessel() -> None:

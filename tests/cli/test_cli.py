@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import shipid
 from shipid import cli
 from shipid.cli import app
-from tests.cli.running import BAD, ended, said, shell
+from tests.cli.running import BAD, ended, output_of, shell
 from tests.study.tiny import TINY
 
 
@@ -53,7 +53,7 @@ def test_help_names_every_command() -> None:
         (["data"], ("import", "check", "fetch", "segment", "measures")),
         (["study"], ("list", "variants", "screen", "run", "resume", "report")),
     ):
-        text = said(*group, "--help")
+        text = output_of(*group, "--help")
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
 
 
@@ -115,7 +115,7 @@ def test_mistakes_with_folders(tiny_run: Path) -> None:
         assert remedy in err
 
 
-def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, tiny_run: Path) -> None:
+def test_a_mistake_in_a_separate_process(tmp_path: Path, tiny_run: Path) -> None:
     """No traceback, no warning, exit 1: a damaged folder."""
     damaged = tmp_path / "damaged"
     damaged.mkdir()

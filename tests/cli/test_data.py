@@ -11,17 +11,17 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.study.store import DATASET
-from tests.cli.running import BAD, said
+from tests.cli.running import BAD, output_of
 from tests.logs.simulated import as_bridge, si_log
 
 
 def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    text = said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv")
+    text = output_of("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv")
     assert "41 rows in 1 runs -> plain.parquet" in text
     assert read_dataset("plain.parquet").runs == ["good"]
-    said("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
-    assert "10 of 10 checks passed" in said("data", "check", "deep/other.parquet")
+    output_of("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
+    assert "10 of 10 checks passed" in output_of("data", "check", "deep/other.parquet")
     refused = CliRunner().invoke(
         app, ["data", "import", str(BAD / "logs" / "plain.toml"), str(BAD / "logs" / "good.csv"), "--out", "a.csv"]
     )
@@ -40,12 +40,12 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
 def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     as_bridge(si_log()).to_csv("trial.csv", index=False)
-    text = said("data", "import", "--guess", "trial.csv")
+    text = output_of("data", "import", "--guess", "trial.csv")
     assert "draft -> trial.toml" in text
     assert "positive turns the ship to starboard" in text
-    said("data", "import", "trial.toml", "trial.csv")
-    assert "7 segments -> trial-segments.toml" in said("data", "segment", "trial.toml", "trial.csv")
-    assert "checks passed" in said("data", "check", "trial.parquet", "--html", "deep/page.html")
+    output_of("data", "import", "trial.toml", "trial.csv")
+    assert "7 segments -> trial-segments.toml" in output_of("data", "segment", "trial.toml", "trial.csv")
+    assert "checks passed" in output_of("data", "check", "trial.parquet", "--html", "deep/page.html")
     assert "plotly" in Path("deep/page.html").read_text(encoding="utf-8")
     for arguments, remedy in {
         ("import", "--guess", "trial.csv"): "not written over",
@@ -58,6 +58,6 @@ def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHIPID_DATA", str(shared_data))
-    file = Path(said("data", "fetch", "gunnerus-2022").strip())
+    file = Path(output_of("data", "fetch", "gunnerus-2022").strip())
     assert file.is_file()
     assert shared_data in file.parents

@@ -10,7 +10,7 @@ from shipid.cli import app
 
 
 def test_options_are_read_before_anything_is_loaded(tmp_path: Path) -> None:
-    """A mistake in an option is told before a dataset is read, in one line."""
+    """A mistake in an option is reported before a dataset is read, in one line."""
     for arguments, remedy in (
         (["--prior", "hull.derivatives.*"], "--prior: 'hull.derivatives.*': write paths=0.3"),
         (["--bounds", "hull.derivatives.*=[0.5"], "--bounds: 'hull.derivatives.*=[0.5': write paths=[0.5,2]"),

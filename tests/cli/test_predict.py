@@ -8,14 +8,14 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.study.store import read_rows
-from tests.cli.running import BAD, said
+from tests.cli.running import BAD, output_of
 
 
 def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A log with other commands than the ship's is one line."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ShipidError, match=r"needs this command; the data have propeller\.n"):
-        said(
+        output_of(
             *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", read_rows(tiny_run)["cell"].iloc[0]),
             *("--mapping", BAD / "logs" / "plain.toml"),
         )

@@ -42,7 +42,7 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--run", "zz 30"], "is no run"),
         (["--out", "page.txt"], "a page is an HTML file"),
@@ -50,8 +50,8 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
         (["--csv", "both.doc"], "csv"),
     ],
 )
-def test_a_mistake_is_one_line(log: Path, words: list[str], said: str) -> None:
+def test_a_mistake_is_one_line(log: Path, words: list[str], message: str) -> None:
     result = CliRunner().invoke(app, ["replay", SHIP, str(log), *words])
     assert isinstance(result.exception, ShipidError)
-    assert said in str(result.exception)
+    assert message in str(result.exception)
     assert "\n" not in str(result.exception)

@@ -8,13 +8,13 @@ from typing import get_args, get_type_hints
 
 from shipid.cli.schema import schema as command
 from shipid.schemas import SCHEMAS, schema
-from tests.cli.running import said
+from tests.cli.running import output_of
 
 
 def test_every_schema_is_printed_or_written(tmp_path: Path) -> None:
-    assert json.loads(said("schema", "settings")) == schema("settings")
+    assert json.loads(output_of("schema", "settings")) == schema("settings")
     file = tmp_path / "new" / "mapping.schema.json"
-    assert said("schema", "mapping", "--out", file).strip() == f"schema -> {file}"
+    assert output_of("schema", "mapping", "--out", file).strip() == f"schema -> {file}"
     assert json.loads(file.read_text()) == schema("mapping")
 
 

@@ -11,20 +11,22 @@ import pytest
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
-from tests.cli.running import ended, said
+from tests.cli.running import ended, output_of
 
 
 def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Table, page, CSV and log of one run; the log measures the same."""
     monkeypatch.chdir(tmp_path)
-    text = said("manoeuvre", "gunnerus-28.9", "zigzag", 20, 10, "--csv", "z.csv", "--log", "z.parquet", "--speed", 4)
+    text = output_of(
+        "manoeuvre", "gunnerus-28.9", "zigzag", 20, 10, "--csv", "z.csv", "--log", "z.parquet", "--speed", 4
+    )
     assert "approach at 4 m/s" in text
     assert "zigzag 20/10, first to starboard" in text
     assert Path("gunnerus-28.9-zigzag.html").is_file()
     table = pd.read_csv("z.csv").set_index("measure")
     assert table.loc["execute heading", "value"] == pytest.approx(10)
     assert f"{table.loc['overshoot 1', 'value']:.3g}" in text
-    text = said("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
+    text = output_of("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
     assert "1 runs measured, 0 not" in text
     again = pd.read_csv("again.csv").set_index("measure")
     pd.testing.assert_series_equal(again["value"], table["value"])
@@ -42,13 +44,13 @@ def test_manoeuvres_that_cannot_be() -> None:
 
 
 def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:
-    text = said("simulate", study, "--out", "runs.parquet")
+    text = output_of("simulate", study, "--out", "runs.parquet")
     dataset = read_dataset("runs.parquet")
     assert f"{len(dataset.runs)} runs, {len(dataset.frame)} rows -> runs.parquet" in text
     assert len(dataset.runs) == 12
     assert re.search(r"^ *test +-?\d+\.\d / -?\d+\.\d / -?\d+\.\d", text, re.MULTILINE)
     with pytest.raises(ShipidError, match=r"let the name end in \.parquet"):
-        said("simulate", study, "--out", "runs.csv")
+        output_of("simulate", study, "--out", "runs.csv")
 
 
 def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,11 +58,11 @@ def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     run = '[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nangle_deg = 20\nexecute_heading_deg = 20\nduration = 200\n'
     Path("runs.toml").write_text("step = 0.5\n" + run)
-    text = said("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.csv")
+    text = output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.csv")
     assert "1 runs, 201 rows -> log.csv" in text
-    said("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.parquet")
+    output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.parquet")
     log = pd.read_csv("log.csv")
     np.testing.assert_allclose(log["psi"], read_dataset(Path("log.parquet")).frame["psi"], rtol=1e-12)
     assert np.abs(log["psi"]).max() > np.radians(20)
     with pytest.raises(ShipidError, match="changes a study"):
-        said("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")
+        output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")

@@ -16,31 +16,31 @@ from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
-from tests.cli.running import said
-from tests.study.tiny import without_workers
+from tests.cli.running import output_of
+from tests.study.tiny import without_figures, without_workers
 
 
 def test_studies_and_variants(study: Path) -> None:
-    text = said("study", "list")
+    text = output_of("study", "list")
     assert all(f" {name} " in text for name in bundled("studies"))
-    text = said("study", "variants", study, "--save", "patches")
+    text = output_of("study", "variants", study, "--save", "patches")
     accuracy = re.findall(r"^ *(right|wrong-1|wrong-2|none) +(\S+)", text, re.MULTILINE)
     assert [name for name, _ in accuracy] == ["right", "wrong-1", "wrong-2", "none"]
     assert [value == "-" for _, value in accuracy] == [False, False, False, True]
     assert "3 patches -> patches" in text
     assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
-    text = said("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
+    text = output_of("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
     assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
 
 
 def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "compiler", lambda: None)
     with pytest.raises(ShipidError, match="--single: needs a C compiler"):
-        said("study", "screen", study, "--single")
+        output_of("study", "screen", study, "--single")
 
 
 def test_screen_writes_a_row_per_member(study: Path) -> None:
-    text = said("study", "screen", study, "--members", "6")
+    text = output_of("study", "screen", study, "--members", "6")
     frame = pd.read_csv("tiny-screen.csv")
     assert list(frame["member"]) == [f"wrong-{k}" for k in range(1, 7)]
     shown = re.search(r"^ *wrong +6 +0 +([\d. ]+)$", text, re.MULTILINE)
@@ -48,18 +48,18 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
     expected = np.quantile(frame["A"], [0.05, 0.25, 0.5, 0.75, 0.95])
     np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.005)
     assert len(re.findall(r"^ *wrong +hull\.derivatives\.\S+ +[+-]\d\.\d\d +[+-]\d\.\d\d *$", text, re.MULTILINE)) == 5
-    said("study", "screen", study, "wrong", "--members", "2", "--out", "new/rows.parquet")
+    output_of("study", "screen", study, "wrong", "--members", "2", "--out", "new/rows.parquet")
     pd.testing.assert_frame_equal(pd.read_parquet("new/rows.parquet"), frame[:2], rtol=1e-12)
     for arguments, remedy in (
         (["right"], "'right' draws no factor from a range"),
         (["--out", "rows.txt"], "ending in .parquet or .csv"),
     ):
         with pytest.raises(ShipidError, match=re.escape(remedy)):
-            said("study", "screen", study, *arguments)
+            output_of("study", "screen", study, *arguments)
 
 
 def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:
-    text = said("study", "variants", study)
+    text = output_of("study", "variants", study)
     rows = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")
     for name in ("right", "wrong-1", "wrong-2"):
         shown = re.search(rf"^ *{name} +(\S+)", text, re.MULTILINE)
@@ -69,7 +69,7 @@ def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Pat
 
 def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     """The whole way, as a user goes it; the run on one worker."""
-    text = said("study", "run", study, "--workers", "1")
+    text = output_of("study", "run", study, "--workers", "1")
     folder = next(Path("results").iterdir())
     assert re.fullmatch(r"tiny-[0-9a-f]{8}", folder.name)
     assert "8 of 8 cells to do" in text
@@ -86,17 +86,18 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     assert "Does the whole chain hold together?" in (folder / "summary.md").read_text()
 
     (folder / "report.html").unlink()
-    assert said("study", "report", folder).strip() == str(folder / "report.html")
+    with without_figures():
+        assert output_of("study", "report", folder).strip() == str(folder / "report.html")
     assert (folder / "report.html").is_file()
     next((folder / "batches").iterdir()).unlink()
-    with without_workers():
-        text = said("study", "resume", folder, "--workers", "1")
+    with without_workers(), without_figures():
+        text = output_of("study", "resume", folder, "--workers", "1")
     assert "missing: computed again" in text
     assert "4 of 8 cells to do" in text
-    assert said("study", "check", folder).strip() == "8 of 8 cells finished, 0 faults"
+    assert output_of("study", "check", folder).strip() == "8 of 8 cells finished, 0 faults"
 
     cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
-    text = said("predict", folder, folder / DATASET, "--cell", cell)
+    text = output_of("predict", folder, folder / DATASET, "--cell", cell)
     assert f"{12 * 21} instants, {12 * 21 * 5} points -> {cell}.parquet" in text
     assert len(pd.read_parquet(f"{cell}.parquet")) == 12 * 21 * 5
     assert "outside what the cell was trained on" in text
@@ -109,7 +110,8 @@ def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run:
     shutil.copytree(tiny_run, folder)
     (folder / "batches" / "N0004-s0.json").unlink()
     (folder / "seals" / "N0004-s0.sha256").unlink()
-    said("study", "report", folder)
+    with without_figures():
+        output_of("study", "report", folder)
     assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
     assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
 

@@ -38,7 +38,7 @@ class Still:
 
 
 def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a terminal there is a line when nothing was said for a while; on one, a second bar."""
+    """Without a terminal there is a line when nothing was printed for a while; on one, a second bar."""
     import io
 
     import rich.console

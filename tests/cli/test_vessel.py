@@ -9,15 +9,15 @@ import pytest
 
 from shipid.document import bundled
 from shipid.vessel.load import load_vessel
-from tests.cli.running import ended, said
+from tests.cli.running import ended, output_of
 
 
 def test_vessels() -> None:
-    text = said("vessel", "list")
+    text = output_of("vessel", "list")
     for name in bundled("models"):
         assert f" {name} " in text
     ship = load_vessel("gunnerus-28.9")
-    text = said("vessel", "show", "gunnerus-28.9")
+    text = output_of("vessel", "show", "gunnerus-28.9")
     assert ship.digest in text
     columns = {
         stem: re.search(rf"^\s*{stem}\.0 \.\.\. \.18 +(.+?)\s+-\s*$", text, re.MULTILINE)
@@ -37,12 +37,12 @@ def test_vessels() -> None:
 def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
     file = tmp_path / "my-ship.toml"
     order = ("vessel", "new", "--length", 33.9, "--beam", 9.6, "--draught", 2.6, "--block", 0.61, "--out", file)
-    text = said(*order, "--propulsor", "azimuth", "--ship-type", "research", "--speed", 5)
+    text = output_of(*order, "--propulsor", "azimuth", "--ship-type", "research", "--speed", 5)
     assert "none of them measured" in text
     assert "rpm hold 5 m/s" in text
     assert "course-stable" in text
     assert load_vessel(str(file)).parameters["thruster.port.y"] == pytest.approx(-2.688)
-    assert "First guess, 33.9 m" in said("vessel", "show", file)
+    assert "First guess, 33.9 m" in output_of("vessel", "show", file)
     written = file.read_text()
     status, _, err = ended(*order)
     assert (status, err) == (1, f"error: {file}: exists already: choose another name\n")

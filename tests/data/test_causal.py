@@ -42,7 +42,7 @@ def test_a_later_fix_changes_no_earlier_row(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_fixes_between_rows_reach_no_row_before_them(seed: int) -> None:
-    """Fixes on a clock of their own: whatever comes at a fix and later, rows before it hold what they held."""
+    """Fixes on another clock: whatever comes at a fix and later, rows before it hold what they held."""
     rng = np.random.default_rng(seed)
     rows = np.arange(80.0)
     fixes = np.cumsum(rng.uniform(2.0, 6.0, 60)) - 3.0

@@ -1,4 +1,4 @@
-"""A clean log passes every check; each defect put into it fails its own check."""
+"""A clean log passes every check; each defect put into it fails the check for it."""
 
 from collections.abc import Callable
 
@@ -52,7 +52,7 @@ def test_defect_fails_its_check(defect: Callable[[pd.DataFrame], pd.DataFrame], 
     assert caught <= failed(defect(frame))
 
 
-def test_shared_rows_are_told() -> None:
+def test_shared_rows_are_reported() -> None:
     assert "overlap" in failed(turning(T), turning(T + 10.0))
 
 
@@ -103,11 +103,11 @@ def test_noise_alone_is_no_finding() -> None:
         (lambda f: f.assign(psi=np.interp(f["t"] - 2.0, f["t"], f["psi"])), "latency"),
     ],
 )
-def test_a_defect_is_found_in_noise(seed: int, defect: Callable[[pd.DataFrame], pd.DataFrame], caught: str) -> None:
+def test_a_defect_is_detected_in_noise(seed: int, defect: Callable[[pd.DataFrame], pd.DataFrame], caught: str) -> None:
     assert any(caught in check for check in failed(defect(noisy(seed))))
 
 
-def test_a_run_contained_in_another_is_found_on_a_clock_of_its_own() -> None:
+def test_a_run_contained_in_another_is_detected_on_another_clock() -> None:
     whole = noisy(1)
     part = whole.iloc[len(whole) // 3 : len(whole) // 2].assign(t=lambda f: f["t"] - f["t"].iloc[0])
     part = part.reset_index(drop=True)

@@ -20,15 +20,15 @@ def test_constant_turn_without_noise(step: float) -> None:
     t = np.arange(0.0, 120.0, step)
     motion = turning(t)
     logged = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
-    found = smooth(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
+    smoothed = smooth(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
     inside = slice(3, -3)
-    np.testing.assert_allclose(found.state("u")[inside], 4.0, atol=0.01)
-    np.testing.assert_allclose(found.state("v")[inside], -0.5, atol=0.01)
-    np.testing.assert_allclose(found.state("r")[inside], 0.05, atol=1e-4)
+    np.testing.assert_allclose(smoothed.state("u")[inside], 4.0, atol=0.01)
+    np.testing.assert_allclose(smoothed.state("v")[inside], -0.5, atol=0.01)
+    np.testing.assert_allclose(smoothed.state("r")[inside], 0.05, atol=1e-4)
 
 
 def random_motion(random: np.random.Generator, t: np.ndarray, given: Noise) -> np.ndarray:
-    """The filter's own model in fine steps: u, v, r walk at random; (N, 6)."""
+    """The model of the filter in fine steps: u, v, r walk at random; (N, 6)."""
     fine, states = 20, np.zeros((len(t), 6))
     x = np.array([0.0, 0.0, 1.0, 5.0, 0.3, 0.02])
     states[0] = x
@@ -56,16 +56,16 @@ def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
         noisy = {
             name: truth[:, STATES.index(name)] + given.sample[name] * random.standard_normal(len(t)) for name in logged
         }
-        found = smooth(t, noisy, given)
-        error = (found.states - truth)[20, 3:]
-        nees.append(error @ np.linalg.solve(found.covariances[20][3:, 3:], error))
-        consistency.append(found.consistency)
+        smoothed = smooth(t, noisy, given)
+        error = (smoothed.states - truth)[20, 3:]
+        nees.append(error @ np.linalg.solve(smoothed.covariances[20][3:, 3:], error))
+        consistency.append(smoothed.consistency)
     low, high = chi2.ppf([0.001, 0.999], 3 * 120) / 120
     assert low < np.mean(nees) < high
     assert np.mean(consistency) == pytest.approx(1.0, abs=0.1)
 
 
-def test_wrong_noise_is_told() -> None:
+def test_wrong_noise_is_reported() -> None:
     """Samples that err three times more than declared give innovations above one."""
     random = np.random.default_rng(4)
     motion = turning(T)

@@ -199,7 +199,7 @@ def test_no_moment_is_seen_by_both_parts(runs: list[tuple[float, float]], data: 
     np.testing.assert_array_equal(lost, np.any(inside, axis=0) & ~validation)  # and none is lost in vain
 
 
-def test_runs_with_their_own_clocks_do_not_exclude_each_other() -> None:
+def test_runs_with_separate_clocks_do_not_exclude_each_other() -> None:
     windows = runs_at((0, 30), (0, 30), (0, 30), clock="run")
     training, validation = fold_masks(windows, ["b"])
     assert (training.sum(), validation.sum()) == (42, 21)

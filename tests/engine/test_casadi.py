@@ -50,8 +50,8 @@ def test_orders_of_many_samples_are_those_of_each() -> None:
     names = ((*model.state, *model.hidden), model.memory, model.commands, model.environment)
     inputs = [rng.uniform(0.1, 1.0, (len(each), 3 * BLOCK + 1)) for each in names]
     for count in (1, BLOCK, BLOCK + 1, 3 * BLOCK + 1):
-        found = orders_of(model, *(part[:, :count] for part in inputs), values)
-        assert found.shape == (len(model.ordered), count)
+        together = orders_of(model, *(part[:, :count] for part in inputs), values)
+        assert together.shape == (len(model.ordered), count)
         for k in {0, count // 2, count - 1}:
             alone = np.array(model.orders(*(part[:, k] for part in inputs), values)).ravel()
-            np.testing.assert_array_equal(found[:, k], alone)
+            np.testing.assert_array_equal(together[:, k], alone)

@@ -1,4 +1,4 @@
-"""The dict of engines: a new one is one line, `auto` chooses by size, and what an engine cannot do is said."""
+"""The dict of engines: a new one is one line, `auto` chooses by size, and what an engine cannot do is reported."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_an_engine_is_one_line(toy: str, draw_inputs: Draw) -> None:
     given = draw_inputs(SHIP, 3)
-    found = rollout(SHIP, **given, step=2.0, num_steps=6, every=3, keep=("east", "u"), engine=toy)
+    path = rollout(SHIP, **given, step=2.0, num_steps=6, every=3, keep=("east", "u"), engine=toy)
     for name in ("east", "u"):
         expected = given["start"][name] + np.array([0.0, 6.0, 12.0])[:, None]
-        np.testing.assert_allclose(found[name][:, 0], expected)
-    assert not found.diverged.any()
+        np.testing.assert_allclose(path[name][:, 0], expected)
+    assert not path.diverged.any()
 
 
 def test_a_new_engine_measures_from_its_paths(toy: str, draw_inputs: Draw) -> None:
     given, goal = draw_inputs(SHIP, 3), np.zeros((4, 3, 2))
-    found = distances(SHIP, **given, goal=goal, step=1.0, engine=toy)
+    measured = distances(SHIP, **given, goal=goal, step=1.0, engine=toy)
     path = rollout(SHIP, **given, step=1.0, num_steps=4, keep=("north", "east"), engine=toy)
     apart = position_error(path.states[1:, 0], goal)
-    np.testing.assert_allclose(found.total[0], apart.sum(axis=0))
-    np.testing.assert_array_equal(found.tally[0], tally(apart))
+    np.testing.assert_allclose(measured.total[0], apart.sum(axis=0))
+    np.testing.assert_array_equal(measured.tally[0], tally(apart))
 
 
 def test_an_engine_that_measures_is_asked_to(monkeypatch: pytest.MonkeyPatch, draw_inputs: Draw) -> None:
@@ -60,8 +60,8 @@ def test_an_engine_that_measures_is_asked_to(monkeypatch: pytest.MonkeyPatch, dr
         return np.full(shape, 42.0), np.zeros((shape[0], 1)), np.full(shape, job.step)
 
     monkeypatch.setitem(ENGINES, "ruler", Engine(drift, measure=measure))
-    found = distances(SHIP, **draw_inputs(SHIP, 3), goal=np.zeros((4, 3, 2)), step=1.0, engine="ruler")
-    assert (found.total == 42).all()
+    measured = distances(SHIP, **draw_inputs(SHIP, 3), goal=np.zeros((4, 3, 2)), step=1.0, engine="ruler")
+    assert (measured.total == 42).all()
 
 
 def test_a_wrong_name_lists_all_engines(toy: str, draw_inputs: Draw) -> None:

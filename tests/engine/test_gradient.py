@@ -48,8 +48,8 @@ def inputs(vessel: Vessel, draw_inputs: Draw, method: Method) -> tuple[Any, dict
     return given, {"step": 0.5, "num_steps": STEPS, "method": method, "tau_extra": PUSH[..., :num_dof]}
 
 
-def close(found: Array, exact: Array, tolerance: float) -> None:
-    np.testing.assert_allclose(found, exact, rtol=tolerance, atol=tolerance * max(np.abs(exact).max(), 1e-300))
+def close(computed: Array, exact: Array, tolerance: float) -> None:
+    np.testing.assert_allclose(computed, exact, rtol=tolerance, atol=tolerance * max(np.abs(exact).max(), 1e-300))
 
 
 @pytest.mark.slow
@@ -78,33 +78,33 @@ def test_parameters_by_finite_differences(draw_inputs: Draw, method: Method, eng
     ship = SHIP.with_values({"thruster.port.actuator": lag})
     given, options = inputs(ship, draw_inputs, method)
     options["memory"] = {name: np.full(SAMPLES, 0.9) for name in dynamics(ship).memory}
-    found = gradient(ship, given, options, engine, tuple(ship.parameters))
+    gradients = gradient(ship, given, options, engine, tuple(ship.parameters))
     values = np.array(list(ship.parameters.values()))
     widths = 1e-6 * np.maximum(np.abs(values), 1e-2)
     ends = values + np.concatenate([np.diag(widths), -np.diag(widths)])
     path = rollout(ship, **given, **options, parameters=ends, keep=KEEP, engine="casadi")
     ahead, behind = np.split(np.stack([LOSS(path.states[:, v])[0] for v in range(len(ends))], axis=1), 2, axis=1)
-    slopes, noise = (ahead - behind) / (2 * widths), 1e-14 * found.loss.max() / widths
+    slopes, noise = (ahead - behind) / (2 * widths), 1e-14 * gradients.loss.max() / widths
     weights = [name.startswith(("hull.learned", "thruster.port.actuator")) for name in ship.parameters]
-    assert (np.abs(found.parameters[:, weights]).max(axis=0) > 0).mean() > 0.9
+    assert (np.abs(gradients.parameters[:, weights]).max(axis=0) > 0).mean() > 0.9
     for column, name in enumerate(ship.parameters):
         scale = 2e-5 * np.abs(slopes[:, column]).max() + 10 * noise[column]
-        np.testing.assert_allclose(found.parameters[:, column], slopes[:, column], rtol=0, atol=scale, err_msg=name)
+        np.testing.assert_allclose(gradients.parameters[:, column], slopes[:, column], rtol=0, atol=scale, err_msg=name)
 
 
 @pytest.mark.parametrize("engine", ABLE)
 @pytest.mark.parametrize("method", ["euler", "rk4"])
 def test_force_and_start_by_finite_differences(draw_inputs: Draw, method: Method, engine: str) -> None:
     given, options = inputs(SHIP, draw_inputs, method)
-    found = gradient(SHIP, given, options, engine, ())
-    assert found.parameters.shape == (SAMPLES, 0)
+    gradients = gradient(SHIP, given, options, engine, ())
+    assert gradients.parameters.shape == (SAMPLES, 0)
     for step in range(STEPS):
         for axis in range(3):
             push = np.zeros((STEPS, SAMPLES, 3))
             push[step, :, axis] = 10.0 ** (1 + axis)
             ends = [losses(SHIP, given, options, tau_extra=options["tau_extra"] + sign * push) for sign in (1, -1)]
-            close(found.tau_extra[step, :, axis], (ends[0] - ends[1]) / (2 * push[step, :, axis]), 1e-5)
-    for name, slope in found.start.items():
+            close(gradients.tau_extra[step, :, axis], (ends[0] - ends[1]) / (2 * push[step, :, axis]), 1e-5)
+    for name, slope in gradients.start.items():
         ends = [
             losses(SHIP, {**given, "start": given["start"] | {name: given["start"][name] + h}}, options)
             for h in (1e-5, -1e-5)

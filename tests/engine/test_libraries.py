@@ -37,7 +37,7 @@ def forget() -> None:
 
 
 @pytest.fixture(autouse=True)
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(native, "_refused", [])
     monkeypatch.setattr(native, "OPTIONS", QUICK)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -126,10 +126,10 @@ def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.slow
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "open to others", "folder"])
 def test_a_rollout_mends_the_cache(
-    damage: str, own_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
+    damage: str, empty_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
 ) -> None:
     sound = numbers()
-    (library,) = own_cache.iterdir()
+    (library,) = empty_cache.iterdir()
     content = library.read_bytes()
     library.unlink()  # what is loaded stays as it is
     if damage == "folder":
@@ -143,21 +143,21 @@ def test_a_rollout_mends_the_cache(
             os.chown(library, 12345, 12345)
     forget()
     with caplog.at_level(logging.WARNING):
-        found = numbers()
+        states = numbers()
     if damage != "folder":
-        np.testing.assert_array_equal(found, sound)
+        np.testing.assert_array_equal(states, sound)
         assert load(library) is not None
-    np.testing.assert_allclose(found, sound, rtol=1e-9)
+    np.testing.assert_allclose(states, sound, rtol=1e-9)
     assert len([record for record in caplog.records if "anew" in record.message or "not used" in record.message]) <= 2
 
 
 def test_a_folder_of_another_user_is_not_used(
-    own_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
+    empty_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
 ) -> None:
     sound = numbers()
     if os.geteuid():
         pytest.skip("only root can give folders away")
-    os.chown(own_cache, 12345, 12345)
+    os.chown(empty_cache, 12345, 12345)
     forget()
     with caplog.at_level(logging.WARNING):
         np.testing.assert_array_equal(numbers(), sound)
@@ -166,17 +166,17 @@ def test_a_folder_of_another_user_is_not_used(
     assert "another user" in line
 
 
-def test_a_cache_that_others_can_write_is_closed(own_cache: Path, numbers: Callable[..., np.ndarray]) -> None:
-    own_cache.mkdir(parents=True)
-    own_cache.chmod(0o777)
+def test_a_cache_that_others_can_write_is_closed(empty_cache: Path, numbers: Callable[..., np.ndarray]) -> None:
+    empty_cache.mkdir(parents=True)
+    empty_cache.chmod(0o777)
     numbers()
-    assert stat.S_IMODE(own_cache.stat().st_mode) == 0o700
+    assert stat.S_IMODE(empty_cache.stat().st_mode) == 0o700
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
 def test_a_place_that_runs_no_programs(
     everywhere: bool,
-    own_cache: Path,
+    empty_cache: Path,
     numbers: Callable[..., np.ndarray],
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
@@ -185,7 +185,7 @@ def test_a_place_that_runs_no_programs(
     sound, load_it = numbers("native"), libraries.ctypes.CDLL
 
     def refused(name: str) -> Any:
-        if everywhere or name.startswith(str(own_cache)):
+        if everywhere or name.startswith(str(empty_cache)):
             raise OSError(f"{name}: failed to map segment from shared object: Operation not permitted")
         return load_it(name)
 

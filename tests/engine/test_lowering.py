@@ -37,7 +37,7 @@ def family(vessel: Vessel, count: int) -> np.ndarray:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def own_cache(libraries_kept: Path) -> Iterator[None]:
+def empty_cache(libraries_kept: Path) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(libraries_kept))
         yield
@@ -83,9 +83,9 @@ def test_functions_of_every_vessel(vessel: Vessel, draw_inputs: Draw, name: str)
     function = getattr(dynamics(vessel), name)
     inputs = dynamics_inputs(vessel, draw_inputs, 16)
     expected = by_casadi(function, inputs)
-    found = evaluate(function, inputs)
+    computed = evaluate(function, inputs)
     scale = np.abs(expected).max(axis=1, keepdims=True, initial=0.0)
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * scale.max(initial=0.0))
+    np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-12 * scale.max(initial=0.0))
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4"])
@@ -169,12 +169,12 @@ def test_a_diverged_member_spoils_no_other(draw_inputs: Draw, engine: Any) -> No
     spoilt[1, names.index("hull.derivatives.X_u|u|")] = 1e9  # drives, and how
     given["start"]["v"] = given["start"]["v"].copy()
     given["start"]["v"][2] = np.nan
-    found = rollout(vessel, **given, **options, parameters=spoilt)
+    path = rollout(vessel, **given, **options, parameters=spoilt)
     expected = np.zeros((3, 4), dtype=bool)
     expected[1], expected[:, 2] = True, True
-    np.testing.assert_array_equal(found.diverged, expected)
+    np.testing.assert_array_equal(path.diverged, expected)
     keep = ~expected
-    np.testing.assert_allclose(found.states[:, keep], sound.states[:, keep], rtol=1e-12)
+    np.testing.assert_allclose(path.states[:, keep], sound.states[:, keep], rtol=1e-12)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -190,8 +190,8 @@ def test_no_input_that_is_not_a_number_goes_unseen(draw_inputs: Draw, engine: An
         "parameter": parameters[0],
         "force": tau[:, 0],
     }[hidden][0] = np.nan
-    found = rollout(vessel, **given, step=1.0, num_steps=3, engine=engine, parameters=parameters, tau_extra=tau)
-    assert found.diverged[0].tolist() == [True, hidden == "parameter"]
+    path = rollout(vessel, **given, step=1.0, num_steps=3, engine=engine, parameters=parameters, tau_extra=tau)
+    assert path.diverged[0].tolist() == [True, hidden == "parameter"]
 
 
 def test_truths_count_as_numbers_in_arithmetic() -> None:
@@ -267,9 +267,9 @@ def test_a_sum_counts_every_component(what: str, draw_inputs: Draw) -> None:
     with_tau = np.zeros((1, 3, 3))
     with_tau[0, 0] = totals[what]
     pushed = Batch(**{**vars(batch), "tau_extra": with_tau})
-    found, _ = run_torch(summed, batch, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
+    computed, _ = run_torch(summed, batch, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
     expected, _ = run_torch(model, pushed, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
-    np.testing.assert_allclose(found, expected, rtol=1e-13)
+    np.testing.assert_allclose(computed, expected, rtol=1e-13)
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ SHIP = load_vessel("gunnerus-28.9")
 
 @pytest.fixture(autouse=True)
 def no_other_cache(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A cache for tests alone, so that a library is compiled once; `own_cache` is empty at first."""
+    """A cache for tests alone, so that a library is compiled once; `empty_cache` is empty at first."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "_refused", [])
     native._library.cache_clear()
@@ -41,7 +41,7 @@ def no_other_cache(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 
 @pytest.fixture
-def own_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:  # noqa: ARG001
+def empty_cache(no_other_cache: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:  # noqa: ARG001
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(native, "OPTIONS", QUICK)
     return tmp_path / "cache" / "shipid"
@@ -68,11 +68,11 @@ def test_every_operation_has_casadis_value(wanted: str, monkeypatch: pytest.Monk
     for first in range(0, len(values), 6):
         part = ca.vertcat(*(values[first : first + 6] + [ca.SX(0)] * 6)[:6])
         rates = ca.Function("rates", [x, *middle, p, tau], [ca.densify(part)], names, ["rates"])
-        found, _ = run_native(replace(model, rates=rates), batch, Job(1.0, 1, "euler", 1, tuple(range(6))))
+        states, _ = run_native(replace(model, rates=rates), batch, Job(1.0, 1, "euler", 1, tuple(range(6))))
         expected = np.hstack(
             [np.array(rates(start[:, k], [], [0] * 4, [0] * 2, parameters[0], [0] * 3)) for k in range(21)]
         )
-        np.testing.assert_allclose(found[1, 0].T - start, expected, rtol=1e-12, atol=1e-13, err_msg=str(first))
+        np.testing.assert_allclose(states[1, 0].T - start, expected, rtol=1e-12, atol=1e-13, err_msg=str(first))
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
@@ -85,7 +85,7 @@ def test_groups_and_remainders(count: int, draw_inputs: Callable[..., Any]) -> N
     np.testing.assert_array_equal(rollout(SHIP, **part, **options).states, whole[:, :, :count])
 
 
-def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]) -> None:
+def test_a_library_is_made_once(empty_cache: Path, draw_inputs: Callable[..., Any]) -> None:
     """Another variant, size or number of steps needs no compilation; another step or method does."""
 
     def run(step: float, method: Any, count: int) -> None:
@@ -93,23 +93,23 @@ def test_a_library_is_made_once(own_cache: Path, draw_inputs: Callable[..., Any]
         native._library.cache_clear()  # as a new process would find it
 
     run(1.0, "euler", 3)
-    (made,) = own_cache.iterdir()
+    (made,) = empty_cache.iterdir()
     before = made.stat().st_mtime_ns
     run(1.0, "euler", 30)
-    assert [entry.stat().st_mtime_ns for entry in own_cache.iterdir()] == [before]
+    assert [entry.stat().st_mtime_ns for entry in empty_cache.iterdir()] == [before]
     run(0.5, "euler", 3)
     run(1.0, "rk4", 3)
-    assert len(list(own_cache.iterdir())) == 3
+    assert len(list(empty_cache.iterdir())) == 3
 
 
-@pytest.mark.usefixtures("own_cache")
+@pytest.mark.usefixtures("empty_cache")
 def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "compiler", lambda: None)
     with pytest.raises(ShipidError, match="install gcc, or use 'torch'"):
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
 
 
-@pytest.mark.usefixtures("own_cache")
+@pytest.mark.usefixtures("empty_cache")
 def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "target", lambda *_: replace(target(), flags=("-mno-such-processor",)))
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
@@ -123,16 +123,16 @@ def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
 
 
 def test_a_broken_library_is_made_anew(
-    own_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
+    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
 ) -> None:
-    """What a full disk left behind, found by a later process: here another cache, as a loaded file stays loaded."""
+    """What a full disk left behind, read by a later process: here another cache, as a loaded file stays loaded."""
 
     def run() -> np.ndarray:
         native._library.cache_clear()
         return rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").states
 
     sound = run()
-    (library,) = own_cache.iterdir()
+    (library,) = empty_cache.iterdir()
     broken = tmp_path / "other" / "shipid" / library.name
     broken.parent.mkdir(parents=True)
     broken.write_bytes(b"")
@@ -141,13 +141,13 @@ def test_a_broken_library_is_made_anew(
     assert broken.stat().st_size > 0
 
 
-def test_threads_may_make_the_same_library_at_once(own_cache: Path) -> None:
+def test_threads_may_make_the_same_library_at_once(empty_cache: Path) -> None:
     """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
     model = dynamics(SHIP)
     with ThreadPoolExecutor(3) as pool:
         for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler") for _ in range(3)]:
             future.result()
-    assert len(list(own_cache.iterdir())) == 1
+    assert len(list(empty_cache.iterdir())) == 1
 
 
 def test_a_cache_that_cannot_be_written_is_no_obstacle(
@@ -168,12 +168,12 @@ def test_distances_are_those_of_the_paths(count: int, num_variants: int, draw_in
     parameters = np.array(list(SHIP.parameters.values())) * rng.uniform(0.9, 1.1, (num_variants, 1))
     options: dict[str, Any] = {"step": 1.0, "parameters": parameters}
     paths = rollout(SHIP, **given, num_steps=5, keep=("north", "east"), engine="casadi", **options)
-    expected = [position_error(paths.states[1:, own], goal) for own in range(num_variants)]
+    expected = [position_error(paths.states[1:, variant], goal) for variant in range(num_variants)]
     for engine in ("native", "casadi"):
-        found = distances(SHIP, goal=goal, **given, engine=engine, **options)  # type: ignore[arg-type]
-        np.testing.assert_allclose(found.total, [own.sum(axis=0) for own in expected], rtol=1e-12)
-        np.testing.assert_array_equal(found.tally, [tally(own) for own in expected])
-        assert not found.diverged.any()
+        measured = distances(SHIP, goal=goal, **given, engine=engine, **options)  # type: ignore[arg-type]
+        np.testing.assert_allclose(measured.total, [variant.sum(axis=0) for variant in expected], rtol=1e-12)
+        np.testing.assert_array_equal(measured.tally, [tally(variant) for variant in expected])
+        assert not measured.diverged.any()
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "esso-190k"])

@@ -61,11 +61,11 @@ def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> Non
     commands = {name: np.full(2, 2.5) if name.endswith(".n") else angle for name in model.commands}
     weather = {"V_w": np.full(2, 6.0), "beta_w": np.array([0.8, -0.8])}
     environment = {name: weather[name] for name in model.environment}
-    found = rollout(vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
+    motion = rollout(vessel, start, commands, environment, step=0.1, num_steps=500, method="rk4")
     for name, sign in (("north", 1), ("east", -1), ("psi", -1), ("u", 1), ("v", -1), ("r", -1)):
-        np.testing.assert_allclose(found[name][..., 1], sign * found[name][..., 0], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(motion[name][..., 1], sign * motion[name][..., 0], rtol=1e-9, atol=1e-9)
     to_starboard = 1 if "rudder.delta" in commands else -1  # delta > 0 turns there, alpha > 0 to port
-    assert to_starboard * found["psi"][-1, 0, 0] > 0.5
+    assert to_starboard * motion["psi"][-1, 0, 0] > 0.5
 
 
 @pytest.mark.slow
@@ -81,12 +81,12 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
     model = dynamics(bundled_vessel)
     start = zeros(model.state, len(u)) | {"u": u, "v": v, "r": r}
     held = zeros(model.commands, len(u)), zeros(model.environment, len(u))
-    found = rollout(bundled_vessel, start, *held, step=0.5, num_steps=1200, every=120, method="rk4")
-    energy = 0.5 * (found["u"] ** 2 + found["v"] ** 2 + 70 * found["r"] ** 2)[:, 0]  # r_66^2 = 70 m^2
-    assert not found.diverged.any()
+    path = rollout(bundled_vessel, start, *held, step=0.5, num_steps=1200, every=120, method="rk4")
+    energy = 0.5 * (path["u"] ** 2 + path["v"] ** 2 + 70 * path["r"] ** 2)[:, 0]  # r_66^2 = 70 m^2
+    assert not path.diverged.any()
     assert (energy <= energy[0]).all()
     assert (energy[-1] < 0.35 * energy[0]).all()
-    assert np.hypot(found["u"], found["v"])[-1].max() < 0.7
+    assert np.hypot(path["u"], path["v"])[-1].max() < 0.7
 
 
 def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, seed: int = 7) -> np.ndarray:
@@ -96,7 +96,7 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
     commands = {name: np.full(3, 0.7 if name.endswith("alpha") else 2.0) for name in given["commands"]}
     environment = {name: np.zeros(3) for name in given["environment"]}
     memory = {name: np.full(3, 0.6 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
-    found = rollout(
+    path = rollout(
         vessel,
         given["start"],
         commands,
@@ -106,7 +106,7 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
         method=method,
         memory=memory,
     )
-    return found.states[-1, 0, :, : 2 * len(vessel.axes)]
+    return path.states[-1, 0, :, : 2 * len(vessel.axes)]
 
 
 def smooth(vessel: Vessel) -> Vessel:
@@ -124,7 +124,7 @@ def test_order_of_the_integrator(vessel: Vessel, draw_inputs: Draw, method: Meth
     calm = smooth(vessel)
     exact = last_state(calm, draw_inputs, "rk4", 1 / 32)
     errors = [np.abs(last_state(calm, draw_inputs, method, step / 2**k) - exact).max(axis=1) for k in range(3)]
-    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink of its own
+    orders = np.median(np.log2(np.array(errors[:-1]) / errors[1:]), axis=1)  # a sample may meet a kink
     assert np.abs(orders - order).min() < 0.35
     assert orders[-1] == pytest.approx(order, abs=0.5)
 
@@ -189,18 +189,18 @@ def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
         tau[1, :, 0] = 5e3
     model = dynamics(vessel)
     start, commands = zeros(model.state, 2), zeros(model.commands, 2)
-    found = rollout(vessel, start, commands, step=1e-3, num_steps=3, tau_extra=tau, engine=engine)
+    path = rollout(vessel, start, commands, step=1e-3, num_steps=3, tau_extra=tau, engine=engine)
     gained = 5e3 / (410931.81 + 79320.5895) * 1e-3
     expected = {"steps": [0, 0, 1, 1]}.get(shape, [0, 1, 2, 3])
-    np.testing.assert_allclose(found["u"][:, 0, 1], gained * np.array(expected), rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(path["u"][:, 0, 1], gained * np.array(expected), rtol=1e-3, atol=1e-9)
 
 
 def test_lag_follows_its_analytic_solution(draw_inputs: Draw) -> None:
     vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
     given = draw_inputs(vessel, 2)
     order = given["commands"]["port.n"]
-    found = rollout(vessel, **given, memory={"port.n": np.zeros(2)}, step=1.0, num_steps=10)["actual.port.n"][:, 0]
-    np.testing.assert_allclose(found, order * (1 - np.exp(-np.arange(11)[:, None] / 2.0)), rtol=1e-12)
+    path = rollout(vessel, **given, memory={"port.n": np.zeros(2)}, step=1.0, num_steps=10)["actual.port.n"][:, 0]
+    np.testing.assert_allclose(path, order * (1 - np.exp(-np.arange(11)[:, None] / 2.0)), rtol=1e-12)
     reached = rollout(vessel, **given, step=1.0, num_steps=3)["actual.port.n"][:, 0]
     np.testing.assert_allclose(reached, np.tile(order, (4, 1)), rtol=1e-14)
 
@@ -213,10 +213,10 @@ def test_explicit_euler_uses_what_the_actuator_has_reached(engine: Any) -> None:
     model = dynamics(vessel)
     commands = {name: np.full(1, 2.0 if name.endswith(".n") else 0.0) for name in model.commands}
     still = {"port.n": np.zeros(1), "starboard.n": np.zeros(1)}
-    found = rollout(vessel, zeros(model.state), commands, step=1.0, num_steps=2, memory=still, engine=engine)
+    path = rollout(vessel, zeros(model.state), commands, step=1.0, num_steps=2, memory=still, engine=engine)
     n = 2.0 * (1 - np.exp(-0.5))
     gained = 2 * 0.8208 * 1025 * n**2 * 1.9**4 / (410931.81 + 79320.5895)
-    np.testing.assert_allclose(found["u"][:, 0, 0], [0.0, 0.0, gained], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(path["u"][:, 0, 0], [0.0, 0.0, gained], rtol=1e-6, atol=1e-6)
 
 
 def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
@@ -224,12 +224,12 @@ def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
     vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
     t, order = np.array([0.0, 1.0, 1.5, 4.0]), np.array([1.0, 2.0, 2.0, 3.0])
     others = {name: np.zeros(4) for name in dynamics(vessel).commands}
-    found = memory_along(vessel, {**others, "port.n": order}, t)
+    memory = memory_along(vessel, {**others, "port.n": order}, t)
     expected = [1.0, 1.0]
     for dt, held in ((0.5, 2.0), (2.5, 2.0)):
         expected.append(held + (expected[-1] - held) * np.exp(-dt / 2.0))
-    assert found is not None
-    np.testing.assert_allclose(found["port.n"], expected, rtol=1e-12)
+    assert memory is not None
+    np.testing.assert_allclose(memory["port.n"], expected, rtol=1e-12)
     assert memory_along(load_vessel("gunnerus-28.9"), others, t) is None
 
 

@@ -20,10 +20,10 @@ SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 def compiler() -> str:
     """A C compiler; the test is skipped where there is none."""
-    found = shutil.which("gcc") or shutil.which("cc") or shutil.which("clang")
-    if found is None:
+    program = shutil.which("gcc") or shutil.which("cc") or shutil.which("clang")
+    if program is None:
         pytest.skip("no C compiler")
-    return found
+    return program
 
 
 def write(files: Files, folder: Path) -> Path:
@@ -69,12 +69,12 @@ def paths(
     """Paths (T, S, 2) and results (S,) of the pure function."""
     given = {key: np.ascontiguousarray(values, dtype=kind) for key, values in model.inputs(instants).items()}
     function = getattr(loaded, f"{name}_path")
-    found = np.zeros((len(instants), model.layout.horizon, 2), dtype=kind)
+    predicted = np.zeros((len(instants), model.layout.horizon, 2), dtype=kind)
     results = [
-        function(*(pointer(given[key][i]) for key in model.layout.sizes), pointer(found[i]))
+        function(*(pointer(given[key][i]) for key in model.layout.sizes), pointer(predicted[i]))
         for i in range(len(instants))
     ]
-    return found.swapaxes(0, 1), np.array(results)
+    return predicted.swapaxes(0, 1), np.array(results)
 
 
 def bands(
@@ -84,6 +84,6 @@ def bands(
     now = np.ascontiguousarray(model.inputs(instants)["now"], dtype=float)
     function, around = getattr(loaded, f"{name}_band"), np.ascontiguousarray(path.swapaxes(0, 1))
     function.argtypes = [ctypes.c_void_p] * 2 + [ctypes.c_double] + [ctypes.c_int] * 2 + [ctypes.c_void_p]
-    found = np.zeros((len(instants), model.layout.horizon, 4))
-    results = [function(pointer(now[i]), pointer(around[i]), *asked, pointer(found[i])) for i in range(len(instants))]
-    return found.swapaxes(0, 1), np.array(results)
+    regions = np.zeros((len(instants), model.layout.horizon, 4))
+    results = [function(pointer(now[i]), pointer(around[i]), *asked, pointer(regions[i])) for i in range(len(instants))]
+    return regions.swapaxes(0, 1), np.array(results)

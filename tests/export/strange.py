@@ -141,7 +141,7 @@ def _normaliser(names, table):
 
 
 def _signs(rng, size):
-    """A signed permutation that is its own inverse."""
+    """A signed permutation that equals its inverse."""
     matrix, order = np.zeros((size, size)), rng.permutation(size)
     for a, b in zip(order[0::2], order[1::2], strict=False):
         matrix[a, b] = matrix[b, a] = rng.choice([-1.0, 1.0])

@@ -49,18 +49,18 @@ def agrees(predictor, instants, folder):
         path = predictor.predict(instants)
     whole = np.isfinite(path).all(axis=(0, 2))
     for asked in ASKED:
-        found, results = bands(loaded, "odd", exported, instants, path, *asked)
+        computed, results = bands(loaded, "odd", exported, instants, path, *asked)
         assert (results[~whole] == 4).all()
-        assert np.isnan(found[:, ~whole]).all()
+        assert np.isnan(computed[:, ~whole]).all()
         right = expected(predictor, instants, path, *asked)
         if right is None:
             assert (results[whole] == 32).all()
-            assert np.isnan(found).all()
+            assert np.isnan(computed).all()
             continue
         count += 1
         assert (results[whole] == 0).all()
-        np.testing.assert_allclose(found[:, whole, :2], right[:, whole, :2], rtol=NEAR, atol=0)
-        np.testing.assert_allclose(found[:, whole, 2:], right[:, whole, 2:], rtol=0, atol=NEAR)
+        np.testing.assert_allclose(computed[:, whole, :2], right[:, whole, :2], rtol=NEAR, atol=0)
+        np.testing.assert_allclose(computed[:, whole, 2:], right[:, whole, 2:], rtol=0, atol=NEAR)
     return count
 
 
@@ -98,9 +98,9 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
     for level, pointwise in ((0.005, False), (0.4, True), (0.905, False), (0.99, True)):
         right = rows_of(bands_.region(path, columns, 2.0, level, pointwise=pointwise))
         for i in range(12):
-            found = np.array(function(given[i], path[:, i].ravel(), level, pointwise, 0)).reshape(horizon, 4)
-            np.testing.assert_allclose(found[:, :2], right[:, i, :2], rtol=NEAR, atol=0)
-            np.testing.assert_allclose(found[:, 2:], right[:, i, 2:], rtol=0, atol=NEAR)
+            computed = np.array(function(given[i], path[:, i].ravel(), level, pointwise, 0)).reshape(horizon, 4)
+            np.testing.assert_allclose(computed[:, :2], right[:, i, :2], rtol=NEAR, atol=0)
+            np.testing.assert_allclose(computed[:, 2:], right[:, i, 2:], rtol=0, atol=NEAR)
 
 
 def test_faults_give_a_result_and_no_band(tmp_path):
@@ -111,9 +111,9 @@ def test_faults_give_a_result_and_no_band(tmp_path):
 
     def result(path=path, level=0.9, pointwise=0, kind=0, **changed):
         instants = replace(strange.instants, columns={**strange.instants.columns, **changed})
-        found, results = bands(loaded, "odd", exported, instants, path, level, pointwise, kind)
-        assert np.isnan(found[:, results > 0]).all()
-        assert np.isfinite(found[:, results == 0]).all()
+        computed, results = bands(loaded, "odd", exported, instants, path, level, pointwise, kind)
+        assert np.isnan(computed[:, results > 0]).all()
+        assert np.isfinite(computed[:, results == 0]).all()
         return set(results)
 
     assert result() == {0}
@@ -159,13 +159,13 @@ def test_casadi_gives_path_and_band(tmp_path):
         for i in range(4):
             entry = {key: values[i] for key, values in given.items()}
             ahead = path(**entry)["path"]
-            found = band(now=entry["now"], path=ahead, level=level, pointwise=pointwise)
-            assert found["promised"] == 1
+            output = band(now=entry["now"], path=ahead, level=level, pointwise=pointwise)
+            assert output["promised"] == 1
             np.testing.assert_allclose(np.array(ahead).T, right.paths[:, i], rtol=0, atol=1e-11)
             for name in ("along", "across"):
                 axis = getattr(right.region, name)[:, i]
-                np.testing.assert_allclose(np.array(found[name]).ravel(), axis, rtol=NEAR, atol=0)
-            np.testing.assert_allclose(np.array(found["ahead"]).T, right.region.ahead[:, i], rtol=0, atol=NEAR)
+                np.testing.assert_allclose(np.array(output[name]).ravel(), axis, rtol=NEAR, atol=0)
+            np.testing.assert_allclose(np.array(output["ahead"]).T, right.region.ahead[:, i], rtol=0, atol=NEAR)
     for asked in (
         {"level": 0.95},
         {"level": 0.0},

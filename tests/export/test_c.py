@@ -32,7 +32,7 @@ NEAR = 1e-12  # m
 INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME = 1, 2, 4, 8, 16
 
 
-def agree(found, results, strange):
+def agree(computed, results, strange):
     """Paths are those of Python, and results say what they must."""
     with np.errstate(all="ignore"):
         expected = strange.predictor.predict(strange.instants)
@@ -40,7 +40,7 @@ def agree(found, results, strange):
     np.testing.assert_array_equal((results & DIVERGED) > 0, ~whole)
     np.testing.assert_array_equal((results & OUTSIDE) > 0, strange.predictor.outside(strange.instants.columns))
     scale = max(1.0, float(np.abs(expected[:, whole]).max(initial=0.0)) / 100)
-    np.testing.assert_allclose(found[:, whole], expected[:, whole], rtol=0, atol=NEAR * scale)
+    np.testing.assert_allclose(computed[:, whole], expected[:, whole], rtol=0, atol=NEAR * scale)
 
 
 @pytest.mark.parametrize("kind", ["path-drawn", "recurrent"])
@@ -105,15 +105,15 @@ def test_a_thousand_instants_with_faults(kind, tmp_path):
     instants = Instants(
         columns, strange.instants.past, strange.instants.planned, strange.instants.hidden, strange.instants.estimates
     )
-    found, results = paths(loaded, "odd", exported, instants)
+    computed, results = paths(loaded, "odd", exported, instants)
     np.testing.assert_array_equal(results[faulty], INVALID)
-    assert np.isnan(found[:, faulty]).all()
+    assert np.isnan(computed[:, faulty]).all()
     sound = np.flatnonzero(~faulty & (np.abs(columns["u"]) < 100))
     with np.errstate(all="ignore"):
         expected = strange.predictor.predict(instants.select(sound))
     whole = np.isfinite(expected).all(axis=(0, 2))
     np.testing.assert_array_equal((results[sound] & DIVERGED) == 0, whole)
-    np.testing.assert_allclose(found[:, sound][:, whole], expected[:, whole], rtol=0, atol=NEAR)
+    np.testing.assert_allclose(computed[:, sound][:, whole], expected[:, whole], rtol=0, atol=NEAR)
     large = ~faulty & (np.abs(columns["u"]) >= 100)
     assert ((results[large] & OUTSIDE) > 0).all()
 
@@ -192,7 +192,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     assert loaded.odd_predict(pointer(kept), None, pointer(path)) == NO_PAST
     order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    found = []
+    predicted = []
     for i in range(len(t)):
         row = np.ascontiguousarray(rows.iloc[i][list(order)].to_numpy(dtype=float))
         row[order.index("psi")] = (row[order.index("psi")] + np.pi) % (2 * np.pi) - np.pi
@@ -204,9 +204,9 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
         result = loaded.odd_predict(pointer(kept), None, pointer(path))
         assert result == (NO_PAST if t[i] < t[0] + 4.0 - 1e-9 else 0)
         if t[i] > t[0] + 4.0:
-            found.append(path.copy())
+            predicted.append(path.copy())
     expected = predictor.predict(instants)
-    np.testing.assert_allclose(np.stack(found, axis=1), expected, rtol=0, atol=1e-10)  # filters amplify rounding
+    np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)  # filters amplify rounding
 
 
 def _size_of_struct(files, folder):
@@ -268,9 +268,9 @@ def test_single_precision_is_near(tmp_path):
     strange = drawn("path-drawn", 5, vessel="mariner")
     exported = model(strange.predictor)
     loaded = library(predictor_files(exported, "odd", Precision(single=True)), tmp_path)
-    found, _ = paths(loaded, "odd", exported, strange.instants, np.float32)
+    computed, _ = paths(loaded, "odd", exported, strange.instants, np.float32)
     expected = strange.predictor.predict(strange.instants)
-    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(computed - expected).max() < 1e-4 * np.abs(expected).max()
 
 
 def test_names_are_those_of_c():

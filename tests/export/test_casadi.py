@@ -41,11 +41,11 @@ def test_a_forest_is_refused_in_one_line(tmp_path):
 
 def hybrid(horizon):
     """A ship with networks at every step, whose plan is known: 10 s a step."""
-    found = drawn("one-step", 4, vessel="mariner").predictor
-    corrector = found.corrector
+    predictor = drawn("one-step", 4, vessel="mariner").predictor
+    corrector = predictor.corrector
     heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
     physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
-    return replace(found, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None)
+    return replace(predictor, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None)
 
 
 @pytest.mark.slow

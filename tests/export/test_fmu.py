@@ -56,13 +56,13 @@ def test_the_description_names_every_variable(ship):
         root = ET.fromstring(archive.read("modelDescription.xml"))
         source = archive.read("sources/ship.c").decode()
     vessel = variety()["actuators"]
-    found = {entry.get("name"): entry for entry in root.iter("ScalarVariable")}
-    assert {"port.n", "V_w", "load.X", "psi", "actual.port.alpha", "solver.step", "status"} <= set(found)
-    mass = found["inertia.m"]
+    variables = {entry.get("name"): entry for entry in root.iter("ScalarVariable")}
+    assert {"port.n", "V_w", "load.X", "psi", "actual.port.alpha", "solver.step", "status"} <= set(variables)
+    mass = variables["inertia.m"]
     assert mass.get("causality") == "parameter"
     assert float(mass.find("Real").get("start")) == vessel.parameters["inertia.m"]
     assert mass.find("Real").get("unit") == "kg"
-    assert all(entry.get("description") for entry in found.values())
+    assert all(entry.get("description") for entry in variables.values())
     assert root.get("guid") in source
 
 
@@ -109,12 +109,12 @@ def test_a_minute_of_a_vessel_is_that_of_python(ship, tmp_path):
             result = subprocess.run(command, capture_output=True, text=True)
             assert result.returncode == 0, result.stdout[-1000:] + result.stderr[-1000:]
         for step in (1.0, 0.5):
-            found = fmpy.simulate_fmu(
+            output = fmpy.simulate_fmu(
                 str(file), stop_time=SECONDS, step_size=step, output_interval=step, start_values=values, output=names
             )
             every = round(1.0 / step)
             for name in names:
-                np.testing.assert_allclose(found[name][::every], expected[name][:, 0, 0], rtol=1e-12, atol=1e-12)
+                np.testing.assert_allclose(output[name][::every], expected[name][:, 0, 0], rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -124,11 +124,11 @@ def test_a_minute_of_a_predictor_is_that_of_python(aboard, predictor):
     t = np.arange(0.0, SECONDS + 1)
     u, delta = 6 + np.sin(t / 10), 0.2 * np.sin(t / 7)
     signals = np.rec.fromarrays([t, u, delta, np.full_like(t, 1.2)], names="time,u,rudder.delta,propeller.n")
-    found = fmpy.simulate_fmu(
+    output = fmpy.simulate_fmu(
         str(aboard), stop_time=SECONDS, step_size=1.0, output_interval=1.0, input=signals,
         output=["x[6]", "y[6]", "x[1]", "instant", "alarm", "status"],
     )  # fmt: skip
-    at = np.round(found["instant"]).astype(int)
+    at = np.round(output["instant"]).astype(int)
     assert len(at) > 50
     orders = {"propeller.n": np.full(len(t), 1.2), "rudder.delta": delta}
     along = memory_along(predictor.vessel, orders, t)
@@ -138,9 +138,9 @@ def test_a_minute_of_a_predictor_is_that_of_python(aboard, predictor):
     hidden = {name: values[at] for name, values in along.items()}
     expected = predictor.predict(Instants(columns, planned=planned, hidden=hidden))
     for name, k, axis in (("x[6]", 5, 0), ("y[6]", 5, 1), ("x[1]", 0, 0)):
-        np.testing.assert_allclose(found[name], expected[k, :, axis], rtol=0, atol=1e-12)
-    assert not found["alarm"].any()
-    assert not found["status"].any()
+        np.testing.assert_allclose(output[name], expected[k, :, axis], rtol=0, atol=1e-12)
+    assert not output["alarm"].any()
+    assert not output["status"].any()
 
 
 class Instance:
@@ -265,22 +265,22 @@ def test_the_band_of_a_predictor_is_that_of_python(tmp_path):
     last = physics.horizon
     names = [f"{key}[{k}]" for key in ("along", "across", "ahead_x", "ahead_y") for k in (1, last)]
     for level in (0.9, 0.3, 0.95):
-        found = fmpy.simulate_fmu(
+        output = fmpy.simulate_fmu(
             str(file), stop_time=20.0, step_size=1.0, output_interval=1.0, input=signals,
             output=[*names, "instant", "status"], start_values={"level": level},
         )  # fmt: skip
         if level == 0.95:
-            assert (found["status"] == 32).all()
-            assert np.isnan(found["along[1]"]).all()
+            assert (output["status"] == 32).all()
+            assert np.isnan(output["along[1]"]).all()
             continue
-        at = np.round(found["instant"]).astype(int)
+        at = np.round(output["instant"]).astype(int)
         zero = np.zeros(len(at))
         columns = {"u": u[at], "v": zero, "r": zero, "psi": zero, "rudder.delta": delta[at], "V_w": zero}
         columns["propeller.n"] = np.full(len(at), 1.2)
         region = predictor.predict(Instants(columns), level=level).region
         for k in (1, last):
-            np.testing.assert_allclose(found[f"along[{k}]"], region.along[k - 1], rtol=1e-10)
-            np.testing.assert_allclose(found[f"across[{k}]"], region.across[k - 1], rtol=1e-10)
-            np.testing.assert_allclose(found[f"ahead_x[{k}]"], region.ahead[k - 1, :, 0], rtol=0, atol=1e-10)
-            np.testing.assert_allclose(found[f"ahead_y[{k}]"], region.ahead[k - 1, :, 1], rtol=0, atol=1e-10)
-        assert not found["status"].any()
+            np.testing.assert_allclose(output[f"along[{k}]"], region.along[k - 1], rtol=1e-10)
+            np.testing.assert_allclose(output[f"across[{k}]"], region.across[k - 1], rtol=1e-10)
+            np.testing.assert_allclose(output[f"ahead_x[{k}]"], region.ahead[k - 1, :, 0], rtol=0, atol=1e-10)
+            np.testing.assert_allclose(output[f"ahead_y[{k}]"], region.ahead[k - 1, :, 1], rtol=0, atol=1e-10)
+        assert not output["status"].any()

@@ -31,8 +31,8 @@ def test_networks_run_elsewhere(kind, tmp_path):
         session = runtime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
         names = json.loads(session.get_modelmeta().custom_metadata_map["inputs"])
         rows = np.stack([table[name] for name in names], axis=1).astype(np.float32 if single else np.float64)
-        (found,) = session.run(None, {"inputs": rows})
-        np.testing.assert_allclose(found, expected, rtol=0, atol=near * np.abs(expected).max())
+        (computed,) = session.run(None, {"inputs": rows})
+        np.testing.assert_allclose(computed, expected, rtol=0, atol=near * np.abs(expected).max())
 
 
 def test_what_has_no_networks_is_refused_in_one_line(tmp_path):

@@ -20,10 +20,10 @@ def main() -> int:
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     begun = time.perf_counter()
-    found = campaign(given.scale, given.seed, tuple(filter(None, given.only.split(","))))
-    print(table(found))
+    by_row = campaign(given.scale, given.seed, tuple(filter(None, given.only.split(","))))
+    print(table(by_row))
     print(f"{time.perf_counter() - begun:.0f} s, seed {given.seed}, scale {given.scale:g}")
-    return int(any(one.failed for outcomes in found.values() for one in outcomes))
+    return int(any(one.failed for outcomes in by_row.values() for one in outcomes))
 
 
 if __name__ == "__main__":

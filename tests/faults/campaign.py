@@ -46,7 +46,7 @@ SMALLEST = 1.0 / 100
 
 def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, list[Outcome]]:
     """Outcomes of every row, `scale` fifths of its trials; seeds begin at a million times `seed`."""
-    found = {}
+    rows = {}
     for name, row in ROWS.items():
         if only and name not in only:
             continue
@@ -59,8 +59,8 @@ def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, l
             trials.append(one)
             if one.failed:
                 print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
-        found[f"{name} ({row.made})"] = trials
+        rows[f"{name} ({row.made})"] = trials
         failed = sum(one.failed for one in trials)
         words = f"{count} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
         print(f"{name}: {words}", file=sys.stderr, flush=True)
-    return found
+    return rows

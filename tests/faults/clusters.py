@@ -49,9 +49,9 @@ def _process(kind: str, options: list[str], place: Path) -> Iterator[subprocess.
 
 def _address(log: Path) -> str:
     for _ in range(600):
-        found = re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text())
-        if found:
-            return found[1]
+        match = re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text())
+        if match:
+            return match[1]
         time.sleep(0.1)
     raise Failure("no cluster", log.read_text()[-500:])
 

@@ -49,10 +49,10 @@ def vessel(seed: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "x.toml"
         file.write_bytes(mutated("vessel", seed)[0])
-        found = load_vessel(str(file))
-        model = dynamics(found)
+        loaded = load_vessel(str(file))
+        model = dynamics(loaded)
         rest = [{name: np.ones(1) for name in names} for names in (model.state, model.commands, model.environment)]
-        rollout(found, *rest, step=0.5, num_steps=2, engine="casadi")
+        rollout(loaded, *rest, step=0.5, num_steps=2, engine="casadi")
 
 
 def mapping(seed: int) -> None:
@@ -60,9 +60,9 @@ def mapping(seed: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "x.toml"
         file.write_bytes(mutated("mapping", seed)[0])
-        found = read_mapping(file)
+        parsed = read_mapping(file)
         with patch("shipid.logs.catalogue.fetch", side_effect=AssertionError):
-            import_log(found, BAD / "logs" / "good.csv")
+            import_log(parsed, BAD / "logs" / "good.csv")
 
 
 def chain(seed: int) -> None:
@@ -153,6 +153,6 @@ def memory(seed: int) -> None:
             prepare(plan, obtain(plan))
         except DocumentError as error:
             if "GiB" not in error.message:
-                raise Failure("not said", str(error)) from None
+                raise Failure("no line of an error", str(error)) from None
             return
         raise Failure("not refused", f"{path} = {value:g}")

@@ -84,15 +84,15 @@ def intercepted(instead: Callable[..., Any]) -> Iterator[None]:
 
 def stored(folder: Path) -> dict[str, bytes]:
     """What a run has computed: bytes of the predictors, and the rows without the seconds they took."""
-    found = {f"cells/{file.name}": file.read_bytes() for file in (folder / "cells").glob("*.npz")}
+    files = {f"cells/{file.name}": file.read_bytes() for file in (folder / "cells").glob("*.npz")}
     for file in (folder / "batches").glob("*.json"):
         rows = json.loads(file.read_text())
         for row in rows:
             row.pop("seconds")
             row["trials"] = [{k: v for k, v in trial.items() if k != "seconds"} for trial in row["trials"]]
-        found[f"batches/{file.name}"] = json.dumps(rows).encode()
-    found["study.toml"] = (folder / "study.toml").read_bytes()
-    return found
+        files[f"batches/{file.name}"] = json.dumps(rows).encode()
+    files["study.toml"] = (folder / "study.toml").read_bytes()
+    return files
 
 
 def child(work: Callable[[], Any], limit: float = 60.0) -> int:
@@ -137,9 +137,9 @@ def finish(process: int, limit: float = 60.0) -> int:
 
 def _same_as_reference(folder: Path, what: str) -> None:
     """Raise Failure unless a folder holds the numbers of an undisturbed run, sealed, and nothing else."""
-    wanted, found = reference()[1], stored(folder)
-    for name in sorted(wanted.keys() | found.keys()):
-        if wanted.get(name) != found.get(name):
+    wanted, present = reference()[1], stored(folder)
+    for name in sorted(wanted.keys() | present.keys()):
+        if wanted.get(name) != present.get(name):
             raise Failure("mixed", what, name)
     if faults := seals.faults(folder):
         raise Failure("not sealed", what, faults[0].file)
@@ -279,9 +279,9 @@ def damaged(seed: int) -> None:
         words = [_damage(place / "run", rng) for _ in range(rng.choice([1, 1, 2, 3]))]
         what = ", ".join(words)
         with suppress(ShipidError):
-            found = read_results(place / "run")
+            results = read_results(place / "run")
             wanted = reference()[1]
-            for row in found.cells["cell"]:
+            for row in results.cells["cell"]:
                 if (place / "run" / "cells" / f"{row}.npz").read_bytes() != wanted[f"cells/{row}.npz"]:
                     raise Failure("mixed", what, "read without a word")
         with suppress(ShipidError):
@@ -326,8 +326,8 @@ def _damage(folder: Path, rng: random.Random) -> str:
 def _edit(file: Path, rng: random.Random) -> None:
     """Other numbers in a sound file of its kind."""
     if file.suffix == ".npz":
-        with np.load(file) as found:
-            arrays = dict(found)
+        with np.load(file) as archive:
+            arrays = dict(archive)
         name = rng.choice(sorted(arrays))
         if arrays[name].dtype.kind == "f" and arrays[name].size:
             arrays[name] = np.where(rng.random() < 0.5, np.nan, arrays[name] * 1.01)
@@ -348,8 +348,8 @@ def predictor(seed: int) -> None:
     rng = random.Random(seed)
     run = reference()[0]
     file = rng.choice(sorted((run / "cells").glob("*.npz")))
-    with a_place() as place, np.load(file) as found:
-        arrays: dict[str, Any] = dict(found)
+    with a_place() as place, np.load(file) as archive:
+        arrays: dict[str, Any] = dict(archive)
         for _ in range(rng.choice([1, 1, 2])):
             name = rng.choice(sorted(arrays))
             if name == "header" or rng.random() < 0.3:
@@ -438,6 +438,6 @@ def dataset(seed: int) -> None:
             )()
             table = table.set_column(number, field.name, column)
         pyarrow.parquet.write_table(table, place / "x.parquet")
-        found = read_dataset(place / "x.parquet")
-        _ = (found.runs, found.commands, found.digest)
-        check_dataset(found)
+        data = read_dataset(place / "x.parquet")
+        _ = (data.runs, data.commands, data.digest)
+        check_dataset(data)

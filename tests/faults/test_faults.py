@@ -24,23 +24,23 @@ QUICK = {
 @pytest.mark.parametrize("name", QUICK)
 @pytest.mark.filterwarnings("ignore")
 def test_a_few_faults(name: str) -> None:
-    found = [outcome(ROWS[name].trial, seed) for seed in range(5000, 5000 + QUICK[name])]
-    assert not [one for one in found if one.failed], table({name: found})
+    drawn = [outcome(ROWS[name].trial, seed) for seed in range(5000, 5000 + QUICK[name])]
+    assert not [one for one in drawn if one.failed], table({name: drawn})
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(ROWS.keys() - QUICK.keys()))
 @pytest.mark.filterwarnings("ignore")
 def test_a_few_slow_faults(name: str) -> None:
-    found = [outcome(ROWS[name].trial, seed) for seed in range(2)]
-    assert not [one for one in found if one.failed], table({name: found})
+    drawn = [outcome(ROWS[name].trial, seed) for seed in range(2)]
+    assert not [one for one in drawn if one.failed], table({name: drawn})
 
 
 def test_mutations_are_drawn_by_seed() -> None:
     assert [mutated("study", seed) for seed in range(20)] == [mutated("study", seed) for seed in range(20)]
-    found = {mutated(kind, seed)[0] for kind in ("study", "vessel", "mapping") for seed in range(50)}
+    texts = {mutated(kind, seed)[0] for kind in ("study", "vessel", "mapping") for seed in range(50)}
     sources = {file.read_bytes() for kind in ("study", "vessel", "mapping") for file in documents(kind).values()}
-    assert len(found - sources) > 100
+    assert len(texts - sources) > 100
     assert len(MUTATIONS) > 5
 
 
@@ -64,10 +64,10 @@ def _fails(_: int) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # a fork in a process with threads
-def test_every_way_to_fail_is_told_apart() -> None:
+def test_every_way_to_fail_is_distinguished() -> None:
     """The campaign can fail: each outcome is recognised, and the next trial runs."""
     kinds = {"hang": _hangs, "died": _dies, "mixed": _wrong, "traceback": _fails}
     for kind, work in kinds.items():
-        found = list(outcomes(work, [3, 4], 0.3))
-        assert [(one.trial, one.kind) for one in found] == [(3, kind), (4, kind)]
-        assert f"2 {kind}" in table({"row": found})
+        trials = list(outcomes(work, [3, 4], 0.3))
+        assert [(one.trial, one.kind) for one in trials] == [(3, kind), (4, kind)]
+        assert f"2 {kind}" in table({"row": trials})

@@ -1,4 +1,4 @@
-"""Trials in a process of their own: each ends in an outcome, and none may hang or bring the campaign down."""
+"""Each trial in a new process: each ends in an outcome, and none may hang or bring the campaign down."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Outcome:
 
 
 class Failure(Exception):
-    """A trial that found what must not be; the first argument is the kind of failure."""
+    """A trial that showed what must not be; the first argument is the kind of failure."""
 
 
 def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HANG) -> Iterator[Outcome]:
@@ -53,14 +53,14 @@ def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HA
         while left:
             try:
                 waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
-                found = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
+                end = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
             except EOFError:
                 process.join()
-                found = Outcome(left[0], "died", f"exit code {process.exitcode}")
+                end = Outcome(left[0], "died", f"exit code {process.exitcode}")
             begun = time.monotonic()
             left.pop(0)
-            yield found
-            if found.kind in ("hang", "died"):
+            yield end
+            if end.kind in ("hang", "died"):
                 break
         process.kill()
         process.join()
@@ -102,9 +102,9 @@ def _short(error: BaseException) -> str:
 def table(rows: dict[str, list[Outcome]]) -> str:
     """A line per row of the campaign, and one per failure."""
     lines = [f"{'row':34} {'trials':>6}  outcomes"]
-    for name, found in rows.items():
-        counts = Counter(one.kind for one in found)
-        lines.append(f"{name:34} {len(found):6}  " + ", ".join(f"{n} {kind}" for kind, n in counts.most_common()))
-    for name, found in rows.items():
-        lines += [f"FAILED {name}, trial {one.trial}: {one.kind}: {one.words}" for one in found if one.failed]
+    for name, trials in rows.items():
+        counts = Counter(one.kind for one in trials)
+        lines.append(f"{name:34} {len(trials):6}  " + ", ".join(f"{n} {kind}" for kind, n in counts.most_common()))
+    for name, trials in rows.items():
+        lines += [f"FAILED {name}, trial {one.trial}: {one.kind}: {one.words}" for one in trials if one.failed]
     return "\n".join(lines)

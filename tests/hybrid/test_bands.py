@@ -117,7 +117,7 @@ def test_tracks_are_unit_vectors_even_at_rest() -> None:
     np.testing.assert_array_equal(ahead[:, 2], np.tile([1.0, 0.0], (HORIZON, 1)))
 
 
-def test_the_nearest_point_is_found() -> None:
+def test_the_nearest_point_is_the_nearest() -> None:
     rng = np.random.default_rng(3)
     points, centres = rng.normal(1e4, 1.0, (40, 3)), rng.normal(1e4, 1.0, (7, 3))
     by_hand = np.sqrt(((points[:, None] - centres) ** 2).mean(axis=2)).min(axis=1)

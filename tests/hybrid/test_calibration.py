@@ -65,7 +65,7 @@ def test_an_ellipse_is_tighter_where_errors_are_along_the_track() -> None:
     assert bands.along[-1] > 1.5 * bands.across[-1]
 
 
-def test_kinds_have_radii_of_their_own() -> None:
+def test_each_kind_has_its_radii() -> None:
     """Zigzags whose errors are three times those of turning circles: each kind holds its share for itself."""
     held = {"zigzag": [], "turning": []}
     for seed in range(16):

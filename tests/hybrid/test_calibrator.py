@@ -27,13 +27,13 @@ def test_the_trajectory_is_seen_at_even_moments_and_zero_where_it_diverged():
     here = world(ship(), ship(), runs=2, seconds=20)
     inputs = TrajectoryInputs(here.commands, moments=3)
     instants = here.test.instants()
-    found = inputs.of_physics(here.physics, instants)
-    assert sorted({name.split(".")[0] for name in found}) == ["physics-10", "physics-15", "physics-5"]
-    np.testing.assert_array_equal(found["physics-15.y"], here.physics.states(instants)["y"][-1])
+    columns = inputs.of_physics(here.physics, instants)
+    assert sorted({name.split(".")[0] for name in columns}) == ["physics-10", "physics-15", "physics-5"]
+    np.testing.assert_array_equal(columns["physics-15.y"], here.physics.states(instants)["y"][-1])
     broken = instants.columns["u"].copy()
     broken[2] = np.nan
     spoilt = inputs.of_physics(here.physics, replace(instants, columns={**instants.columns, "u": broken}))
     assert spoilt["physics-15.y"][2] == 0.0
-    np.testing.assert_array_equal(np.delete(spoilt["physics-15.y"], 2), np.delete(found["physics-15.y"], 2))
+    np.testing.assert_array_equal(np.delete(spoilt["physics-15.y"], 2), np.delete(columns["physics-15.y"], 2))
     assert inputs.of_physics(replace(here.physics, vessel=None), instants) == {}
     assert TrajectoryInputs.from_header(inputs.header()) == inputs

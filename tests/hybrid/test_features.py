@@ -84,7 +84,7 @@ def test_a_missing_column_is_named(columns):
 
 @pytest.fixture(scope="module")
 def past():
-    """Windows of the ship's own Euler runs with 8 s of past."""
+    """Windows of Euler runs of the ship with 8 s of past."""
     return cut_windows(weaving("ab"), horizon=5, past=8)
 
 
@@ -98,9 +98,9 @@ def test_history_and_turned_by_hand(past):
 
 
 def test_exact_physics_has_no_past_error(past):
-    found = past_error(Physics(SHIP, 5, 1.0), past.instants(), 8.0)
-    assert set(found) == {"x", "y", "u", "v", "r"}
-    for values in found.values():
+    errors = past_error(Physics(SHIP, 5, 1.0), past.instants(), 8.0)
+    assert set(errors) == {"x", "y", "u", "v", "r"}
+    for values in errors.values():
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
 
 

@@ -8,11 +8,11 @@ from tests.hybrid.worlds import FINE, fitted, ship, world
 AGO = 4.0  # s
 
 
-def late(nus, told):
+def late(nus, commands):
     """A force of the velocities and orders four seconds ago."""
     then = max(len(nus) - 1 - round(AGO / FINE), 0)
     u, v, r = nus[then].T
-    return np.stack([-3e3 * (u - 3.5), -2e4 * v - 2e5 * r, -1.5e6 * r + 2e5 * told[then]["port.alpha"]], 1)
+    return np.stack([-3e3 * (u - 3.5), -2e4 * v - 2e5 * r, -1.5e6 * r + 2e5 * commands[then]["port.alpha"]], 1)
 
 
 def test_home_a_force_that_comes_late():

@@ -24,22 +24,22 @@ SPACE: dict[str, Any] = {"scale": Span(1.0, 16.0), "layers": Span(1, 3, log=Fals
 def rows(count: int, seed: int = 0, first: int = 0) -> list[dict[str, Any]]:
     """Trials drawn by a seed: some diverged, some values just outside of their span, with one fixed setting."""
     rng = np.random.default_rng(seed)
-    found = []
+    trials = []
     for number in range(first, first + count):
         bad = rng.random() < 0.2
         params = {"scale": float(np.exp(rng.uniform(0, np.log(16)))), "layers": int(rng.integers(1, 4))}
         if rng.random() < 0.2:
             params["scale"] = math.nextafter(16.0, 17.0)
         params |= {"mirror": float(rng.integers(0, 2)), "offset": 1.5}
-        found.append(
+        trials.append(
             {"number": number, "params": params, "value": math.nan if bad else float(rng.lognormal(0, 5)),
              "seconds": float(rng.random()), "epochs": int(rng.integers(0, 9)),
              "state": "diverged" if bad else "complete"}
         )  # fmt: skip
-    return found
+    return trials
 
 
-def told(kept: list[dict[str, Any]]) -> str:
+def as_text(kept: list[dict[str, Any]]) -> str:
     return repr([{**row, "params": dict(sorted(row["params"].items()))} for row in kept])
 
 
@@ -49,9 +49,9 @@ def test_trials_come_back_to_the_digit(tmp_path: Path, seed: int) -> None:
     Journal(tmp_path / "t.log").add(written, SPACE)
     read = Journal(tmp_path / "t.log")
     for cell, mine in written.items():
-        assert told(read.rows(cell)) == told(mine)
+        assert as_text(read.rows(cell)) == as_text(mine)
     read.add({"b": rows(3, seed, first=4)}, SPACE)
-    assert told(Journal(tmp_path / "t.log").rows("b")) == told(written["b"] + rows(3, seed, first=4))
+    assert as_text(Journal(tmp_path / "t.log").rows("b")) == as_text(written["b"] + rows(3, seed, first=4))
     assert Journal(tmp_path / "t.log").rows("unknown") == []
 
 
@@ -81,11 +81,11 @@ def test_a_write_that_was_cut_off_anywhere_loses_its_last_trial_at_most(tmp_path
     cut = int(np.random.default_rng(seed).integers(len(whole), len(longer)))
     file.write_bytes(longer[:cut])
     again = Journal(file)
-    assert told(again.rows("a")) == told(rows(5, 1))
+    assert as_text(again.rows("a")) == as_text(rows(5, 1))
     again.add({"a": rows(1, 3, first=5), "b": rows(2, 4)}, SPACE)
     last = Journal(file)
-    assert told(last.rows("a")) == told(rows(5, 1) + rows(1, 3, first=5))
-    assert told(last.rows("b")) == told(rows(2, 4))
+    assert as_text(last.rows("a")) == as_text(rows(5, 1) + rows(1, 3, first=5))
+    assert as_text(last.rows("b")) == as_text(rows(2, 4))
 
 
 def _write(file: Path, name: str) -> None:
@@ -106,12 +106,12 @@ def test_journals_of_units_are_merged(tmp_path: Path) -> None:
     with files[1].open("ab") as stream:
         stream.write(b'[1]\n{"x": 2}\nhello\n{"op_code": 4')
     merge(files, tmp_path / "all.log")
-    found = Journal(tmp_path / "all.log")
+    merged = Journal(tmp_path / "all.log")
     for mine in written:
         for cell, expected in mine.items():
-            assert told(found.rows(cell)) == told(expected)
-            assert found.count(cell) == 7
-    found.add({"c": rows(2, 5, first=4)}, SPACE)
+            assert as_text(merged.rows(cell)) == as_text(expected)
+            assert merged.count(cell) == 7
+    merged.add({"c": rows(2, 5, first=4)}, SPACE)
     assert len(Journal(tmp_path / "all.log").rows("c")) == 6
 
 
@@ -123,7 +123,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(fcntl, "flock", refused)
     Journal(tmp_path / "t.log").add({"a": rows(3)}, SPACE)
-    assert told(Journal(tmp_path / "t.log").rows("a")) == told(rows(3))
+    assert as_text(Journal(tmp_path / "t.log").rows("a")) == as_text(rows(3))
 
 
 def test_several_processes_write_at_once(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_several_processes_write_at_once(tmp_path: Path) -> None:
         assert worker.exitcode == 0
     wanted = [row for number in range(30) for row in rows(1, number, first=number)]
     for name in "abc":
-        assert told(Journal(file).rows(name)) == told(wanted)
+        assert as_text(Journal(file).rows(name)) == as_text(wanted)
         assert Journal(file).count(name) == 30
     assert [entry.name for entry in tmp_path.iterdir()] == ["t.log"]  # no lock is left
 
@@ -177,7 +177,7 @@ def test_two_that_write_the_same_trials_leave_each_once(tmp_path: Path, seed: in
             count = int(rng.integers(1, 4))
             both[which].add({"a": mine[written[which] : written[which] + count]}, SPACE)
             written[which] += count
-    assert told(Journal(tmp_path / "t.log").rows("a")) == told(mine)
+    assert as_text(Journal(tmp_path / "t.log").rows("a")) == as_text(mine)
 
 
 def test_a_file_that_is_no_journal_is_one_line(tmp_path: Path) -> None:

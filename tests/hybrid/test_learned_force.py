@@ -43,37 +43,37 @@ def error(paths: np.ndarray, windows: Windows) -> float:
 
 def test_it_learns_most_of_a_wrong_resistance(windows: Windows) -> None:
     given = task(windows)
-    found = LearnedForce(**CHEAP, ridge=(1e-4, 1e-2)).fit(given)["wrong"]
-    assert found.corrector is not None
-    learned = found.corrector.predict(WRONG, given.instants("wrong"), given.cases["wrong"].paths)
+    fit = LearnedForce(**CHEAP, ridge=(1e-4, 1e-2)).fit(given)["wrong"]
+    assert fit.corrector is not None
+    learned = fit.corrector.predict(WRONG, given.instants("wrong"), given.cases["wrong"].paths)
     assert error(learned, windows) < 0.3 * error(given.cases["wrong"].paths, windows)
-    best = min(found.trials, key=lambda row: row["value"])
-    assert found.corrector.hyperparameters == best["params"]
-    assert [row["params"]["ridge"] for row in found.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
+    best = min(fit.trials, key=lambda row: row["value"])
+    assert fit.corrector.hyperparameters == best["params"]
+    assert [row["params"]["ridge"] for row in fit.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
 
 
 def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
     given = task(windows)
-    found = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector
-    assert found is not None
+    fit = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector
+    assert fit is not None
     paths = given.cases["wrong"].paths
-    np.testing.assert_allclose(found.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
+    np.testing.assert_allclose(fit.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
 
 
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:
     document = SHIP.document
     m, I_z, length = document["inertia"]["m"], document["inertia"]["I_z"], document["particulars"]["L_pp"]
-    found = limits(SHIP, 4.0, 0.5)
-    assert found["X_max"][0] == found["Y_max"][0] == pytest.approx(0.5 * m * 16.0 / length)
-    assert found["N_max"][0] == pytest.approx(0.5 * I_z * 16.0 / length**2)
+    bounds = limits(SHIP, 4.0, 0.5)
+    assert bounds["X_max"][0] == bounds["Y_max"][0] == pytest.approx(0.5 * m * 16.0 / length)
+    assert bounds["N_max"][0] == pytest.approx(0.5 * I_z * 16.0 / length**2)
     assert limits(SHIP, 0.0, 1.0)["X_max"][0] > 0
 
 
 def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
     """Numbers of a force."""
     rng = np.random.default_rng(0)
-    found = {name: np.array([1.0]) for name in ("u_scale", "v_scale", "r_scale")} | limits(SHIP, 3.0, 1.0)
-    return found | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
+    numbers = {name: np.array([1.0]) for name in ("u_scale", "v_scale", "r_scale")} | limits(SHIP, 3.0, 1.0)
+    return numbers | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
 
 
 def test_it_survives_its_header_and_arrays() -> None:

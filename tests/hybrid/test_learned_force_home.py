@@ -17,10 +17,10 @@ def test_home_a_missing_cross_flow():
 def test_the_mass_is_that_of_the_equations():
     here = world(load_vessel("gunnerus-33.9"), load_vessel("gunnerus-33.9"), runs=2, seconds=20)
     document = here.physics.vessel.document
-    found = mass(here.physics, here.test.instants().select([0]))
+    inertia = mass(here.physics, here.test.instants().select([0]))
     for axis, key in enumerate(("X_udot", "Y_vdot", "N_rdot")):
         rigid = document["inertia"]["I_z" if axis == 2 else "m"]
-        assert found[axis, axis] == pytest.approx(rigid - document["added_mass"][key], rel=1e-6)
+        assert inertia[axis, axis] == pytest.approx(rigid - document["added_mass"][key], rel=1e-6)
 
 
 def test_the_start_in_closed_form_is_better_than_no_force():

@@ -23,7 +23,7 @@ QUICK = {
     "forest": {"trials": 2, "trees": 6},
     "hankel-dmd": {"delays": (2.0, 4.0)},
     "learned-force": {"trials": 2, "units": 4, "iterations": 4},
-    "modules": {"trials": 2, "units": 4, "centres": 16},
+    "modules": {"trials": 2, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 2, "units": 16, "averaged": 2},
     "path-drawn": {"trials": 3, "units": 24, "averaged": 2},
     "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
@@ -67,9 +67,9 @@ def others(here, kind):
     return {"physics": here.physics, "doubtful": doubtful, **none}
 
 
-def predicted(here, found, physics, chosen=slice(None)):
+def predicted(here, fit, physics, chosen=slice(None)):
     instants = here.test.instants(known=True).select(chosen)
-    return found.corrector.predict(physics, instants, physics.paths(instants))
+    return fit.corrector.predict(physics, instants, physics.paths(instants))
 
 
 @EVERY
@@ -89,13 +89,13 @@ def test_what_is_saved_says_the_same_numbers(kind, here, fitted):
     learned = [(here.physics, fitted(kind))]
     if method.meets_none:
         learned.append((none, method.fit(here.task({"none": none}))["none"]))
-    for physics, found in learned:
-        header = json.loads(json.dumps(found.corrector.header()))
-        arrays = {key: np.asarray(values) for key, values in found.corrector.arrays().items()}
-        again = type(found)(METHODS[kind].corrector.from_arrays(header, arrays), [], 0.0)
-        np.testing.assert_array_equal(predicted(here, again, physics), predicted(here, found, physics))
-        assert again.corrector.hyperparameters == found.corrector.hyperparameters
-        assert again.corrector.past == found.corrector.past <= method.past
+    for physics, fit in learned:
+        header = json.loads(json.dumps(fit.corrector.header()))
+        arrays = {key: np.asarray(values) for key, values in fit.corrector.arrays().items()}
+        again = type(fit)(METHODS[kind].corrector.from_arrays(header, arrays), [], 0.0)
+        np.testing.assert_array_equal(predicted(here, again, physics), predicted(here, fit, physics))
+        assert again.corrector.hyperparameters == fit.corrector.hyperparameters
+        assert again.corrector.past == fit.corrector.past <= method.past
 
 
 @EVERY
@@ -132,11 +132,11 @@ def test_the_same_seed_gives_the_same_digits(kind, here, fitted):
 def test_a_foundation_that_diverged_is_a_value_and_harms_nobody(kind, here, fitted):
     task = here.task()
     broken = Case(here.physics, np.full_like(task.cases["physics"].paths, np.nan))
-    found = quick(kind).fit(replace(task, cases={"broken": broken, **task.cases}))
-    assert found["broken"].corrector is None
-    assert {row["state"] for row in found["broken"].trials} == {"diverged"}
+    fit = quick(kind).fit(replace(task, cases={"broken": broken, **task.cases}))
+    assert fit["broken"].corrector is None
+    assert {row["state"] for row in fit["broken"].trials} == {"diverged"}
     np.testing.assert_allclose(
-        predicted(here, found["physics"], here.physics),
+        predicted(here, fit["physics"], here.physics),
         predicted(here, fitted(kind), here.physics),
         rtol=0,
         atol=IN_STACKS.get(kind, CLOSE),
@@ -145,10 +145,10 @@ def test_a_foundation_that_diverged_is_a_value_and_harms_nobody(kind, here, fitt
 
 @EVERY
 def test_an_instant_does_not_notice_the_others(kind, here, fitted):
-    found = fitted(kind)
+    corrector = fitted(kind)
     chosen = np.array([7, 2, 11])
-    whole = predicted(here, found, here.physics)
-    np.testing.assert_allclose(predicted(here, found, here.physics, chosen), whole[:, chosen], rtol=0, atol=CLOSE)
+    whole = predicted(here, corrector, here.physics)
+    np.testing.assert_allclose(predicted(here, corrector, here.physics, chosen), whole[:, chosen], rtol=0, atol=CLOSE)
     assert whole.shape == here.test.future.shape
     assert np.isfinite(whole).all()
 
@@ -156,17 +156,17 @@ def test_an_instant_does_not_notice_the_others(kind, here, fitted):
 @COMPENSATING
 def test_the_rows_of_a_search_are_whole(kind, here):
     method, calls = quick(kind), []
-    found = method.fit(here.task(on_trial=lambda done, total: calls.append((done, total))))["physics"]
-    assert [row["number"] for row in found.trials] == list(range(len(found.trials)))
-    for row in found.trials:
+    fit = method.fit(here.task(on_trial=lambda done, total: calls.append((done, total))))["physics"]
+    assert [row["number"] for row in fit.trials] == list(range(len(fit.trials)))
+    for row in fit.trials:
         assert {"number", "params", "value", "seconds", "epochs", "state"} <= set(row)
         assert set(method.varied()) <= set(row["params"])
         assert row["state"] == "complete"
         assert row["value"] > 0
-    assert found.seconds > 0
+    assert fit.seconds > 0
     assert calls[-1][0] == calls[-1][1]
-    best = min(row["value"] for row in found.trials)
-    assert found.corrector.hyperparameters in [row["params"] for row in found.trials if row["value"] == best]
+    best = min(row["value"] for row in fit.trials)
+    assert fit.corrector.hyperparameters in [row["params"] for row in fit.trials if row["value"] == best]
 
 
 @COMPENSATING
@@ -182,8 +182,8 @@ def test_windows_that_are_in_no_fold_are_not_seen(kind, here):
     for values in spoilt.states.values():
         values[:, outside] = 50.0
     for one in (task, replace(task, windows=spoilt)):
-        found = quick(kind).fit(one)["physics"]
-        paths = predicted(here, found, here.physics)
+        fit = quick(kind).fit(one)["physics"]
+        paths = predicted(here, fit, here.physics)
         if one is task:
             first = paths
     np.testing.assert_allclose(paths, first, rtol=0, atol=CLOSE)
@@ -194,17 +194,17 @@ def test_without_physics_a_method_learns_the_path(kind, here):
     physics = Physics(None, HORIZON, 1.0)
     longer = {"path-trained": {"epochs": 400, "learning_rate": 0.01}, "recurrent": {"epochs": 60, "batch": 16}}
     method = quick(kind).model_copy(update=longer.get(kind, {}))
-    found = method.fit(here.task({"none": physics}))["none"]
-    left = here.error(predicted(here, found, physics))
+    fit = method.fit(here.task({"none": physics}))["none"]
+    left = here.error(predicted(here, fit, physics))
     assert left < 0.75 * here.error(np.zeros_like(here.test.future))
 
 
 @pytest.mark.parametrize("kind", ["hankel-dmd", "recurrent"])
 def test_a_past_that_is_too_short_is_refused(kind, here, fitted):
-    found = fitted(kind)
+    corrector = fitted(kind)
     instants = replace(here.test.instants(known=True), past={})
     with pytest.raises(DataError, match="past"):
-        found.corrector.predict(here.physics, instants, here.physics.paths(instants))
+        corrector.corrector.predict(here.physics, instants, here.physics.paths(instants))
 
 
 def test_the_made_up_truth_is_not_what_the_physics_says(here):

@@ -46,9 +46,9 @@ def test_the_share_of_a_module_is_what_its_factor_changes(here):
     """With Euler's rule an acceleration is linear in the forces: half the thrust is half the share of the thrusters."""
     whole, half = (Physics(with_thrust(factor), 1, 1.0) for factor in (1.0, 0.5))
     at = here.test.instants()
-    found = shares(without(whole), at, free(whole, at), 1.0)
-    np.testing.assert_allclose(free(whole, at) - free(half, at), found[:, 0] / 2, atol=1e-12)
-    assert np.abs(found).max(axis=(0, 2)).min() > 1e-3
+    effects = shares(without(whole), at, free(whole, at), 1.0)
+    np.testing.assert_allclose(free(whole, at) - free(half, at), effects[:, 0] / 2, atol=1e-12)
+    assert np.abs(effects).max(axis=(0, 2)).min() > 1e-3
 
 
 def test_factors_stay_in_their_limits_and_fade_to_one_off_the_data(here, corrector):

@@ -74,13 +74,13 @@ def test_a_foundation_with_a_memory_does_not_notice_its_company(dataset: Dataset
     reordered = method.fit(task(dataset, dict(reversed(foundations.items()))))
     for name, one in foundations.items():
         alone = method.fit(task(dataset, {name: one}))[name]
-        for found in (together[name], reordered[name]):
-            assert [row["params"] for row in found.trials] == [row["params"] for row in alone.trials]
-            values = [[row["value"] for row in each.trials] for each in (found, alone)]
+        for fit in (together[name], reordered[name]):
+            assert [row["params"] for row in fit.trials] == [row["params"] for row in alone.trials]
+            values = [[row["value"] for row in each.trials] for each in (fit, alone)]
             np.testing.assert_allclose(*values, rtol=1e-9)
-            assert isinstance(found.corrector, Compensator)
+            assert isinstance(fit.corrector, Compensator)
             assert isinstance(alone.corrector, Compensator)
-            both = [each.corrector for each in (found, alone)]
+            both = [each.corrector for each in (fit, alone)]
             assert both[0].header() == both[1].header()
             given = task(dataset, {name: one})
             instants = given.instants(name)
@@ -108,16 +108,16 @@ def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: st
     """What is missed is a function of one kind of memory: the trials that take it validate best, and are taken."""
     foundation = physics(N_ur=-3e5)
     method = PathDrawn(**{**SMALL, "trials": 15, "averaged": 1, "choose": True, "mirror": 0.0, "ridge": 1e-4})
-    found = method.fit(task(dataset, {"one": foundation}, target(dataset, foundation, group)))["one"]
-    assert [row["params"]["memory"] for row in found.trials] == [float(k % len(method.memories)) for k in range(15)]
-    best = min(found.trials, key=lambda row: row["value"])
-    assert found.corrector is not None
-    assert found.corrector.hyperparameters == best["params"]
+    fit = method.fit(task(dataset, {"one": foundation}, target(dataset, foundation, group)))["one"]
+    assert [row["params"]["memory"] for row in fit.trials] == [float(k % len(method.memories)) for k in range(15)]
+    best = min(fit.trials, key=lambda row: row["value"])
+    assert fit.corrector is not None
+    assert fit.corrector.hyperparameters == best["params"]
     assert group in method.memories[int(best["params"]["memory"])]
-    without = [row["value"] for row in found.trials if group not in method.memories[int(row["params"]["memory"])]]
+    without = [row["value"] for row in fit.trials if group not in method.memories[int(row["params"]["memory"])]]
     assert best["value"] < 0.9 * min(without)
     seen = {"history", "error"}  # without an observer its estimates are no inputs
-    assert kinds(found.corrector) & seen == seen & set(method.memories[int(best["params"]["memory"])])
+    assert kinds(fit.corrector) & seen == seen & set(method.memories[int(best["params"]["memory"])])
 
 
 @pytest.mark.parametrize("known", [False, True])

@@ -40,7 +40,7 @@ def test_paths_are_the_rollout_seen_from_the_instant(windows: Windows) -> None:
     np.testing.assert_allclose(RIGHT.paths(windows.instants()), np.stack([x, y], axis=-1), atol=1e-9)
 
 
-def test_known_commands_lead_the_ship_along_its_own_run() -> None:
+def test_known_commands_lead_the_ship_along_its_run() -> None:
     windows = cut_windows(weaving("ab"), horizon=5)
     np.testing.assert_allclose(RIGHT.paths(windows.instants(known=True)), windows.future, atol=1e-9)
     assert np.abs(RIGHT.paths(windows.instants()) - windows.future).max() > 0.1
@@ -86,11 +86,11 @@ def test_the_slope_of_the_error_is_that_of_differences(seen: bool) -> None:
 
 def test_distances_are_those_of_the_paths(windows: Windows) -> None:
     instants = windows.instants()
-    found = WRONG.distances(instants, windows.future)
+    measured = WRONG.distances(instants, windows.future)
     apart = np.linalg.norm(WRONG.paths(instants) - windows.future, axis=-1)
-    np.testing.assert_allclose(found.total[0], apart.sum(axis=0), rtol=1e-9)
-    assert found.tally.sum() == apart.size
-    assert not found.diverged.any()
+    np.testing.assert_allclose(measured.total[0], apart.sum(axis=0), rtol=1e-9)
+    assert measured.tally.sum() == apart.size
+    assert not measured.diverged.any()
 
 
 def test_an_observer_needs_its_estimates_and_takes_no_screening(windows: Windows) -> None:
@@ -110,7 +110,7 @@ def test_still_water_and_a_right_start_leave_the_physics_as_it_is(windows: Windo
     np.testing.assert_allclose(seen, RIGHT.paths(windows.instants()), atol=1e-9)
 
 
-def test_what_is_not_measured_is_zero_and_said() -> None:
+def test_what_is_not_measured_is_zero_and_reported() -> None:
     columns = {name: np.full(3, 0.5) for name in ("u", "v", "psi", *dynamics(SHIP).commands)}
     assert assumed(SHIP, columns) == ["north", "east", "r", "V_w", "beta_w"]
     zero = dict.fromkeys(assumed(SHIP, columns), np.zeros(3))

@@ -12,9 +12,9 @@ from tests.hybrid.worlds import FINE, fitted, ship, world
 MEMORY = 8.0  # s
 
 
-def wake(_, told):
+def wake(_, commands):
     """A force of the mean orders of the last seconds."""
-    last = told[-round(MEMORY / FINE) :]
+    last = commands[-round(MEMORY / FINE) :]
     n, alpha = (np.mean([here[name] for here in last], axis=0) for name in ("port.n", "port.alpha"))
     return np.stack([8e3 * (n - 2.2), 2e4 * alpha, -4e5 * alpha], axis=1)
 
@@ -41,7 +41,7 @@ def test_the_arrays_say_what_pytorch_says():
 
 def test_x_is_even_and_y_odd_in_the_mirror():
     here = world(ship(), ship(), force=wake, runs=4, seconds=30, past=4)
-    found = fitted(Recurrent(trials=1, seconds=4.0, epochs=2, units=5), here)
+    corrector = fitted(Recurrent(trials=1, seconds=4.0, epochs=2, units=5), here)
     instants = here.test.instants()
     flip = {"v": -1.0, "r": -1.0, "psi": -1.0, "port.alpha": -1.0, "starboard.alpha": -1.0}
 
@@ -49,7 +49,7 @@ def test_x_is_even_and_y_odd_in_the_mirror():
         return {name: flip.get(name, 1.0) * values for name, values in columns.items()}
 
     nowhere = np.zeros((15, len(instants), 2))
-    plain = found.predict(here.physics, instants, nowhere)
-    other = found.predict(here.physics, Instants(image(instants.columns), image(instants.past)), nowhere)
+    plain = corrector.predict(here.physics, instants, nowhere)
+    other = corrector.predict(here.physics, Instants(image(instants.columns), image(instants.past)), nowhere)
     np.testing.assert_allclose(other, plain * [1.0, -1.0], rtol=0, atol=1e-9)
     assert np.abs(plain[..., 1]).max() > 1e-3

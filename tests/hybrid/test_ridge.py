@@ -46,12 +46,12 @@ def drawn(commands=TWINS, seed=0, count=120):
 def mirrored(columns):
     """The ship and the wind as a mirror shows them."""
     sides = {"port": "starboard", "starboard": "port"}
-    found = {}
+    columns_ = {}
     for name, values in columns.items():
         component, _, signal = name.rpartition(".")
         odd = signal in ("psi", "v", "r", "beta_w", "alpha", "delta")
-        found[f"{sides.get(component, component)}.{signal}" if component else name] = -values if odd else values
-    return found
+        columns_[f"{sides.get(component, component)}.{signal}" if component else name] = -values if odd else values
+    return columns_
 
 
 @pytest.fixture
@@ -76,8 +76,8 @@ def tuned(columns, targets, setup, *, commands=TWINS, folds=FOLDS, seed=3):
     return tune(columns, commands, targets, folds, setup, seed)
 
 
-def predicted(found, columns):
-    return {key: compensation(one.corrector, columns) for key, one in found.items()}
+def predicted(fits, columns):
+    return {key: compensation(one.corrector, columns) for key, one in fits.items()}
 
 
 # What is left out.
@@ -123,8 +123,8 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
     parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
-    found, by_fold, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
-    np.testing.assert_allclose(found[0], expected, rtol=rtol)
+    rms, by_fold, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
+    np.testing.assert_allclose(rms[0], expected, rtol=rtol)
     np.testing.assert_allclose(by_fold[0].sum(axis=0), expected, rtol=rtol)
     judged = np.unique(np.concatenate([part for _, part in folds]))
     kept = errors.of(np.zeros(len(folds), dtype=int), slice(None))
@@ -281,7 +281,7 @@ def test_a_mirrored_log_teaches_a_mirrored_trial_the_same(columns, targets):
     image = {key: paths * [1.0, -1.0] for key, paths in targets.items()}
     here, there = tuned(columns, targets, recipe(mirror=1.0)), tuned(mirrored(columns), image, recipe(mirror=1.0))
     for key in targets:
-        values = [[row["value"] for row in found[key].trials] for found in (here, there)]
+        values = [[row["value"] for row in fits[key].trials] for fits in (here, there)]
         np.testing.assert_allclose(*values, rtol=1e-9)
         np.testing.assert_allclose(predicted(there, columns)[key], predicted(here, columns)[key], atol=1e-8)
     plain = [tuned(*log, recipe(mirror=0.0))["rough"] for log in ((columns, targets), (mirrored(columns), image))]
@@ -346,7 +346,7 @@ def test_nor_the_order_of_runs_windows_or_columns(columns, targets):
     folds = [(place[training], place[judged]) for training, judged in reversed(FOLDS)]
     there = tuned(shuffled, {key: paths[:, order] for key, paths in targets.items()}, SMALL, folds=folds)
     for key in targets:
-        values = [[row["value"] for row in found[key].trials] for found in (here, there)]
+        values = [[row["value"] for row in fits[key].trials] for fits in (here, there)]
         np.testing.assert_allclose(*values, rtol=1e-5)
         np.testing.assert_allclose(predicted(there, columns)[key], predicted(here, columns)[key], rtol=1e-6, atol=1e-6)
 
@@ -374,7 +374,7 @@ def test_windows_outside_the_folds_are_not_seen(columns, targets):
 
 
 def test_what_can_be_solved_is_learned(columns):
-    """A compensation of the same kind, of the same hidden units, is found again where nothing was seen."""
+    """A compensation of the same kind, of the same hidden units, is recovered where nothing was seen."""
     new = drawn(seed=7)
     setup = recipe(mirror=0.0, trials=1, ridge=1e-9)
     first = tuned(columns, {"any": missed(columns)}, setup)["any"].corrector
@@ -483,7 +483,7 @@ def test_two_runs_are_enough(columns, targets):
         (("propeller.n", "rudder.delta"), True),
     ],
 )
-def test_sides_are_told_from_names(names, mirrored):
+def test_sides_are_distinguished_from_names(names, mirrored):
     rng = np.random.default_rng(2)
     table = {name: rng.normal(size=60) for name in ("u", "v", "r", *names)}
     assert (_reflection(table, choose_features(table)) is not None) == mirrored

@@ -75,15 +75,15 @@ class Stopping(Journal):
         super().add(rows, space)
 
 
-def digits(found: Any, here: World, kind: str) -> dict[str, Any]:
+def digits(fits: Any, here: World, kind: str) -> dict[str, Any]:
     """What a fit gave, without what a clock measured."""
     instants = here.test.instants(known=True)
-    told = {}
+    digits_of = {}
     for name, physics in cases_of(here, kind).items():
-        fitted = found[name]
+        fitted = fits[name]
         rows = [{key: value for key, value in row.items() if key != "seconds"} for row in fitted.trials]
-        told[name] = rows, fitted.corrector.predict(physics, instants, physics.paths(instants)).tobytes()
-    return told
+        digits_of[name] = rows, fitted.corrector.predict(physics, instants, physics.paths(instants)).tobytes()
+    return digits_of
 
 
 def task_in(here: World, kind: str, journal: Journal | None) -> Task:
@@ -127,7 +127,7 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
     method = quick(kind, budget=100.0) if kind != "path-drawn" else quick(kind, budget=100.0, averaged=1)
     monkeypatch.setattr(searches, "affordable", lambda *known: 2 if known[-1] else None)
     first = method.fit(task_in(here, kind, Journal(file)))
-    assert {len(found.trials) for found in first.values()} == {2}
+    assert {len(fit.trials) for fit in first.values()} == {2}
     monkeypatch.setattr(searches, "affordable", lambda *_: 3)
     second = method.fit(task_in(here, kind, Journal(file)))
     assert digits(second, here, kind) == digits(first, here, kind)
@@ -154,7 +154,7 @@ def test_a_budget_is_kept_by_trials_of_any_price(seed: int) -> None:
     rng = np.random.default_rng(seed)
     price, before, budget = rng.uniform(0.01, 1.0), rng.uniform(0.0, 2.0), rng.uniform(8.0, 20.0)
     seconds: list[float] = []
-    while (found := affordable(budget, before, seconds)) is None or len(seconds) < found:
+    while (trials := affordable(budget, before, seconds)) is None or len(seconds) < trials:
         seconds.append(price * rng.uniform(0.98, 1.02))
     assert budget - 3 * price < before + sum(seconds) + CLOSING * price < 1.03 * budget + price
 

@@ -36,7 +36,7 @@ def test_a_method_that_cannot_be_meant_is_refused_in_one_line(name, changes, mes
     assert "\n" not in str(caught.value)
 
 
-def test_an_unknown_kind_is_told_the_names():
+def test_an_unknown_kind_is_refused_with_the_names():
     with pytest.raises(DocumentError, match="did you mean 'path-trained'"):
         method_of("path-traind", {})
 
@@ -61,11 +61,11 @@ def test_trials_fill_their_ranges_by_the_logarithm():
     for name, (low, high) in method.ranges().items():
         if name == "ridge":
             continue
-        found = np.array([point[name] for point in points])
-        assert ((found >= low) & (found <= high)).all()
-        assert np.log(found).mean() == pytest.approx(np.log([low, high]).mean(), abs=0.1)
-        assert found.min() < low * (high / low) ** 0.1
-        assert found.max() > low * (high / low) ** 0.9
+        values = np.array([point[name] for point in points])
+        assert ((values >= low) & (values <= high)).all()
+        assert np.log(values).mean() == pytest.approx(np.log([low, high]).mean(), abs=0.1)
+        assert values.min() < low * (high / low) ** 0.1
+        assert values.max() > low * (high / low) ** 0.9
     assert {point["offset"] for point in points} == {1.5}
     assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
     assert points[:5] == list(PathDrawn(trials=5, offset=1.5).points())

@@ -101,9 +101,9 @@ def test_a_path_that_diverges_is_not_finite_and_harms_no_other(here):
     instants = here.test.instants(known=True)
 
     def wild(at, k, _):
-        found = np.zeros((len(at), 3))
-        found[0] = 1e3 if k == 2 else 0.0
-        return found
+        accelerations = np.zeros((len(at), 3))
+        accelerations[0] = 1e3 if k == 2 else 0.0
+        return accelerations
 
     paths = stepped_paths(here.physics, instants, wild)
     assert np.isfinite(paths[:2]).all()

@@ -55,6 +55,6 @@ def test_units_are_saved_and_refused_where_a_part_is_missing(table):
 def test_a_ridge_regression_is_the_normal_equations():
     rng = np.random.default_rng(1)
     features, targets, penalty = rng.normal(size=(40, 4)), rng.normal(size=(40, 2)), np.array([1.0, 2.0, 0.5, 1.0])
-    for ridge, found in zip((1e-3, 2.0), solve(features, targets, (1e-3, 2.0), penalty), strict=True):
+    for ridge, weights in zip((1e-3, 2.0), solve(features, targets, (1e-3, 2.0), penalty), strict=True):
         gram = features.T @ features / 40 + ridge * np.diag(penalty**2)
-        np.testing.assert_allclose(found, np.linalg.solve(gram, features.T @ targets / 40), atol=1e-10)
+        np.testing.assert_allclose(weights, np.linalg.solve(gram, features.T @ targets / 40), atol=1e-10)

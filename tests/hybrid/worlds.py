@@ -49,7 +49,7 @@ class World:
         instants = self.test.instants(known=self.known)
         paths = physics.paths(instants)
         alone, left, least = (
-            self.error(found) for found in (paths, corrector.predict(physics, instants, paths), self.perfect)
+            self.error(predicted) for predicted in (paths, corrector.predict(physics, instants, paths), self.perfect)
         )
         return (alone - left) / (alone - least)
 
@@ -83,7 +83,7 @@ def world(
     hold: tuple[float, float] = (8.0, 25.0),
 ) -> World:
     """Windows of a truth, and physics for it. The master says what the truth says of itself without noise."""
-    dataset = sailed(truth, runs + 6, runs, seconds, seed, force, hold)
+    dataset = simulated(truth, runs + 6, runs, seconds, seed, force, hold)
     windows = cut_windows(dataset, horizon=HORIZON, past=past)
     held_out = np.char.startswith(windows.run, TEST)
     physics = Physics(known_as, HORIZON, 1.0, "rk4")
@@ -92,7 +92,7 @@ def world(
     return World(windows.select(~held_out), test, physics, best, tuple(dataset.commands), known)
 
 
-def sailed(
+def simulated(
     vessel: Vessel,
     count: int,
     training: int,
@@ -109,20 +109,20 @@ def sailed(
     state |= {"v": rng.uniform(-0.3, 0.3, count), "r": rng.uniform(-0.03, 0.03, count)}
     n, alpha = (orders(rng, count, steps, *span, hold) for span in ((1.2, 3.2), (-0.5, 0.5)))
     orders_ = {"port.n": n, "port.alpha": alpha, "starboard.n": n, "starboard.alpha": alpha}
-    rows, nus, told = [], [], []
+    rows, nus, commands = [], [], []
     every = round(1 / FINE)
     for i in range(steps):
         here = {name: values[i] for name, values in orders_.items()}
         nus.append(np.stack([state[name] for name in ("u", "v", "r")], axis=1))
-        told.append(here)
+        commands.append(here)
         if i % every == 0:
             rows.append(pd.DataFrame({"run": names(count, training), "t": i * FINE, **state, **here, "flags": 0}))
-        extra = None if force is None else force(nus, told)
-        found = rollout(
+        extra = None if force is None else force(nus, commands)
+        path = rollout(
             vessel, state, here, dict.fromkeys(("V_w", "beta_w"), np.zeros(count)),
             step=FINE, num_steps=1, method="rk4", tau_extra=extra, engine="native",
         )  # fmt: skip
-        state = {name: found[name][-1, 0] for name in state}
+        state = {name: path[name][-1, 0] for name in state}
     frame = pd.concat(rows).sort_values(["run", "t"], ignore_index=True)
     return Dataset(frame, {"clock": "run"})
 
@@ -135,14 +135,14 @@ def orders(
     rng: np.random.Generator, count: int, steps: int, low: float, high: float, hold: tuple[float, float]
 ) -> Array:
     """Orders (steps, count) that are held for some seconds and then jump."""
-    found = np.zeros((steps, count))
+    levels = np.zeros((steps, count))
     for run in range(count):
         at = 0
         while at < steps:
             length = max(round(rng.uniform(*hold)), 1) * round(1 / FINE)  # orders change on whole seconds
-            found[at : at + length, run] = rng.uniform(low, high)
+            levels[at : at + length, run] = rng.uniform(low, high)
             at += length
-    return found
+    return levels
 
 
 def ship() -> Vessel:
@@ -150,9 +150,9 @@ def ship() -> Vessel:
 
 
 def fitted(method: Method, world_: World, seed: int = 0) -> Corrector:
-    found = method.fit(world_.task(seed=seed))["physics"].corrector
-    assert found is not None
-    return found
+    fit = method.fit(world_.task(seed=seed))["physics"].corrector
+    assert fit is not None
+    return fit
 
 
 def missed(world_: World, error: Callable[[World, Windows], Array]) -> World:

@@ -66,7 +66,7 @@ def to_identify() -> Vessel:
 
 
 def sailing(solution: Solution) -> Vessel:
-    """What was found, with the steering gear."""
+    """The identified vessel, with the steering gear."""
     return load_vessel("kvlcc2-hsva").with_values(solution.values)
 
 
@@ -82,8 +82,8 @@ def late_helmsman(commands: tuple[str, ...]) -> Helmsman:
         "late zigzag",
         prompt.inputs,
         prompt.memory,
-        orders=lambda signals, told, memory: prompt.orders(past(signals), told, memory),
-        advance=lambda signals, told, memory, dt: prompt.advance(past(signals), told, memory, dt),  # type: ignore[misc]
+        orders=lambda signals, given, memory: prompt.orders(past(signals), given, memory),
+        advance=lambda signals, given, memory, dt: prompt.advance(past(signals), given, memory, dt),  # type: ignore[misc]
     )
 
 
@@ -92,29 +92,29 @@ def measured(log: Mapping[str, np.ndarray], run: str) -> Measures:
     return zigzag(record_of(log), execute_heading=float(run.split("_")[1]) * DEGREE, course=0.0)
 
 
-def sailed(vessel: Vessel, log: Mapping[str, np.ndarray], run: str) -> Measures:
+def simulated(vessel: Vessel, log: Mapping[str, np.ndarray], run: str) -> Measures:
     """The same of the zigzag that the vessel sails from the state in which the test began, with the same helm."""
-    found, model, count = measured(log, run), dynamics(vessel), len(log["t"]) - 1
+    trial, model, count = measured(log, run), dynamics(vessel), len(log["t"]) - 1
     record = record_of(log)
-    side = float(np.sign(record.helm[int(np.argmax(np.abs(record.helm) > found["helm"].value / 2))]))
-    helm_over = np.where(log["t"][:-1] >= found["execute"].value, side * found["helm"].value, 0.0)
-    told = {
+    side = float(np.sign(record.helm[int(np.argmax(np.abs(record.helm) > trial["helm"].value / 2))]))
+    helm_over = np.where(log["t"][:-1] >= trial["execute"].value, side * trial["helm"].value, 0.0)
+    inputs = {
         "propeller.n": log["propeller.n"][:-1, None],
         "rudder.delta": helm_over[:, None],
         "course": np.zeros(1),
-        "execute_heading": np.full(1, side * found["execute_heading"].value),
+        "execute_heading": np.full(1, side * trial["execute_heading"].value),
     }
     start = {name: log[name][:1] for name in model.state}
     path = rollout(
-        vessel, start, told, step=STEP, num_steps=count, method="rk4", helmsman=late_helmsman(model.commands)
+        vessel, start, inputs, step=STEP, num_steps=count, method="rk4", helmsman=late_helmsman(model.commands)
     )
     return measured(_columns(path, model.state), run)
 
 
 def _columns(path: Trajectories, state: Sequence[str]) -> dict[str, np.ndarray]:
-    found = {name: path[name][:, 0, 0] for name in state}
-    found |= {"t": STEP * np.arange(len(found["psi"])), "rudder.delta": path["actual.rudder.delta"][:, 0, 0]}
-    return found | {"propeller.n": np.full(len(found["psi"]), SHAFT)}
+    logged = {name: path[name][:, 0, 0] for name in state}
+    logged |= {"t": STEP * np.arange(len(logged["psi"])), "rudder.delta": path["actual.rudder.delta"][:, 0, 0]}
+    return logged | {"propeller.n": np.full(len(logged["psi"]), SHAFT)}
 
 
 def windows(vessel: Vessel, data: Dataset, runs: Sequence[str], horizon: float) -> tuple[float, float]:
@@ -142,8 +142,8 @@ def whole(vessel: Vessel, log: Mapping[str, np.ndarray]) -> tuple[float, float]:
     """RMS over a whole run, from its first state on with the rudder as measured: position [m], heading [rad]."""
     model, count = dynamics(vessel), len(log["t"]) - 1
     start = {name: log[name][:1] for name in model.state}
-    told = {name: log[name][:-1, None] for name in model.commands}
-    path = rollout(vessel, start, told, step=STEP, num_steps=count, method="rk4")
+    commands = {name: log[name][:-1, None] for name in model.commands}
+    path = rollout(vessel, start, commands, step=STEP, num_steps=count, method="rk4")
     away = {name: path[name][:, 0, 0] - log[name] for name in ("north", "east", "psi")}
     return float(np.sqrt((away["north"] ** 2 + away["east"] ** 2).mean())), float(np.sqrt((away["psi"] ** 2).mean()))
 
@@ -153,8 +153,8 @@ def circle(vessel: Vessel, side: float, angle: float = 35 * DEGREE, speed: float
     model, count = dynamics(vessel), round(CIRCLE / STEP)
     start = {name: np.full(1, speed if name == "u" else 0.0) for name in model.state}
     over = np.where(np.arange(count) * STEP >= 1.0, side * angle, 0.0)[:, None]
-    told = {"propeller.n": np.full(1, SHAFT), "rudder.delta": over}
-    path = rollout(vessel, start, told, step=STEP, num_steps=count, method="rk4")
+    inputs = {"propeller.n": np.full(1, SHAFT), "rudder.delta": over}
+    path = rollout(vessel, start, inputs, step=STEP, num_steps=count, method="rk4")
     return turning(record_of(_columns(path, model.state)))
 
 
@@ -167,23 +167,21 @@ def main(folder: Path, fit: Sequence[str] = FITTED) -> None:
     """Print what was predicted, run by run."""
     data = logs(folder)
     solution = fitted(data, fit)
-    own, bare = sailing(solution), solution.identified
+    vessel, bare = sailing(solution), solution.identified
     print(solution.sentence, f"{solution.seconds:.1f} s")
     for run in data.runs:
         log = columns(data, run)
-        pairs = [(measured(log, run), sailed(own, log, run))]
+        pairs = [(measured(log, run), simulated(vessel, log, run))]
         both = [[one[f"overshoot_{k}"].value / DEGREE for one in pairs[0]] for k in (1, 2)]
         position, heading = whole(bare, log)
-        told = " ".join(f"{a:6.2f} {b:6.2f} {b - a:+.2f}" for a, b in both)
-        print(f"{run:8} {'fit ' if run in fit else 'held'} {told} {position:6.1f} m {heading / DEGREE:5.1f} deg")
+        overshoots = " ".join(f"{a:6.2f} {b:6.2f} {b - a:+.2f}" for a, b in both)
+        print(f"{run:8} {'fit ' if run in fit else 'held'} {overshoots} {position:6.1f} m {heading / DEGREE:5.1f} deg")
     others = [run for run in data.runs if run not in fit]
     for horizon in (15.0, 30.0):
         print(f"{horizon:g} s:", *(f"{value:.3f} m" for value in windows(bare, data, others, horizon)))
     for name, side in (("starboard", 1.0), ("port", -1.0)):
-        found = circle(own, side)
-        ratio = {
-            key: round(found[key].value / LENGTH, 3) for key in ("advance", "tactical_diameter", "steady_diameter")
-        }
+        turn = circle(vessel, side)
+        ratio = {key: round(turn[key].value / LENGTH, 3) for key in ("advance", "tactical_diameter", "steady_diameter")}
         print(name, ratio)
     for path, factor in zip(solution.paths, solution.factors, strict=True):
         print(f"{path} {factor:.3f}")

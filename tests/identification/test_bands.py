@@ -41,12 +41,12 @@ def judged(seed: int) -> tuple[Solution, Statistics]:
 
 
 @pytest.fixture(scope="module")
-def found() -> tuple[Solution, Statistics]:
+def fitted() -> tuple[Solution, Statistics]:
     return judged(3)
 
 
-def test_of_a_linear_measure_it_is_the_propagated_covariance(found: tuple[Solution, Statistics]) -> None:
-    solution, known = found
+def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solution, Statistics]) -> None:
+    solution, known = fitted
     rows = bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
     best = known.covariances[known.chosen]
     slopes = SLOPES[[FEW.index(path) for path in solution.paths]]
@@ -75,17 +75,17 @@ def test_axes_make_up_the_covariance() -> None:
     assert principal(np.diag([1.0, 0.0, 1e-12])).shape == (3, 1)
 
 
-def test_a_manoeuvre_that_cannot_be_performed_says_why(found: tuple[Solution, Statistics]) -> None:
+def test_a_manoeuvre_that_cannot_be_performed_says_why(fitted: tuple[Solution, Statistics]) -> None:
     def never(_: Vessel) -> Mapping[str, float]:
         raise ShipidError("no shaft speed gives it 9 m/s")
 
-    rows = bands(SHIP, *found, [("fast", never), ("all", linear)])
+    rows = bands(SHIP, *fitted, [("fast", never), ("all", linear)])
     assert rows["note"][0] == "no shaft speed gives it 9 m/s"
     assert np.isfinite(rows["low"][1])
 
 
-def test_short_horizons_with_coloured_residuals_are_refused(found: tuple[Solution, Statistics]) -> None:
-    solution, known = found
+def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Solution, Statistics]) -> None:
+    solution, known = fitted
     coloured = {name: replace(one, memory=4.0, probability=0.0) for name, one in known.whiteness.items()}
     bad = replace(known, whiteness=coloured)
     short = replace(solution, settings=settings(horizon=20.0))
@@ -95,6 +95,6 @@ def test_short_horizons_with_coloured_residuals_are_refused(found: tuple[Solutio
     assert short_horizon(solution, bad, 1.0) == ""  # whole runs
 
 
-def test_a_level_that_is_none_is_said_before_the_fit() -> None:
+def test_a_level_that_is_none_is_refused_before_the_fit() -> None:
     with pytest.raises(DataError, match="90 is no level of a band"):
         run_identification(SHIP, trials(SHIP, runs=2, steps=10), settings(), band=90.0)

@@ -24,10 +24,10 @@ def test_index_of_two_columns_is_known(cosine: float) -> None:
 
 def test_condition_indices_and_shares_of_two_columns() -> None:
     """Eigenvalues 1 +- c: eta = sqrt((1 + c) / (1 - c)); the weak direction has (1 + c) / 2 of both variances."""
-    found = collinearity(correlated(0.999), ("a", "b"))
-    np.testing.assert_allclose(found.indices, [1, np.sqrt(1.999 / 0.001)], rtol=1e-9)
-    np.testing.assert_allclose(found.shares[1], 0.9995, rtol=1e-9)
-    np.testing.assert_allclose(found.shares.sum(axis=0), 1)
+    diagnosis = collinearity(correlated(0.999), ("a", "b"))
+    np.testing.assert_allclose(diagnosis.indices, [1, np.sqrt(1.999 / 0.001)], rtol=1e-9)
+    np.testing.assert_allclose(diagnosis.shares[1], 0.9995, rtol=1e-9)
+    np.testing.assert_allclose(diagnosis.shares.sum(axis=0), 1)
 
 
 def test_nothing_depends_on_units() -> None:
@@ -41,32 +41,32 @@ def test_nothing_depends_on_units() -> None:
 
 def test_directions_move_the_residuals_as_little_as_they_say() -> None:
     jacobian = correlated(0.999) * np.array([1.0, 20.0])
-    found = collinearity(jacobian, ("a", "b"))
-    seen = np.linalg.norm(jacobian @ found.directions.T, axis=0)
-    np.testing.assert_allclose(seen[0] / seen, found.indices, rtol=1e-9)
+    diagnosis = collinearity(jacobian, ("a", "b"))
+    seen = np.linalg.norm(jacobian @ diagnosis.directions.T, axis=0)
+    np.testing.assert_allclose(seen[0] / seen, diagnosis.indices, rtol=1e-9)
 
 
 def test_sets_are_as_small_as_they_can_be() -> None:
     """b = a, and e = c + d / 2: two sets, and f in neither."""
     a, c, d, f = FREE[:, :4].T
     jacobian = np.stack([a, a + 1e-4 * FREE[:, 4], c, d, c + 0.5 * d + 1e-4 * FREE[:, 5], f], axis=1)
-    found = combinations(jacobian, "abcdef")
-    assert {own.paths for own in found} == {("a", "b"), ("c", "d", "e")}
-    three = next(own for own in found if len(own.paths) == 3)
+    sets = combinations(jacobian, "abcdef")
+    assert {entry.paths for entry in sets} == {("a", "b"), ("c", "d", "e")}
+    three = next(entry for entry in sets if len(entry.paths) == 3)
     weights = np.array(three.weights) / three.weights[2]
     np.testing.assert_allclose(weights, [-1, -0.5, 1], atol=1e-3)
 
 
-def test_columns_at_right_angles_have_no_set_and_silent_ones_their_own() -> None:
+def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> None:
     assert combinations(FREE, "abcdef") == ()
     silent = np.column_stack([FREE[:, :2], np.zeros(200)])
-    (own,) = combinations(silent, "abc")
-    assert own.sentence() == "c has no effect on these data"
+    (silent_one,) = combinations(silent, "abc")
+    assert silent_one.sentence() == "c has no effect on these data"
     assert collinearity(silent, "abc").gamma == pytest.approx(1)
 
 
 def test_names_are_as_short_as_is_clear() -> None:
     assert short(["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]) == ("Y_v", "port.D_p", "starboard.D_p")
     assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
-    (own,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
-    assert own.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"
+    (pair,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
+    assert pair.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"

@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.identification import outcome
 from shipid.vessel.load import load_vessel
-from tests.cli.running import ended, said
+from tests.cli.running import ended, output_of
 from tests.identification.trials import trials
 from tests.report.test_page import Page
 
@@ -29,14 +29,14 @@ def log() -> Dataset:
 
 @pytest.fixture
 def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The log in a folder of its own, which is the working folder."""
+    """The log in a new folder, which is the working folder."""
     monkeypatch.chdir(tmp_path)
     return write_dataset(log, tmp_path / "log.parquet")
 
 
 def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    text = said(
+    text = output_of(
         *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
         *("--prior", "hull.*[order >= 2]=0.5", "--bounds", f"{ONE}=[0.5, 2]", "--horizon", 0, "--test", "*3"),
         *("--set", "weights.u=0.05", "--set", "weights.r=0.003", "--nuisance", "current=0.1", "--ahead", 30),
@@ -49,20 +49,20 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monke
     assert "1 held out" in text
     assert "times its base value" in text
     assert "To run next" in text
-    found = load_vessel("gunnerus-28.9-identified.toml")
-    assert found.parameters[ONE] == pytest.approx(0.8 * SHIP.parameters[ONE], rel=0.01)
+    vessel = load_vessel("gunnerus-28.9-identified.toml")
+    assert vessel.parameters[ONE] == pytest.approx(0.8 * SHIP.parameters[ONE], rel=0.01)
     page = Page(Path("page.html").read_text())
-    titles = " ".join(said for _, said in page.all("h3"))
+    titles = " ".join(heading for _, heading in page.all("h3"))
     for part in ("The estimates", "Correlated estimates", "Free runs", "Profile", "Candidates", "Standard manoeuvres"):
         assert part in titles
-    assert found.name == f"{SHIP.name}, identified"
+    assert vessel.name == f"{SHIP.name}, identified"
 
 
 def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
     monkeypatch.setattr(command, "_look", lambda *_: None)
     Path("settings.toml").write_text(f'[identify]\nparameters = ["{ONE}"]\nhorizon = 30\nmethod = "euler"\n')
-    said("identify", "gunnerus-28.9", file, "--settings", "settings.toml", "--horizon", 20, "--out", "a.toml")
+    output_of("identify", "gunnerus-28.9", file, "--settings", "settings.toml", "--horizon", 20, "--out", "a.toml")
     text = Path("a.toml").read_text()
     assert "horizon = 20" in text
     assert 'method = "euler"' in text
@@ -102,7 +102,7 @@ def test_a_mistake_is_one_line_and_writes_nothing(name: str, file: Path) -> None
     Path("bad.toml").write_text(f'[identify]\nparameters = ["{ONE}"]\nwieghts = {{u = 1}}\n')
     before = set(Path().iterdir())
     with pytest.raises(ShipidError) as error:
-        said("identify", "gunnerus-28.9", file, *options)
+        output_of("identify", "gunnerus-28.9", file, *options)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
     assert set(Path().iterdir()) == before
@@ -118,7 +118,7 @@ def test_a_mistake_is_one_line_and_writes_nothing(name: str, file: Path) -> None
 )
 def test_a_vessel_that_does_not_fit_is_one_line(vessel: str, parameters: str, message: str, file: Path) -> None:
     with pytest.raises(ShipidError, match=message):
-        said("identify", vessel, file, "--parameters", parameters)
+        output_of("identify", vessel, file, "--parameters", parameters)
     assert [one.name for one in Path().iterdir()] == [file.name]
 
 

@@ -18,12 +18,12 @@ def test_the_page_holds_what_was_identified():
     frame = measure_standard(ship, "zigzag", (20.0, 10.0)).frame
     log = Dataset(frame, {"clock": "run", "flags": [], "source": "simulated"})
     wanted = ["hull.derivatives.Y_uv", "hull.derivatives.N_ur"]
-    found = run_identification(ship, log, Identify(parameters=wanted))
-    content = identification_content(found, "z.parquet", "shipid identify")
+    identified = run_identification(ship, log, Identify(parameters=wanted))
+    content = identification_content(identified, "z.parquet", "shipid identify")
     assert list(content.estimates["path"]) == wanted
     assert content.correlations.shape == (2, 2)
-    assert content.provenance["Dataset"] == f"z.parquet, digest {found.digest}"
+    assert content.provenance["Dataset"] == f"z.parquet, digest {identified.digest}"
     assert content.provenance["Held out"] == "none"
-    assert content.study_document == found.patch(Path())
+    assert content.study_document == identified.patch(Path())
     assert len(content.profiles) == 0
     assert content.answer[0].text == "2 of 2 parameters are identified by these runs."

@@ -34,7 +34,7 @@ CHOICE = candidates(SHIP, [3.0])
 
 
 @cache
-def found() -> list[Informed]:
+def informed_choice() -> list[Informed]:
     """What each candidate tells of the four factors."""
     return informed(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
 
@@ -46,8 +46,8 @@ def kind(title: str) -> str:
 def alone(path: str, by: str) -> list[str]:
     """Manoeuvres in order, for one factor that is the only one unknown."""
     j = PATHS.index(path)
-    own = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in found()]
-    return list(rank(own, (path,), by=by)["manoeuvre"])
+    single = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
+    return list(rank(single, (path,), by=by)["manoeuvre"])
 
 
 def test_what_excites_a_parameter_ranks_first_for_it() -> None:
@@ -60,16 +60,16 @@ def test_what_excites_a_parameter_ranks_first_for_it() -> None:
 
 
 def test_a_speed_run_says_nothing_of_yaw() -> None:
-    run = next(one for one in found() if one.candidate.title.startswith("speed"))
+    run = next(one for one in informed_choice() if one.candidate.title.startswith("speed"))
     np.testing.assert_allclose(run.information[1:, 1:], 0, atol=1e-9 * run.information[0, 0])
 
 
 def test_information_adds() -> None:
     """Two runs bring what the first and then the second bring; more never harms; the second of a kind brings less."""
-    table = rank(found(), PATHS).set_index("manoeuvre")
-    first = found()[0]
-    then = rank(found(), PATHS, first.information).set_index("manoeuvre")
-    other = found()[1]
+    table = rank(informed_choice(), PATHS).set_index("manoeuvre")
+    first = informed_choice()[0]
+    then = rank(informed_choice(), PATHS, first.information).set_index("manoeuvre")
+    other = informed_choice()[1]
     both = Informed(other.candidate, first.information + other.information)
     assert rank([both], PATHS)["gain"][0] == pytest.approx(
         table["gain"][first.candidate.title] + then["gain"][other.candidate.title]
@@ -81,8 +81,8 @@ def test_information_adds() -> None:
 def test_ranks_do_not_depend_on_scales_of_factors() -> None:
     """Gains are ratios of determinants: with the present information scaled alike, they are the same."""
     scale, there = np.diag([1e3, 1.0, 1e-2, 5.0]), np.diag([4.0, 25.0, 9.0, 1e4])
-    scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in found()]
-    one = rank(found(), PATHS, there - np.eye(4))
+    scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in informed_choice()]
+    one = rank(informed_choice(), PATHS, there - np.eye(4))
     other = rank(scaled, PATHS, scale @ there @ scale - np.eye(4))
     assert list(one["manoeuvre"]) == list(other["manoeuvre"])
     np.testing.assert_allclose(one["gain"], other["gain"], rtol=1e-6)
@@ -93,12 +93,12 @@ def test_twice_the_value_is_twice_the_sensitivity() -> None:
     double = informed(
         SHIP, CHOICE[:1], GROUPS, scale=[[2 * SHIP.parameters[path]] for path in PATHS], weights=WEIGHTS
     )  # fmt: skip
-    np.testing.assert_allclose(double[0].information, 4 * found()[0].information, rtol=1e-2)
+    np.testing.assert_allclose(double[0].information, 4 * informed_choice()[0].information, rtol=1e-2)
 
 
 def test_only_what_matters_counts() -> None:
     """Of one factor alone that matters, the gain is what its standard error shrinks by, in bits."""
-    table = rank(found(), PATHS, focus=["hull.derivatives.N_ur"])
+    table = rank(informed_choice(), PATHS, focus=["hull.derivatives.N_ur"])
     np.testing.assert_allclose(table["gain"], np.log2(table["before"] / table["after"]), rtol=1e-6)
     assert (table["narrows"] == "hull.derivatives.N_ur").all()
 
@@ -107,8 +107,8 @@ def test_sensitivities_are_those_of_the_trajectory() -> None:
     """Free starts cost information; half the standard deviation brings four times as much; longer predictions more."""
     short = informed(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
     sharp = informed(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[0].information
-    assert (np.diag(short) < np.diag(found()[0].information)).all()
-    np.testing.assert_allclose(sharp, 4 * found()[0].information, rtol=1e-9)
+    assert (np.diag(short) < np.diag(informed_choice()[0].information)).all()
+    np.testing.assert_allclose(sharp, 4 * informed_choice()[0].information, rtol=1e-9)
 
 
 def test_limits_of_the_actuators_hold() -> None:
@@ -146,7 +146,7 @@ def test_no_kind_orders_more_than_the_limits(manoeuvre: Approached, helm: float,
 
 @pytest.mark.parametrize("name", ["gunnerus-33.9", "roll", "six"])
 def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
-    """Their starts are along the ship's own axes, the velocities of a log are horizontal: the next start is met."""
+    """Their starts are along the ship's axes, the velocities of a log are horizontal: the next start is met."""
     ship = variety()[name]
     one = TurningCircle(n_rpm=180, approach="rest", duration=60)
     log = perform(ship, [one], step=0.2, environment={})
@@ -159,24 +159,24 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
 
 def test_position_and_heading_and_whole_runs_count() -> None:
     more = {**WEIGHTS, "psi": 0.01, "position": 1.0}
-    own = Candidate("zigzag", standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
-    one = informed(SHIP, [own], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
-    all_ = informed(SHIP, [own], GROUPS, weights=more, horizon=0.0)[0].information
+    zigzag = Candidate("zigzag", standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
+    one = informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
+    all_ = informed(SHIP, [zigzag], GROUPS, weights=more, horizon=0.0)[0].information
     assert np.linalg.eigvalsh(all_ - one).min() > -1e-6 * np.trace(one)
     assert all_[2, 2] > 1.1 * one[2, 2]
 
 
-def test_mistakes_are_told() -> None:
+def test_mistakes_are_reported() -> None:
     with pytest.raises(ShipidError, match="position"):
         informed(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
     with pytest.raises(ShipidError, match="within the limits"):
         informed(SHIP, candidates(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
     with pytest.raises(ShipidError, match="N_ur"):
-        rank(found(), PATHS, focus=["hull.derivatives.N_urr"])
+        rank(informed_choice(), PATHS, focus=["hull.derivatives.N_urr"])
 
 
 def test_a_zigzag_is_replayed_as_logged() -> None:
-    """Copies get the orders of the log: the helmsman would answer each copy in his own way, at whole steps."""
-    own = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
-    fine, coarse = (informed(SHIP, [own], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
+    """Copies get the orders of the log: the helmsman would answer each copy differently, at whole steps."""
+    zigzag = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
+    fine, coarse = (informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
     np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)

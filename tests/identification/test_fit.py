@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.fit import Point, evaluate, loss, origin, search
+from shipid.identification import fit
+from shipid.identification.fit import Point, _Value, evaluate, loss, origin, search
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import Identify
 from shipid.simulation.manoeuvre import Zigzag
@@ -33,36 +35,36 @@ def problem(**more: object) -> Problem:
 @pytest.mark.parametrize("nuisance", [[], ["initial_state"], ["velocity_bias", "current"]])
 def test_the_gradient_is_that_of_the_objective(nuisance: list[str], loss_kind: str) -> None:
     """With the unknowns of the runs eliminated anew at each place, priors of the factors included."""
-    own = problem(nuisance=nuisance, loss=loss_kind, prior={"hull.*": 0.5})
+    task = problem(nuisance=nuisance, loss=loss_kind, prior={"hull.*": 0.5})
     factors = np.array([1.1, 0.9, 1.05])
-    here = evaluate(own, factors, origin(own))
+    here = evaluate(task, factors, origin(task))
     point = Point(here.at.nuisances, here.at.away)
     for j, unit in enumerate(np.eye(3)):
-        ends = [evaluate(own, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
+        ends = [evaluate(task, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
         assert 2 * (here.J.T @ here.f)[j] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-2)
 
 
 def test_a_prior_is_about_the_base_vessel_also_where_that_is_zero() -> None:
-    own, factors = problem(), np.array([0.4, 0.9, 1.05])
+    task, factors = problem(), np.array([0.4, 0.9, 1.05])
     centre, prior = np.array([0.0, 1.0, 1.0]), np.array([0.5, 0.25, np.inf])
-    believed = replace(own, unknown=replace(own.unknown, centre=centre, prior=prior))
-    costs = [evaluate(each, factors, origin(each)).objective for each in (own, believed)]
+    believed = replace(task, unknown=replace(task.unknown, centre=centre, prior=prior))
+    costs = [evaluate(each, factors, origin(each)).objective for each in (task, believed)]
     assert costs[1] - costs[0] == pytest.approx((0.4 / 0.5) ** 2 + (0.1 / 0.25) ** 2)
 
 
 def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:
-    own, rng = problem(nuisance=["initial_state", "velocity_bias"]), np.random.default_rng(1)
+    task, rng = problem(nuisance=["initial_state", "velocity_bias"]), np.random.default_rng(1)
     factors = np.array([1.1, 0.9, 1.05])
-    best = evaluate(own, factors, origin(own))
+    best = evaluate(task, factors, origin(task))
     for _ in range(5):
-        moved = own.whole, rng.normal(0, 0.05, best.at.nuisances.shape), rng.normal(0, 0.05, best.at.away.shape)
-        again = evaluate(own, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
+        moved = task.whole, rng.normal(0, 0.05, best.at.nuisances.shape), rng.normal(0, 0.05, best.at.away.shape)
+        again = evaluate(task, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
         assert again.objective == pytest.approx(best.objective, rel=1e-8)
 
 
 def test_rows_that_scipy_sees_do_not_grow_with_the_log() -> None:
-    own = problem()
-    value = evaluate(own, np.ones(3), origin(own))
+    task = problem()
+    value = evaluate(task, np.ones(3), origin(task))
     assert value.f.shape == (3 * 4,)  # of each run one row a factor and one for what is left
     assert value.objective == pytest.approx(float((value.at.r**2).sum()), rel=1e-12)
 
@@ -75,21 +77,39 @@ def test_the_loss_is_linear_beyond_its_threshold() -> None:
 
 
 def test_a_factor_that_is_pushed_ends_at_its_bound() -> None:
-    own = problem(bounds={PATHS[0]: (1.2, 3.0)})
-    found = search(own, np.array([2.0, 1.0, 1.0]), origin(own))
-    assert found.status == "ok"
-    assert found.factors[0] == 1.2
-    slope = evaluate(own, found.factors, origin(own)).J.T @ evaluate(own, found.factors, origin(own)).f
+    task = problem(bounds={PATHS[0]: (1.2, 3.0)})
+    end = search(task, np.array([2.0, 1.0, 1.0]), origin(task))
+    assert end.status == "ok"
+    assert end.factors[0] == 1.2
+    slope = evaluate(task, end.factors, origin(task)).J.T @ evaluate(task, end.factors, origin(task)).f
     assert slope[0] > 0
     assert np.abs(slope[1:]).max() < 1e-3 * slope[0]
 
 
 def test_it_ends_where_whoever_looks_on_asks() -> None:
-    own, begin = problem(), np.array([1.5, 0.5, 1.5])
-    found = search(own, begin, origin(own), progress=lambda iteration, _: iteration == 4, before=3)
-    assert (found.status, found.iterations) == ("stopped", 4)
-    none = search(own, begin, origin(own), progress=lambda *_: True)
+    task, begin = problem(), np.array([1.5, 0.5, 1.5])
+    end = search(task, begin, origin(task), progress=lambda iteration, _: iteration == 4, before=3)
+    assert (end.status, end.iterations) == ("stopped", 4)
+    none = search(task, begin, origin(task), progress=lambda *_: True)
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
+
+
+@pytest.mark.parametrize("slope", [1.0, 10.0, 100.0])
+def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """(1 + slope |y - x|)^2 + (x - 3)^2 / 9 is least at (3, 3); from (0, 0) every step of one side's slope goes up."""
+
+    def kinked(_: object, at: np.ndarray, __: object) -> _Value:
+        side = 1.0 if at[1] >= at[0] else -1.0
+        f = np.array([1 + slope * side * (at[1] - at[0]), (at[0] - 3) / 3])
+        J = np.array([[-slope * side, slope * side], [1 / 3, 0.0]])
+        return _Value(at, SimpleNamespace(nuisances=None, away=None), f, J)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fit, "evaluate", kinked)
+    unknown = SimpleNamespace(low=np.full(2, -10.0), high=np.full(2, 10.0))
+    end = search(SimpleNamespace(unknown=unknown), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
+    assert end.status == "ok"
+    assert end.objective < 1.05
+    np.testing.assert_allclose(end.factors, 3, atol=0.7)
 
 
 @pytest.mark.slow

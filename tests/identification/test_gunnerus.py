@@ -31,8 +31,8 @@ def without(dataset: Dataset, runs: list[str], others: list[str]) -> Dataset:
     seen = np.zeros(len(t), dtype=bool)
     for low, high in spans.to_numpy():
         seen |= (t >= low) & (t <= high)
-    own = dataset.frame["run"].isin(runs).to_numpy()
-    return Dataset(dataset.frame[own & ~seen].reset_index(drop=True), dataset.metadata)
+    chosen = dataset.frame["run"].isin(runs).to_numpy()
+    return Dataset(dataset.frame[chosen & ~seen].reset_index(drop=True), dataset.metadata)
 
 
 def test_half_of_the_trials_predict_the_other(trials: Dataset) -> None:
@@ -42,10 +42,10 @@ def test_half_of_the_trials_predict_the_other(trials: Dataset) -> None:
     odd, even = trials.runs[::2], trials.runs[1::2]
     errors = []
     for fitted, others in ((odd, even), (even, odd)):
-        found = identify(template, trials, fitted, settings)
-        assert found.status == "ok"
+        solution = identify(template, trials, fitted, settings)
+        assert solution.status == "ok"
         unseen = without(trials, list(others), list(fitted))
-        vessels = {"before": template, "after": found.identified}
+        vessels = {"before": template, "after": solution.identified}
         runs = free_runs(vessels, unseen, unseen.runs, settings, LENGTH).errors
         errors.append(runs[runs["run"] == ALL].set_index("model"))
     mean = sum(table.loc["after", list(GOAL)].to_numpy(dtype=float) for table in errors) / 2

@@ -1,4 +1,4 @@
-"""Inverse dynamics: simulated forces are found again, whatever they are made of."""
+"""Inverse dynamics: simulated forces are recovered, whatever they are made of."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MASS = ("inertia.m", "added_mass.Y_vdot", "added_mass.N_rdot")
 D_P = [("thruster.port.D_p", "thruster.starboard.D_p")]
 
 
-def sailed(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
+def log_of(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
     orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
     block = orders | {key: more.pop(key) for key in orders if key in more}
     if "rudder.delta" in dynamics(vessel).commands:
@@ -30,7 +30,7 @@ def sailed(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Data
     return Dataset(simulate(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
 
 
-LOG = sailed()
+LOG = log_of()
 
 
 def wrong(paths: tuple[str, ...], low: float = 0.7, high: float = 1.3, vessel: Vessel = SHIP) -> Vessel:
@@ -43,52 +43,52 @@ def truth(base: Vessel, paths: tuple[str, ...], vessel: Vessel = SHIP) -> np.nda
     return np.array([vessel.parameters[path] / base.parameters[path] for path in paths])
 
 
-def test_derivatives_are_found() -> None:
+def test_derivatives_are_recovered() -> None:
     base = wrong(MAIN)
-    found = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN])
-    assert found.linear.all()
-    assert found.settled
-    assert min(found.explained.values()) > 0.99999
-    np.testing.assert_allclose(found.factors, truth(base, MAIN), rtol=2e-3)
+    estimate = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN])
+    assert estimate.linear.all()
+    assert estimate.settled
+    assert min(estimate.explained.values()) > 0.99999
+    np.testing.assert_allclose(estimate.factors, truth(base, MAIN), rtol=2e-3)
 
 
 def test_inertia_is_linear_too() -> None:
     """M multiplies out: mass and added mass next to derivatives."""
     base = wrong(MAIN + MASS, 0.9, 1.1)
-    found = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN + MASS])
-    assert found.linear.all()
-    np.testing.assert_allclose(found.factors, truth(base, MAIN + MASS), rtol=1e-2)
+    estimate = inverse_dynamics(base, LOG, LOG.runs, [[path] for path in MAIN + MASS])
+    assert estimate.linear.all()
+    np.testing.assert_allclose(estimate.factors, truth(base, MAIN + MASS), rtol=1e-2)
 
 
-def test_a_diameter_is_not_linear_and_found_by_iterating() -> None:
+def test_a_diameter_is_not_linear_and_needs_iterations() -> None:
     """Both propellers share one factor; thrust goes with its fourth power and more."""
     base = wrong((*MAIN, *D_P[0])).with_values(dict.fromkeys(D_P[0], 1.9 / 1.15))
-    found = inverse_dynamics(base, LOG, LOG.runs, [*([path] for path in MAIN), *D_P])
-    assert found.linear.tolist() == [True] * len(MAIN) + [False]
-    assert found.paths[-1] == D_P[0][0]
-    np.testing.assert_allclose(found.factors, [*truth(base, MAIN), 1.15], rtol=5e-3)
+    estimate = inverse_dynamics(base, LOG, LOG.runs, [*([path] for path in MAIN), *D_P])
+    assert estimate.linear.tolist() == [True] * len(MAIN) + [False]
+    assert estimate.paths[-1] == D_P[0][0]
+    np.testing.assert_allclose(estimate.factors, [*truth(base, MAIN), 1.15], rtol=5e-3)
 
 
 def test_a_derivative_that_the_base_lacks_needs_a_scale() -> None:
     base = SHIP.with_values({"hull.derivatives.N_ur": 0.0})
-    found = inverse_dynamics(base, LOG, LOG.runs, [["hull.derivatives.N_ur"]], scale=[[-1e6]])
-    assert found.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
+    estimate = inverse_dynamics(base, LOG, LOG.runs, [["hull.derivatives.N_ur"]], scale=[[-1e6]])
+    assert estimate.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "actuators", "six"])
-def test_every_structure_is_found(name: str) -> None:
+def test_every_structure_is_recovered(name: str) -> None:
     """Its greatest forces: the first three hull parameters that data see best."""
     vessel = variety()[name]
     small = name == "kvlcc2-l7"
     speeds = {"n_rpm": (300.0, 700.0), "start_speed": (0.6, 1.2)} if small else {"start_speed": (3.0, 7.0)}
-    log = sailed(vessel, alpha_deg=(-30, 30), **speeds)  # type: ignore[arg-type]
+    log = log_of(vessel, alpha_deg=(-30, 30), **speeds)  # type: ignore[arg-type]
     paths = tuple(path for path in vessel.parameters if path.startswith("hull."))
     seen = inverse_dynamics(vessel, log, log.runs, [[path] for path in paths]).collinearity.sensitivity
     main = tuple(paths[j] for j in np.argsort(-seen)[:3])
     base = wrong(main, 0.8, 1.2, vessel)
-    found = inverse_dynamics(base, log, log.runs, [[path] for path in main])
-    np.testing.assert_allclose(found.factors, truth(base, main, vessel), rtol=2e-2)
+    estimate = inverse_dynamics(base, log, log.runs, [[path] for path in main])
+    np.testing.assert_allclose(estimate.factors, truth(base, main, vessel), rtol=2e-2)
 
 
 def test_orders_that_jump_within_a_bump_do_no_harm() -> None:
@@ -99,14 +99,14 @@ def test_orders_that_jump_within_a_bump_do_no_harm() -> None:
     circle = TurningCircle(n_rpm=150, duration=80, execute_at=30)
     log = Dataset(perform(SHIP, [circle], step=0.05, interval=0.2), {})
     base = wrong(MAIN)
-    found = inverse_dynamics(base, log, log.runs, [["hull.derivatives.N_ur"]])
+    estimate = inverse_dynamics(base, log, log.runs, [["hull.derivatives.N_ur"]])
     exact = inverse_dynamics(SHIP, log, log.runs, [["hull.derivatives.N_ur"]])
     assert exact.factors[0] == pytest.approx(1, abs=1e-3)
-    assert abs(found.factors[0] - 1) > 0.01  # what the others lack goes somewhere
+    assert abs(estimate.factors[0] - 1) > 0.01  # what the others lack goes somewhere
 
 
 def test_what_data_do_not_see_stays_at_the_base_and_priors_hold() -> None:
-    still = ["wind.A_FW"]  # no wind in these runs, but the ship's own
+    still = ["wind.A_FW"]  # no wind in these runs but that of the ship's motion
     low = Dataset(LOG.frame.assign(V_w=0.0), LOG.metadata)
     free = inverse_dynamics(SHIP, low, low.runs, [["hull.derivatives.N_ur"], ["thruster.port.k_over2"]])
     assert free.factors[1] == pytest.approx(1)
@@ -125,8 +125,8 @@ def noisy(seed: int, level: float = 0.02) -> Dataset:
 def test_noise_is_averaged_not_differentiated() -> None:
     """0.02 m/s at 5 Hz would be an acceleration noise of 0.14 m/s^2; each equation errs by a twentieth of that."""
     log = noisy(0)
-    found = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN])
-    assert found.levels["u"] < 0.007
+    estimate = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN])
+    assert estimate.levels["u"] < 0.007
     sea = Noise({"north": 0.3, "east": 0.3, "psi": 0.002, "u": 0.02, "v": 0.02, "r": 0.002}, 0.1, 0.02)
     smoothed = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN], noise=sea)
     assert np.abs(smoothed.factors - 1).max() < 0.25
@@ -135,9 +135,9 @@ def test_noise_is_averaged_not_differentiated() -> None:
 def test_a_start_can_be_simulated() -> None:
     """Y_v|r| and Y_r|v| do the same: with noise they would run away from each other by hundreds of base values."""
     pair = [["hull.derivatives.Y_v|r|"], ["hull.derivatives.Y_r|v|"]]
-    found = inverse_dynamics(SHIP, noisy(1, 0.1), LOG.runs, pair)
-    assert np.abs(found.factors - 1).max() < 2
-    assert found.collinearity.gamma > 15
+    estimate = inverse_dynamics(SHIP, noisy(1, 0.1), LOG.runs, pair)
+    assert np.abs(estimate.factors - 1).max() < 2
+    assert estimate.collinearity.gamma > 15
 
 
 def test_order_of_groups_and_rows_of_other_runs_are_of_no_account() -> None:
@@ -148,7 +148,7 @@ def test_order_of_groups_and_rows_of_other_runs_are_of_no_account() -> None:
     np.testing.assert_allclose(one.factors, other.factors[::-1], rtol=1e-6)
 
 
-def test_mistakes_are_told() -> None:
+def test_mistakes_are_reported() -> None:
     with pytest.raises(DataError, match="no run 'M999'"):
         inverse_dynamics(SHIP, LOG, ["M999"], [[MAIN[0]]])
     without = Dataset(LOG.frame.drop(columns="port.n"), LOG.metadata)

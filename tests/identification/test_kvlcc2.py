@@ -23,8 +23,8 @@ from tests.identification.kvlcc2 import (
     fitted,
     logs,
     measured,
-    sailed,
     sailing,
+    simulated,
     to_identify,
     windows,
 )
@@ -70,15 +70,15 @@ def test_the_helmsman_of_the_runs_fitted_is_late_by_one_time(data: Dataset) -> N
 def test_overshoots_of_runs_that_were_not_fitted(solution: Solution, data: Dataset, run: str) -> None:
     """First to 1.0 deg; second to 2.5 deg: those of the 10/10s come out too small by 2 deg."""
     log = columns(data, run)
-    seen, told = measured(log, run), sailed(sailing(solution), log, run)
-    assert told["overshoot_1"].value / DEGREE == pytest.approx(seen["overshoot_1"].value / DEGREE, abs=1.0)
-    assert told["overshoot_2"].value / DEGREE == pytest.approx(seen["overshoot_2"].value / DEGREE, abs=2.5)
+    seen, model = measured(log, run), simulated(sailing(solution), log, run)
+    assert model["overshoot_1"].value / DEGREE == pytest.approx(seen["overshoot_1"].value / DEGREE, abs=1.0)
+    assert model["overshoot_2"].value / DEGREE == pytest.approx(seen["overshoot_2"].value / DEGREE, abs=2.5)
 
 
 def test_before_it_was_identified_it_does_not_predict_them(data: Dataset) -> None:
     log = columns(data, "10_10_S")
-    found = sailed(load_vessel("kvlcc2-hsva"), log, "10_10_S")
-    assert measured(log, "10_10_S")["overshoot_1"].value - found["overshoot_1"].value > 3 * DEGREE
+    model = simulated(load_vessel("kvlcc2-hsva"), log, "10_10_S")
+    assert measured(log, "10_10_S")["overshoot_1"].value - model["overshoot_1"].value > 3 * DEGREE
 
 
 @pytest.mark.parametrize(("horizon", "most", "naive"), [(15.0, 0.12, 1.14), (30.0, 0.42, 8.86)])
@@ -94,9 +94,9 @@ def test_positions(solution: Solution, data: Dataset, horizon: float, most: floa
 )
 def test_turning_circles(solution: Solution, side: float, advance: float, tactical_diameter: float) -> None:
     """Against another tank's model of the same scale (SIMMAN 2008, in Yasukawa and Yoshimura 2015, table 5): 12 %."""
-    found = circle(sailing(solution), side)
-    assert found["advance"].value / LENGTH == pytest.approx(advance, rel=0.12)
-    assert found["tactical_diameter"].value / LENGTH == pytest.approx(tactical_diameter, rel=0.12)
+    turn = circle(sailing(solution), side)
+    assert turn["advance"].value / LENGTH == pytest.approx(advance, rel=0.12)
+    assert turn["tactical_diameter"].value / LENGTH == pytest.approx(tactical_diameter, rel=0.12)
 
 
 FLOW = ("rudder.epsilon", "rudder.kappa", "propeller.w_P0", "propeller.C_2_*")
@@ -121,8 +121,8 @@ def test_a_rudder_whose_force_differs_by_side_predicts_better(
         start=SETTINGS.start,
     )
     vessel = to_identify().with_values(dict.fromkeys(sides, 0.0))
-    found = identify(vessel, data, FITTED, settings)
-    assert found.status == "ok"
+    fit = identify(vessel, data, FITTED, settings)
+    assert fit.status == "ok"
     for horizon, limit in zip((15.0, 30.0), most, strict=True):
-        error = windows(found.identified, data, OTHERS, horizon)[0]
+        error = windows(fit.identified, data, OTHERS, horizon)[0]
         assert error < min(limit, windows(solution.identified, data, OTHERS, horizon)[0])

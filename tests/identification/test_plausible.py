@@ -9,11 +9,11 @@ from shipid.vessel.load import Vessel, load_vessel
 
 
 def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
-    assert [said for path in bundled_vessel.parameters if (said := verdict(bundled_vessel, path, {}))] == []
+    assert [objection for path in bundled_vessel.parameters if (objection := verdict(bundled_vessel, path, {}))] == []
 
 
 @pytest.mark.parametrize(
-    ("path", "factor", "said"),
+    ("path", "factor", "message"),
     [
         ("added_mass.Y_vdot", 1e-5, "added mass in sway over the mass is 7.69e-06, of ships 0.25 to 1.8"),
         ("added_mass.Y_vdot", 0.3, "no ship has that"),
@@ -26,10 +26,10 @@ def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
         ("thruster.rudder.ell_R", -1.0, "lever of the flow"),
     ],
 )
-def test_what_no_ship_has_is_said(path: str, factor: float, said: str) -> None:
+def test_what_no_ship_has_is_reported(path: str, factor: float, message: str) -> None:
     vessel = load_vessel("kvlcc2-l7")
     sentence = verdict(vessel, path, {path: factor * vessel.parameters[path]})
-    assert said in sentence
+    assert message in sentence
     assert sentence.startswith(path)
     assert "\n" not in sentence
 

@@ -1,4 +1,4 @@
-"""Profiles: the linear one is the interval of the standard error, others follow their formula, open ends are told."""
+"""Profiles: the linear one is the interval of the standard error, others follow their formula, open ends are named."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def refit_of(residuals: Residuals) -> Callable[[str, float, np.ndarray], tuple[f
     def refit(path: str, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:  # noqa: ARG001
         if len(start) == 1:
             return float((residuals(np.array([value])) ** 2).sum()), np.array([value])
-        found = least_squares(lambda rest: residuals(np.append(value, rest)), start[1:])
-        return 2 * float(found.cost), np.append(value, found.x)
+        optimum = least_squares(lambda rest: residuals(np.append(value, rest)), start[1:])
+        return 2 * float(optimum.cost), np.append(value, optimum.x)
 
     return refit
 
@@ -33,34 +33,34 @@ def test_a_linear_profile_is_the_interval(phi: float) -> None:
     jacobian, (clusters, signals) = design(12, 40, 3), labels(12, 40)
     error = noise(np.random.default_rng(0), 12, 40, phi)
     fit = fitted(jacobian, error, clusters, signals)
-    found = statistics(fit)
+    estimates = statistics(fit)
 
     def residuals(factors: np.ndarray) -> np.ndarray:
         return fit.residuals - jacobian @ (factors - fit.factors)
 
-    freedom = found.covariances[found.chosen].freedom[0]
-    own = profile(
+    freedom = estimates.covariances[estimates.chosen].freedom[0]
+    curve = profile(
         "p0", fit.factors, 0, float(fit.residuals @ fit.residuals), refit_of(residuals),
-        half_width=found.high[0] - fit.factors[0], freedom=freedom, ratio=variance_ratio(found, "p0"),
+        half_width=estimates.high[0] - fit.factors[0], freedom=freedom, ratio=variance_ratio(estimates, "p0"),
     )  # fmt: skip
-    assert own.low == pytest.approx(found.low[0], abs=0.03 * (found.high[0] - fit.factors[0]))
-    assert own.high == pytest.approx(found.high[0], abs=0.03 * (found.high[0] - fit.factors[0]))
-    assert len(own.values) < 12
-    assert "lies between" in own.sentence
-    np.testing.assert_array_equal(own.values, np.sort(own.values))
+    assert curve.low == pytest.approx(estimates.low[0], abs=0.03 * (estimates.high[0] - fit.factors[0]))
+    assert curve.high == pytest.approx(estimates.high[0], abs=0.03 * (estimates.high[0] - fit.factors[0]))
+    assert len(curve.values) < 12
+    assert "lies between" in curve.sentence
+    np.testing.assert_array_equal(curve.values, np.sort(curve.values))
 
 
 def test_a_skewed_profile_has_the_ends_of_its_formula() -> None:
     """One residual (exp(f) - 1) / w: the interval is ln(1 -+ t w), which the standard error does not know."""
     t, w = stats.t.ppf(0.975, 30), 0.3
-    own = profile(
+    curve = profile(
         "a", np.zeros(1), 0, 0.0, refit_of(lambda f: (np.exp(f) - 1) / w), half_width=t * w, freedom=30.0
     )  # fmt: skip
-    assert own.low == pytest.approx(np.log(1 - t * w), rel=0.05)
-    assert own.high == pytest.approx(np.log(1 + t * w), rel=0.05)
+    assert curve.low == pytest.approx(np.log(1 - t * w), rel=0.05)
+    assert curve.high == pytest.approx(np.log(1 + t * w), rel=0.05)
 
 
-def test_open_ends_are_told() -> None:
+def test_open_ends_are_reported() -> None:
     """Residual (1 - exp(-5 f)) / 0.4 never exceeds 2.5 on the right but for t = 2; here 0.6: open upwards."""
     one = profile("a", np.zeros(1), 0, 0.0, refit_of(lambda f: (1 - np.exp(-5 * f)) / 0.6), half_width=0.2, freedom=100)
     assert np.isfinite(one.low)
@@ -78,16 +78,16 @@ def test_a_bound_is_never_passed() -> None:
         asked.append(value)
         return 0.0, start
 
-    own = profile("a", np.ones(1), 0, 0.0, refit, half_width=0.1, freedom=100, bounds=(0.5, 1.2))
+    curve = profile("a", np.ones(1), 0, 0.0, refit, half_width=0.1, freedom=100, bounds=(0.5, 1.2))
     assert min(asked) == 0.5
     assert max(asked) == 1.2
-    assert np.isinf(own.high)
+    assert np.isinf(curve.high)
 
 
-def test_a_better_fit_on_the_way_is_told() -> None:
-    own = profile("a", np.ones(1), 0, 6.25, refit_of(lambda f: (f - 1.5) / 0.2), half_width=0.4, freedom=1e6)
-    assert "the fit had not converged" in own.sentence
-    assert own.high == pytest.approx(1.5 + 1.96 * 0.2, abs=0.03)
+def test_a_better_fit_on_the_way_is_reported() -> None:
+    curve = profile("a", np.ones(1), 0, 6.25, refit_of(lambda f: (f - 1.5) / 0.2), half_width=0.4, freedom=1e6)
+    assert "the fit had not converged" in curve.sentence
+    assert curve.high == pytest.approx(1.5 + 1.96 * 0.2, abs=0.03)
 
 
 def test_a_refit_that_fails_counts_as_outside() -> None:
@@ -97,8 +97,8 @@ def test_a_refit_that_fails_counts_as_outside() -> None:
         asked.append(value)
         return (np.inf if value > 1.3 else ((value - 1) / 0.5) ** 2), start
 
-    own = profile("a", np.ones(1), 0, 0.0, refit, half_width=1.0, freedom=1e6)
-    assert own.high == pytest.approx(1.3, abs=0.02)
-    assert own.failed > 0
-    assert "failed" in own.sentence
+    curve = profile("a", np.ones(1), 0, 0.0, refit, half_width=1.0, freedom=1e6)
+    assert curve.high == pytest.approx(1.3, abs=0.02)
+    assert curve.failed > 0
+    assert "failed" in curve.sentence
     assert len(set(asked)) == len(asked)

@@ -1,4 +1,4 @@
-"""How far data and manoeuvres reach, and what is said where a manoeuvre goes beyond."""
+"""How far data and manoeuvres reach, and the warning where a manoeuvre goes beyond."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ SHIP = load_vessel("kvlcc2-l7")
 def test_it_is_the_greatest_of_the_motion() -> None:
     u, v, r = np.array([2.0, 2.0, 1.0]), np.array([0.0, -2.0, 0.0]), np.array([0.0, 0.1, -0.3])
     helm = np.array([0.0, -30.0, 10.0]) * DEGREE
-    found = Reach.of(SHIP, {"u": u, "v": v, "r": r, "rudder.delta": helm, "propeller.n": u})
-    assert found.drift == pytest.approx(45)
-    assert found.rate == pytest.approx(0.3 * 7)
-    assert found.helm == pytest.approx(30)
-    assert found.speed == 1.0
+    reach = Reach.of(SHIP, {"u": u, "v": v, "r": r, "rudder.delta": helm, "propeller.n": u})
+    assert reach.drift == pytest.approx(45)
+    assert reach.rate == pytest.approx(0.3 * 7)
+    assert reach.helm == pytest.approx(30)
+    assert reach.speed == 1.0
 
 
 def test_a_ship_at_rest_has_no_drift() -> None:
@@ -33,10 +33,10 @@ def test_a_ship_at_rest_has_no_drift() -> None:
 def test_a_hard_turn_goes_beyond_gentle_trials_and_not_beyond_itself() -> None:
     hard = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=35, duration=60)], step=0.1)
     gentle = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=3, duration=20)], step=0.1)
-    said = beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, gentle))
-    assert said.startswith("turning 35 reaches ")
+    sentence = beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, gentle))
+    assert sentence.startswith("turning 35 reaches ")
     for word in ("deg of drift", "r L / U of", "35 deg of helm", "a speed of", "; the data reach"):
-        assert word in said
+        assert word in sentence
     assert beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, hard)) == ""
     data = trials(SHIP, runs=2, steps=40)
     assert reach_of(SHIP, data, ["M01"]).helm <= 0.6 / DEGREE

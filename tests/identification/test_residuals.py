@@ -41,9 +41,9 @@ def test_slopes_are_differences(name: str) -> None:
     nuisances = np.abs(rng.normal(0.5, 0.1, (2, len(fit.names))))
     away = rng.normal(0, 1e-2, (2, len(fit.model.node)))
     here = predict(fit, factors, nuisances, away)
-    own = [(here.by_factor[:, i], _moved(i), 0) for i in range(fit.num_factors)]
-    own += [(here.by_nuisance[:, i], 0, _moved(i)) for i in range(len(fit.names))]
-    for slope, by_factor, by_nuisance in own:
+    columns = [(here.by_factor[:, i], _moved(i), 0) for i in range(fit.num_factors)]
+    columns += [(here.by_nuisance[:, i], 0, _moved(i)) for i in range(len(fit.names))]
+    for slope, by_factor, by_nuisance in columns:
         ends = []
         for sense in (1, -1):
             factor = factors.copy()
@@ -70,14 +70,14 @@ def test_residuals_are_those_of_the_rollout() -> None:
     dataset = trials(vessel, runs=2, steps=30)
     other = vessel.with_values({"hull.derivatives.N_ur": 1.3 * vessel.parameters["hull.derivatives.N_ur"]})
     fit = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
-    found = predict(fit, np.array([1.3]), np.zeros((2, 0)))
+    prediction = predict(fit, np.array([1.3]), np.zeros((2, 0)))
     for number, (_, rows) in enumerate(dataset.frame.groupby("run")):
         start = {name: rows[name].to_numpy()[:1] for name in dynamics(other).state}
         commands = {name: rows[name].to_numpy()[:-1, None] for name in dataset.commands}
         weather = {name: np.zeros(1) for name in dynamics(other).environment}
         path = rollout(other, start, commands, weather, step=1.0, num_steps=30, method="rk4", engine="casadi")
         for name, width in zip(("u", "v", "r"), fit.deviations, strict=True):
-            mine = found.r[(found.run == number) & (found.signals == name)]
+            mine = prediction.r[(prediction.run == number) & (prediction.signals == name)]
             assert np.allclose(mine * width, path[name][1:, 0, 0] - rows[name].to_numpy()[1:], atol=1e-12)
 
 
@@ -88,16 +88,16 @@ def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     dataset = trials(vessel, runs=3, steps=20)
     wanted = Identify(parameters=["hull.derivatives.N_u*"], nuisance=["current", "latency", "lever_arm"], horizon=0)
     fit = build(vessel, dataset, dataset.runs, wanted)
-    found = []
+    evaluated = []
     for least in (np.inf, 0.0):
         monkeypatch.setattr(residuals, "COMPILE_FROM", least)
         side_by_side = Predictions(fit)
         assert (side_by_side.packed is not None) is (least == 0.0)
         nuisances = fit.centres + 0.5 * fit.widths * np.ones((3, 1))
         begun = side_by_side.begin(nuisances)[0]
-        found.append(side_by_side.evaluate(begun, np.full(fit.num_factors, 1.1), nuisances))
+        evaluated.append(side_by_side.evaluate(begun, np.full(fit.num_factors, 1.1), nuisances))
     for key in ("r", "R"):
-        one, other = (getattr(each, key) for each in found)
+        one, other = (getattr(each, key) for each in evaluated)
         assert np.abs(one - other).max() <= 1e-12 * (1 + np.abs(one).max())
 
 

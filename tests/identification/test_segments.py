@@ -72,7 +72,7 @@ def test_wind_that_was_logged_is_felt() -> None:
     assert worst[1] > 0.1
 
 
-def test_a_command_that_was_not_logged_is_told() -> None:
+def test_a_command_that_was_not_logged_is_reported() -> None:
     without = Dataset(DATA.frame.drop(columns="port.n"), DATA.metadata)
     with pytest.raises(DataError, match=r"port\.n: .* needs this command; the data have port\.alpha"):
         cut_segments(SHIP, without, without.runs, 1.0, 0.0)
@@ -80,7 +80,7 @@ def test_a_command_that_was_not_logged_is_told() -> None:
 
 @pytest.mark.parametrize("name", ["roll", "six"])
 def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
-    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along her own axes."""
+    """u, v and r of a log are horizontal; the states of a ship with 4 or 6 degrees of freedom are along its axes."""
     vessel = variety()[name]
     data = trials(vessel, runs=2, steps=40)
     assert np.abs(data.frame["phi"]).max() > 0.02
@@ -89,14 +89,14 @@ def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
     assert np.abs(at.r).max() < 1e-6
 
 
-def test_actuators_lag_as_in_their_own_run() -> None:
-    """An override of an actuator's time constant also says where the actuator stands when a prediction begins."""
+def test_actuators_lag_as_in_each_run() -> None:
+    """An override of an actuator's time constant also sets the actuator's position when a prediction begins."""
     vessel = variety()["actuators"]
-    own = {path: 3.0 * x for path, x in vessel.parameters.items() if path.startswith("thruster.port.actuator.n.")}
+    lags = {path: 3.0 * x for path, x in vessel.parameters.items() if path.startswith("thruster.port.actuator.n.")}
     numbers = np.tile(list(vessel.parameters.values()), (2, 1))
-    numbers[1] = list(vessel.with_values(own).parameters.values())
+    numbers[1] = list(vessel.with_values(lags).parameters.values())
     data = trials(vessel, runs=2, steps=40, parameters=numbers)
-    overrides = {f"M02.{path}": x for path, x in own.items()}
+    overrides = {f"M02.{path}": x for path, x in lags.items()}
     worst = []
     for runs in ({}, overrides):
         for free in ("hull.derivatives.N_uv", "thruster.starboard.actuator.*"):  # memory as given, and carried

@@ -1,4 +1,4 @@
-"""Laws of identify: what made the data is found again, what is declared holds, and each failure is one sentence."""
+"""Laws of identify: what made the data is recovered, what is declared holds, and each failure is one sentence."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def ranges(dataset: Dataset) -> np.ndarray:
 def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> None:
     dataset = trials(SHIP, runs=6, method=method)
     base = degraded(SHIP)
-    found = identify(
+    solution = identify(
         base, dataset, dataset.runs, settings(parameters=["hull.derivatives.*"], method=method, horizon=horizon)
     )
-    assert found.status == "ok"
-    assert found.objective < 1e-6 * found.objective_start
-    for path in found.paths:  # 32 numbers, all of them seen by these manoeuvres
-        assert found.values[path] == pytest.approx(SHIP.parameters[path], rel=1e-4)
-    fit = build(found.identified, dataset, dataset.runs, settings(method=method))
+    assert solution.status == "ok"
+    assert solution.objective < 1e-6 * solution.objective_start
+    for path in solution.paths:  # 32 numbers, all of them seen by these manoeuvres
+        assert solution.values[path] == pytest.approx(SHIP.parameters[path], rel=1e-4)
+    fit = build(solution.identified, dataset, dataset.runs, settings(method=method))
     free = predict(fit, np.ones(len(FEW)), np.zeros((6, 0)))
     for name, width, extent in zip(("u", "v", "r"), fit.deviations, ranges(dataset), strict=True):
         assert np.sqrt(np.mean((free.r[free.signals == name] * width) ** 2)) < 1e-4 * extent
@@ -63,35 +63,35 @@ def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
     fit = build(SHIP, dataset, dataset.runs, wanted)
     begin = {path: 1 + 3 * rng.uniform(-1, 1) for path in fit.unknown.paths}
     assert search(fit, np.array(list(begin.values())), origin(fit)).status == "diverged"
-    found = identify(SHIP, dataset, dataset.runs, wanted, start=begin)
-    assert not np.isfinite(found.objective_start)
-    assert found.status == "ok"
-    assert np.allclose(found.factors, 1, atol=1e-4)
+    solution = identify(SHIP, dataset, dataset.runs, wanted, start=begin)
+    assert not np.isfinite(solution.objective_start)
+    assert solution.status == "ok"
+    assert np.allclose(solution.factors, 1, atol=1e-4)
 
 
 def test_ties_share_a_factor_and_what_is_fixed_stays() -> None:
     truth = SHIP.with_values({path: 1.2 * SHIP.parameters[path] for path in FEW[:2]})
     dataset = trials(truth, runs=4)
-    found = identify(SHIP, dataset, dataset.runs, settings(together=[FEW[:2]], fixed=FEW[2:3]))
-    assert found.paths == (FEW[0], FEW[3])
-    assert np.allclose(found.factors, [1.2, 1.0], atol=1e-5)
-    assert set(found.values) == {FEW[0], FEW[1], FEW[3]}
-    assert found.values[FEW[1]] == pytest.approx(1.2 * SHIP.parameters[FEW[1]], rel=1e-5)
-    assert found.identified.parameters[FEW[2]] == SHIP.parameters[FEW[2]]
+    solution = identify(SHIP, dataset, dataset.runs, settings(together=[FEW[:2]], fixed=FEW[2:3]))
+    assert solution.paths == (FEW[0], FEW[3])
+    assert np.allclose(solution.factors, [1.2, 1.0], atol=1e-5)
+    assert set(solution.values) == {FEW[0], FEW[1], FEW[3]}
+    assert solution.values[FEW[1]] == pytest.approx(1.2 * SHIP.parameters[FEW[1]], rel=1e-5)
+    assert solution.identified.parameters[FEW[2]] == SHIP.parameters[FEW[2]]
 
 
 def test_bounds_hold_and_are_flagged() -> None:
     dataset = trials(SHIP, runs=4)
-    found = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 2.0), "hull.*.N_uv": (0.5, 1.5)}))
-    assert found.factors[0] == pytest.approx(1.1, abs=1e-5)
-    assert (found.factors >= [1.1, -np.inf, 0.5, -np.inf]).all()
-    assert found.at_bound.tolist() == [True, False, False, False]
-    assert FEW[0] in found.sentence
-    held = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 1.1)}), start=found)
+    solution = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 2.0), "hull.*.N_uv": (0.5, 1.5)}))
+    assert solution.factors[0] == pytest.approx(1.1, abs=1e-5)
+    assert (solution.factors >= [1.1, -np.inf, 0.5, -np.inf]).all()
+    assert solution.at_bound.tolist() == [True, False, False, False]
+    assert FEW[0] in solution.sentence
+    held = identify(SHIP, dataset, dataset.runs, settings(bounds={FEW[0]: (1.1, 1.1)}), start=solution)
     assert held.factors[0] == 1.1
     assert not held.at_bound.any()
     assert held.held.tolist() == [True, False, False, False]
-    assert held.objective == pytest.approx(found.objective, rel=1e-4)
+    assert held.objective == pytest.approx(solution.objective, rel=1e-4)
 
 
 def test_a_prior_pulls_as_linear_theory_says() -> None:
@@ -100,16 +100,16 @@ def test_a_prior_pulls_as_linear_theory_says() -> None:
     free = identify(SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}))
     information = free.jacobian.T @ free.jacobian
     width = 1 / np.sqrt(np.diag(information)).mean()
-    found = identify(
+    solution = identify(
         SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}, prior={"hull.*": width})
     )
     expected = 1 + np.linalg.solve(information + np.eye(4) / width**2, information @ np.full(4, 0.002))
-    assert np.allclose(found.prior_widths, width)
-    assert np.allclose(found.factors - 1, expected - 1, rtol=0.02, atol=1e-6)
+    assert np.allclose(solution.prior_widths, width)
+    assert np.allclose(solution.factors - 1, expected - 1, rtol=0.02, atol=1e-6)
     assert np.abs(expected - 1.002).max() > 3e-4  # it does pull
 
 
-def test_what_each_run_has_of_its_own_is_found() -> None:
+def test_what_differs_by_run_is_identified() -> None:
     runs, steps = 4, 60
     vessel = SHIP.with_values({"current.kind": "uniform"})
     rng = np.random.default_rng(8)
@@ -121,16 +121,16 @@ def test_what_each_run_has_of_its_own_is_found() -> None:
             numbers[:, i] *= scale
     dataset = trials(vessel, runs, steps, weather={"V_c": V_c, "beta_c": beta_c}, parameters=numbers)
     wanted = settings(nuisance={"current": 1.0, "thrust_scale": 0.5}, weights={"u": 1e-4, "v": 1e-4, "r": 1e-5})
-    found = identify(SHIP, dataset, dataset.runs, wanted, start=dict.fromkeys(FEW, 1.1))
-    assert found.status == "ok"
-    assert np.allclose(found.factors, 1, atol=1e-3)
-    own = [found.nuisances[run] for run in dataset.runs]
-    assert np.allclose([one["thrust_scale"] for one in own], scale, atol=1e-3)
-    assert np.allclose([one["current_north"] for one in own], V_c * np.cos(beta_c), atol=2e-3)
-    assert np.allclose([one["current_east"] for one in own], V_c * np.sin(beta_c), atol=2e-3)
+    solution = identify(SHIP, dataset, dataset.runs, wanted, start=dict.fromkeys(FEW, 1.1))
+    assert solution.status == "ok"
+    assert np.allclose(solution.factors, 1, atol=1e-3)
+    nuisances = [solution.nuisances[run] for run in dataset.runs]
+    assert np.allclose([one["thrust_scale"] for one in nuisances], scale, atol=1e-3)
+    assert np.allclose([one["current_north"] for one in nuisances], V_c * np.cos(beta_c), atol=2e-3)
+    assert np.allclose([one["current_east"] for one in nuisances], V_c * np.sin(beta_c), atol=2e-3)
 
 
-def test_faults_of_the_log_are_found() -> None:
+def test_faults_of_the_log_are_identified() -> None:
     runs, steps, rng = 4, 60, np.random.default_rng(9)
     dataset = trials(SHIP, runs, steps)
     each = np.repeat(np.arange(runs), steps + 1)
@@ -151,46 +151,48 @@ def test_faults_of_the_log_are_found() -> None:
         nuisance={"heading_bias": 0.1, "velocity_bias": 0.5, "lever_arm": 10.0},
         weights={"u": 1e-4, "v": 1e-4, "r": 1e-5, "position": 1e-2},
     )
-    found = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
-    assert found.status == "ok"
-    assert np.allclose(found.factors, 1, atol=1e-3)
+    solution = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
+    assert solution.status == "ok"
+    assert np.allclose(solution.factors, 1, atol=1e-3)
     for name, truth in (
         ("heading_bias", bias),
         ("lever_arm", arm),
         ("velocity_bias_u", slip[0]),
         ("velocity_bias_v", slip[1]),
     ):
-        assert np.allclose([found.nuisances[run][name] for run in log.runs], truth, atol=5e-3)
+        assert np.allclose([solution.nuisances[run][name] for run in log.runs], truth, atol=5e-3)
 
 
-def test_late_commands_and_wrong_starts_are_found() -> None:
+def test_late_commands_and_wrong_starts_are_identified() -> None:
     runs, steps, late = 3, 60, 1.4
     logged = orders(SHIP, runs, steps, 1)
     before = {k: np.concatenate([x[:1], x[:1], x])[: steps + 1] for k, x in logged.items()}
-    told = {k: (2 - late) * np.concatenate([x[:1], x])[: steps + 1] + (late - 1) * before[k] for k, x in logged.items()}
-    dataset = trials(SHIP, runs, steps, told=told)
+    delayed = {
+        k: (2 - late) * np.concatenate([x[:1], x])[: steps + 1] + (late - 1) * before[k] for k, x in logged.items()
+    }
+    dataset = trials(SHIP, runs, steps, true_commands=delayed)
     frame = dataset.frame
     first = (frame["t"] == 0).to_numpy()
     log = changed(dataset, u=frame["u"] + 0.002 * first, r=frame["r"] - 2e-4 * first)
     wanted = settings(nuisance={"latency": 1.0, "initial_state": 50.0})
-    found = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
-    assert found.status == "ok"
-    assert np.allclose(found.factors, 1, atol=2e-3)
+    solution = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
+    assert solution.status == "ok"
+    assert np.allclose(solution.factors, 1, atol=2e-3)
     for run in log.runs:
-        own = found.nuisances[run]
-        assert own["latency"] == pytest.approx(late, abs=2e-3)
-        assert own["initial_state.u"] == pytest.approx(-0.002, abs=4e-4)
-        assert own["initial_state.r"] == pytest.approx(2e-4, abs=4e-5)
+        nuisances = solution.nuisances[run]
+        assert nuisances["latency"] == pytest.approx(late, abs=2e-3)
+        assert nuisances["initial_state.u"] == pytest.approx(-0.002, abs=4e-4)
+        assert nuisances["initial_state.r"] == pytest.approx(2e-4, abs=4e-5)
 
 
 def test_an_override_counts_for_its_run_alone() -> None:
     vessel = SHIP.with_values({"current.kind": "uniform"})
     dataset = trials(vessel, 3, 40, weather={"V_c": np.array([0.0, 0.4, 0.0]), "beta_c": np.array([0.0, 1.0, 0.0])})
-    own = {"M02": {"environment": {"V_c": 0.4, "beta_c": 1.0}}}
+    overrides = {"M02": {"environment": {"V_c": 0.4, "beta_c": 1.0}}}
     without = identify(vessel, dataset, dataset.runs, settings())
-    found = identify(vessel, dataset, dataset.runs, settings(runs=own))
-    assert np.allclose(found.factors, 1, atol=1e-5)
-    assert without.objective > 1e6 * found.objective
+    solution = identify(vessel, dataset, dataset.runs, settings(runs=overrides))
+    assert np.allclose(solution.factors, 1, atol=1e-5)
+    assert without.objective > 1e6 * solution.objective
 
 
 def test_the_nuisances_are_projected_out() -> None:
@@ -198,12 +200,12 @@ def test_the_nuisances_are_projected_out() -> None:
     dataset, rng = trials(SHIP, runs=3, steps=30), np.random.default_rng(1)
     noisy = changed(dataset, u=dataset.frame["u"] + rng.normal(0, 0.05, len(dataset.frame)))
     wanted = settings(nuisance=["initial_state", "velocity_bias"], weights={"u": 0.05, "v": 0.05, "r": 0.003})
-    found = identify(SHIP, noisy, noisy.runs, wanted)
-    assert (found.residuals**2).sum() == pytest.approx(found.objective, rel=1e-6)
-    assert np.abs(found.jacobian.T @ found.residuals).max() < 1e-3 * np.abs(found.jacobian).sum(axis=0).max()
+    solution = identify(SHIP, noisy, noisy.runs, wanted)
+    assert (solution.residuals**2).sum() == pytest.approx(solution.objective, rel=1e-6)
+    assert np.abs(solution.jacobian.T @ solution.residuals).max() < 1e-3 * np.abs(solution.jacobian).sum(axis=0).max()
     fit = build(SHIP, noisy, noisy.runs, wanted)
-    assert found.point is not None
-    whole = predict(fit, found.factors, found.point.nuisances, found.point.away)
+    assert solution.point is not None
+    whole = predict(fit, solution.factors, solution.point.nuisances, solution.point.away)
     columns = [whole.by_factor]
     for run in range(3):
         mine = (whole.run == run)[:, None]
@@ -211,7 +213,7 @@ def test_the_nuisances_are_projected_out() -> None:
     A = np.hstack(columns)
     information = A.T @ A + np.diag([0.0] * 4 + [1.0] * (A.shape[1] - 4))
     covariance = np.linalg.inv(information)[:4, :4]
-    assert np.allclose(np.linalg.inv(found.jacobian.T @ found.jacobian), covariance, rtol=1e-6)
+    assert np.allclose(np.linalg.inv(solution.jacobian.T @ solution.jacobian), covariance, rtol=1e-6)
 
 
 def test_order_of_runs_and_repetition_change_nothing() -> None:
@@ -240,18 +242,18 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     dataset, rng = trials(SHIP, runs=4, steps=40), np.random.default_rng(4)
     noisy = changed(dataset, **{k: dataset.frame[k] + rng.normal(0, s, len(dataset.frame)) for k, s in SHARP.items()})
     base = SHIP.with_values({"hull.derivatives.N_ur": 0.5 * SHIP.parameters["hull.derivatives.N_ur"]})
-    found = identify(base, noisy, noisy.runs, settings(drop=3.0))
-    assert FEW[3] not in found.dropped
-    assert len(found.dropped) >= 2
-    assert [path for path, there in zip(found.paths, found.held, strict=True) if there] == [
-        path for path in found.paths if path in found.dropped
+    solution = identify(base, noisy, noisy.runs, settings(drop=3.0))
+    assert FEW[3] not in solution.dropped
+    assert len(solution.dropped) >= 2
+    assert [path for path, there in zip(solution.paths, solution.held, strict=True) if there] == [
+        path for path in solution.paths if path in solution.dropped
     ]
-    judged = statistics(LinearFit.of(found))
-    assert np.isinf(judged.errors[found.held]).all()
-    assert "dropped" in judged.sentences[found.paths.index(found.dropped[0])]
-    for path in found.dropped:
-        assert found.values[path] == base.parameters[path]
-    assert found.factors[3] == pytest.approx(2.0, rel=0.02)
+    judged = statistics(LinearFit.of(solution))
+    assert np.isinf(judged.errors[solution.held]).all()
+    assert "dropped" in judged.sentences[solution.paths.index(solution.dropped[0])]
+    for path in solution.dropped:
+        assert solution.values[path] == base.parameters[path]
+    assert solution.factors[3] == pytest.approx(2.0, rel=0.02)
 
 
 def test_what_cannot_be_seen_is_dropped_first() -> None:
@@ -259,15 +261,15 @@ def test_what_cannot_be_seen_is_dropped_first() -> None:
     dataset, rng = trials(SHIP, runs=2, steps=30), np.random.default_rng(4)
     noisy = changed(dataset, **{k: dataset.frame[k] + rng.normal(0, s, len(dataset.frame)) for k, s in SHARP.items()})
     wanted = settings(parameters=[*FEW[:2], "wind.C_X.18"], drop=1e-6)
-    found = identify(SHIP, noisy, noisy.runs, wanted, start={"wind.C_X.18": 3.0})
-    assert found.dropped == ("wind.C_X.18",)
-    assert found.factors[2] == 1.0
+    solution = identify(SHIP, noisy, noisy.runs, wanted, start={"wind.C_X.18": 3.0})
+    assert solution.dropped == ("wind.C_X.18",)
+    assert solution.factors[2] == 1.0
 
 
 def test_a_mass_stays_above_zero() -> None:
     wanted = settings(parameters=["inertia.m", "inertia.I_z", "added_mass.X_udot", "thruster.*.D_p", *FEW])
-    own = unknowns(SHIP, wanted)
-    low = dict(zip(own.paths, own.low, strict=True))
+    free = unknowns(SHIP, wanted)
+    low = dict(zip(free.paths, free.low, strict=True))
     for path in ("inertia.m", "inertia.I_z", "thruster.port.D_p"):
         assert low[path] == POSITIVE
         assert POSITIVE * SHIP.parameters[path] > 0
@@ -275,59 +277,59 @@ def test_a_mass_stays_above_zero() -> None:
     assert low[FEW[0]] == -np.inf
 
 
-def test_values_that_the_vessel_refuses_are_told() -> None:
+def test_values_that_the_vessel_refuses_are_reported() -> None:
     """Bounds may allow what no ship can be, here added mass below zero: the fit ends, its values are not taken."""
     path, dataset = "added_mass.X_udot", trials(SHIP, runs=2, steps=30)
-    found = identify(SHIP, dataset, dataset.runs, settings(parameters=[path, FEW[0]], bounds={path: (-0.2, -0.1)}))
-    assert found.status == "refused"
-    assert f"the vessel refuses the estimates: {path}: " in found.sentence
-    assert "\n" not in found.sentence
+    solution = identify(SHIP, dataset, dataset.runs, settings(parameters=[path, FEW[0]], bounds={path: (-0.2, -0.1)}))
+    assert solution.status == "refused"
+    assert f"the vessel refuses the estimates: {path}: " in solution.sentence
+    assert "\n" not in solution.sentence
     with pytest.raises(ShipidError, match="X_udot is negative"):
-        _ = found.identified
+        _ = solution.identified
 
 
 def test_overrides_of_other_runs_of_the_data_are_left_out() -> None:
     """A batch of fits shares one block: what is set for a run that is not in this fit does not count here."""
     dataset = trials(SHIP, 3, 30)
-    own = {"M01.environment.V_w": 3.0, "M02.environment.V_w": 5.0}
-    found = identify(SHIP, dataset, ["M01", "M03"], settings(runs=own))
+    overrides = {"M01.environment.V_w": 3.0, "M02.environment.V_w": 5.0}
+    solution = identify(SHIP, dataset, ["M01", "M03"], settings(runs=overrides))
     alone = identify(SHIP, dataset, ["M01", "M03"], settings(runs={"M01.environment.V_w": 3.0}))
-    assert np.array_equal(found.factors, alone.factors)
+    assert np.array_equal(solution.factors, alone.factors)
 
 
-def test_progress_is_told() -> None:
+def test_progress_is_reported() -> None:
     dataset = trials(SHIP, runs=2, steps=30)
-    told: list[tuple[int, float]] = []
-    found = identify(
+    reported: list[tuple[int, float]] = []
+    solution = identify(
         SHIP,
         dataset,
         dataset.runs,
         settings(),
         start=dict.fromkeys(FEW, 1.2),
-        progress=lambda i, f: told.append((i, f)),
+        progress=lambda i, f: reported.append((i, f)),
     )
-    assert [i for i, _ in told] == list(range(found.iterations + 1))
-    assert told[-1][1] == pytest.approx(found.objective, abs=1e-6)
+    assert [i for i, _ in reported] == list(range(solution.iterations + 1))
+    assert reported[-1][1] == pytest.approx(solution.objective, abs=1e-6)
 
 
 def test_progress_can_stop_and_fail() -> None:
     dataset, start = trials(SHIP, runs=2, steps=30), dict.fromkeys(FEW, 1.2)
-    found = identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: i == 1)
-    assert (found.status, found.iterations) == ("stopped", 1)
+    solution = identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: i == 1)
+    assert (solution.status, solution.iterations) == ("stopped", 1)
     with pytest.raises(ZeroDivisionError):
         identify(SHIP, dataset, dataset.runs, settings(), start=start, progress=lambda i, _: 1 / i)
 
 
 def test_ctrl_c_ends_it() -> None:
-    dataset, told = trials(SHIP, runs=2, steps=30), list[int]()
+    dataset, reported = trials(SHIP, runs=2, steps=30), list[int]()
 
     def interrupt(iteration: int, _objective: float) -> None:
-        told.append(iteration)
+        reported.append(iteration)
         signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
         identify(SHIP, dataset, dataset.runs, settings(), start=dict.fromkeys(FEW, 1.2), progress=interrupt)
-    assert told == [0]
+    assert reported == [0]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -337,11 +339,11 @@ def solution_of(**more: object) -> Solution:
     return identify(SHIP, dataset, given.get("runs_wanted", dataset.runs), settings(**more), start=given.get("start"))  # type: ignore[arg-type]
 
 
-def test_a_start_that_diverges_is_told() -> None:
-    found = solution_of(start={FEW[0]: -1e6})
-    assert found.status == "diverged"
-    assert "'M01'" in found.sentence
-    assert "\n" not in found.sentence
+def test_a_start_that_diverges_is_reported() -> None:
+    solution = solution_of(start={FEW[0]: -1e6})
+    assert solution.status == "diverged"
+    assert "'M01'" in solution.sentence
+    assert "\n" not in solution.sentence
 
 
 @pytest.mark.parametrize(
@@ -396,7 +398,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
         ({"weights": {"u": 0.0}}, "greater than 0"),
     ],
 )
-def test_a_wrong_block_is_told(more: dict[str, object], words: str) -> None:
+def test_a_wrong_block_is_reported(more: dict[str, object], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         settings(**more)
 
@@ -404,8 +406,8 @@ def test_a_wrong_block_is_told(more: dict[str, object], words: str) -> None:
 def test_a_number_that_is_zero_needs_its_size() -> None:
     truth = SHIP.with_values({"inertia.x_G": -0.8})
     dataset = trials(truth, runs=3, steps=40)
-    found = identify(SHIP, dataset, dataset.runs, settings(parameters=["inertia.x_G"], scale={"inertia.x_G": 1.0}))
-    assert found.values["inertia.x_G"] == pytest.approx(-0.8, rel=1e-4)
+    solution = identify(SHIP, dataset, dataset.runs, settings(parameters=["inertia.x_G"], scale={"inertia.x_G": 1.0}))
+    assert solution.values["inertia.x_G"] == pytest.approx(-0.8, rel=1e-4)
 
 
 def walked(dataset: Dataset, seed: int) -> Dataset:
@@ -434,10 +436,10 @@ def test_discounted_residuals_let_priors_count() -> None:
 
 def test_residuals_that_vanish_are_discounted_to_a_limit() -> None:
     data = trials(SHIP, runs=1, steps=20)
-    found = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
-    again, _ = _discounted(replace(found, residuals=np.zeros_like(found.residuals)))
-    assert all(again.weights[name] == pytest.approx(LEAST * found.settings.weights[name]) for name in again.weights)
-    assert again.widths["initial_state"] == pytest.approx(found.settings.widths["initial_state"] / LEAST)
+    solution = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
+    again, _ = _discounted(replace(solution, residuals=np.zeros_like(solution.residuals)))
+    assert all(again.weights[name] == pytest.approx(LEAST * solution.settings.weights[name]) for name in again.weights)
+    assert again.widths["initial_state"] == pytest.approx(solution.settings.widths["initial_state"] / LEAST)
 
 
 @pytest.mark.slow
@@ -453,7 +455,7 @@ def test_intervals_of_discounted_fits_cover(noise: str) -> None:
             widths = {"u": 0.02, "v": 0.02, "r": 2e-3}
             data = changed(clean, **{n: clean.frame[n] + rng.normal(0, w, len(clean.frame)) for n, w in widths.items()})
         base = SHIP.with_values({path: SHIP.parameters[path] / rng.normal(1, 0.1) for path in FEW})
-        found = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
-        known, true = statistics(LinearFit.of(found)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
+        solution = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
+        known, true = statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
         held += ((known.low <= true) & (true <= known.high)).tolist()
     assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5

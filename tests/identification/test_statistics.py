@@ -27,8 +27,8 @@ def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, ph
     jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
     rng, covered = np.random.default_rng(1), np.zeros(COUNT)
     for _ in range(200):
-        found = statistics(fitted(jacobian, noise(rng, runs, samples, phi), clusters, signals))
-        covered += (found.low <= 1) & (found.high >= 1)
+        estimates = statistics(fitted(jacobian, noise(rng, runs, samples, phi), clusters, signals))
+        covered += (estimates.low <= 1) & (estimates.high >= 1)
     assert 0.92 <= covered.mean() / 200 <= 0.98
     assert covered.min() / 200 >= 0.90
 
@@ -50,11 +50,11 @@ def test_fisher_is_the_textbook_formula() -> None:
     rows = np.array(NAMES) == "u"
     jacobian = JACOBIAN[rows]
     fit = fitted(jacobian, np.random.default_rng(0).normal(size=len(jacobian)), CLUSTERS[rows], ("u",) * rows.sum())
-    found = statistics(fit).covariances["fisher"]
+    estimates = statistics(fit).covariances["fisher"]
     freedom = len(jacobian) - COUNT
     expected = fit.residuals @ fit.residuals / freedom * np.linalg.inv(jacobian.T @ jacobian)
-    np.testing.assert_allclose(found.matrix, expected, rtol=1e-9)
-    np.testing.assert_allclose(found.freedom, freedom)
+    np.testing.assert_allclose(estimates.matrix, expected, rtol=1e-9)
+    np.testing.assert_allclose(estimates.freedom, freedom)
     np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
 
 
@@ -63,12 +63,12 @@ def test_sandwich_of_single_samples_is_hc2() -> None:
     rows = np.array(NAMES) == "u"
     jacobian = JACOBIAN[rows][:200]
     error = np.random.default_rng(0).normal(size=200)
-    found = statistics(fitted(jacobian, error, np.arange(200), ("u",) * 200))
-    fit, inverse = found.fit, np.linalg.inv(jacobian.T @ jacobian)
+    estimates = statistics(fitted(jacobian, error, np.arange(200), ("u",) * 200))
+    fit, inverse = estimates.fit, np.linalg.inv(jacobian.T @ jacobian)
     leverage = np.einsum("mi,ij,mj->m", jacobian, inverse, jacobian)
     weights = fit.residuals**2 / (1 - leverage)
     expected = inverse @ (jacobian.T * weights) @ jacobian @ inverse
-    np.testing.assert_allclose(found.covariances["sandwich"].matrix, expected, rtol=1e-9)
+    np.testing.assert_allclose(estimates.covariances["sandwich"].matrix, expected, rtol=1e-9)
 
 
 def test_freedom_of_a_mean_over_equal_clusters() -> None:
@@ -89,7 +89,7 @@ def test_scaling_a_parameter_scales_its_interval(phi: float) -> None:
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
     fit, rng = one(phi), np.random.default_rng(5)
-    found = statistics(fit)
+    estimates = statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
     moved = LinearFit(
@@ -100,8 +100,8 @@ def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
         fit.clusters[rows],
         tuple(fit.signals[k] for k in rows),
     )
-    np.testing.assert_allclose(statistics(moved).errors, found.errors[columns], rtol=1e-8)
-    assert [statistics(moved).sentences[k] for k in range(COUNT)] == [found.sentences[j] for j in columns]
+    np.testing.assert_allclose(statistics(moved).errors, estimates.errors[columns], rtol=1e-8)
+    assert [statistics(moved).sentences[k] for k in range(COUNT)] == [estimates.sentences[j] for j in columns]
 
 
 def test_declared_levels_that_are_wrong_do_no_harm() -> None:
@@ -122,64 +122,64 @@ def test_levels_and_memory_are_measured() -> None:
 
 
 def test_a_pair_that_acts_as_one_is_named() -> None:
-    """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is told, others are."""
+    """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is named, others are."""
     jacobian = JACOBIAN.copy()
     jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
-    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
-    assert found.identifiable.tolist() == [False, False, True, True, True, True]
-    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 has no effect" in found.sentences[0]
+    estimates = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    assert estimates.identifiable.tolist() == [False, False, True, True, True, True]
+    assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 has no effect" in estimates.sentences[0]
 
 
 def test_what_has_no_effect_is_named() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[:, 2] = 0
-    found = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
-    assert np.isinf(found.high[2])
-    assert not found.identifiable[2]
-    assert found.identifiable.sum() == COUNT - 1
-    assert "p2 has no effect" in found.sentences[2]
+    estimates = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    assert np.isinf(estimates.high[2])
+    assert not estimates.identifiable[2]
+    assert estimates.identifiable.sum() == COUNT - 1
+    assert "p2 has no effect" in estimates.sentences[2]
 
 
 def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[:, 2] *= 1e-4
     error, widths = noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), np.full(COUNT, 0.2)
-    found = statistics(fitted(jacobian, error, CLUSTERS, NAMES, prior_widths=widths))
-    assert found.errors[2] == pytest.approx(0.2, rel=1e-3)
-    assert not found.identifiable[2]
-    assert found.alone[2] > 10
+    estimates = statistics(fitted(jacobian, error, CLUSTERS, NAMES, prior_widths=widths))
+    assert estimates.errors[2] == pytest.approx(0.2, rel=1e-3)
+    assert not estimates.identifiable[2]
+    assert estimates.alone[2] > 10
 
 
-def test_what_stands_at_a_bound_has_no_interval_and_harms_no_other() -> None:
+def test_what_ends_at_a_bound_has_no_interval_and_harms_no_other() -> None:
     bound = np.array([False, True, False, False, False, False])
-    found = statistics(one(at_bound=bound))
-    assert np.isinf(found.high[1])
-    assert "bound" in found.sentences[1]
+    estimates = statistics(one(at_bound=bound))
+    assert np.isinf(estimates.high[1])
+    assert "bound" in estimates.sentences[1]
     without = replace(
         one(), **{"paths": tuple("abcde"), "factors": np.ones(5), "jacobian": np.delete(one().jacobian, 1, axis=1)}
     )
-    np.testing.assert_allclose(found.errors[~bound], statistics(without).errors, rtol=1e-9)
+    np.testing.assert_allclose(estimates.errors[~bound], statistics(without).errors, rtol=1e-9)
 
 
 def test_what_is_held_counts_as_known() -> None:
     """Held or dropped factors have no interval and do not widen those of others."""
     held = np.array([False, True, False, True, False, False])
-    found = statistics(one(held=held, dropped=("p3",)))
-    assert np.isinf(found.high[held]).all()
-    assert not found.identifiable[held].any()
-    assert "p1 was held at " in found.sentences[1]
-    assert "p3 was dropped" in found.sentences[3]
+    estimates = statistics(one(held=held, dropped=("p3",)))
+    assert np.isinf(estimates.high[held]).all()
+    assert not estimates.identifiable[held].any()
+    assert "p1 was held at " in estimates.sentences[1]
+    assert "p3 was dropped" in estimates.sentences[3]
     without = replace(one(), **{"paths": tuple("abcd"), "factors": np.ones(4), "jacobian": one().jacobian[:, ~held]})
-    np.testing.assert_allclose(found.errors[~held], statistics(without).errors, rtol=1e-9)
+    np.testing.assert_allclose(estimates.errors[~held], statistics(without).errors, rtol=1e-9)
 
 
 def test_nothing_free_is_nothing_known() -> None:
     fit = one(at_bound=np.arange(COUNT) < 2, held=np.arange(COUNT) >= 2)
-    found = statistics(fit)
-    assert np.isinf(found.errors).all()
-    assert (found.low, found.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
-    assert not found.identifiable.any()
-    assert len(found.sentences) == COUNT
+    estimates = statistics(fit)
+    assert np.isinf(estimates.errors).all()
+    assert (estimates.low, estimates.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
+    assert not estimates.identifiable.any()
+    assert len(estimates.sentences) == COUNT
 
 
 def test_nuisances_cost_degrees_of_freedom() -> None:
@@ -200,10 +200,10 @@ def test_nuisances_cost_degrees_of_freedom() -> None:
 
 
 def test_blocks_cut_all_signals_at_the_same_times() -> None:
-    own = blocks(one(), 20)
-    assert len(np.unique(own)) == RUNS * 4
+    numbers = blocks(one(), 20)
+    assert len(np.unique(numbers)) == RUNS * 4
     for run in range(RUNS):
-        u, v, r = (own[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
+        u, v, r = (numbers[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
         assert (u == v).all()
         assert (v == r).all()
 

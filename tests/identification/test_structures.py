@@ -50,27 +50,27 @@ def rates(vessel: Vessel, nu: tuple[float, float, float], orders: dict[str, floa
 def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Vessel) -> None:
     data = log_of(ship)
     asked = SETTINGS if ship is KVLCC2 else Identify(parameters=["hull.*"])
-    found = exchange(ship, name, data, data.runs, asked)
-    assert max(found.misfit.values()) < 0.16
+    exchanged = exchange(ship, name, data, data.runs, asked)
+    assert max(exchanged.misfit.values()) < 0.16
     moving = data.frame[["u", "v", "r", *dynamics(ship).commands]].iloc[10::17]
     short = [column.rsplit(".", 1)[-1] for column in moving.columns]
     pairs = []
     for row in moving.to_numpy():
         values = dict(zip(short, row.tolist(), strict=True))
         nu = (values["u"], values["v"], values["r"])
-        pairs.append((rates(ship, nu, values), rates(found.vessel, nu, values)))
+        pairs.append((rates(ship, nu, values), rates(exchanged.vessel, nu, values)))
     old, new = np.array(pairs).swapaxes(0, 1)
     assert (np.sqrt(((old - new) ** 2).mean(axis=0)) < 0.3 * np.sqrt((old**2).mean(axis=0))).all()
-    free = unknowns(found.vessel, found.settings)  # the vessel accepts its settings
+    free = unknowns(exchanged.vessel, exchanged.settings)  # the vessel accepts its settings
     assert set(STRUCTURES[name].hull) <= set(free.paths)
 
 
-def test_the_same_structure_is_found_again() -> None:
+def test_the_same_structure_is_recovered() -> None:
     data = log_of(KVLCC2)
-    found = exchange(KVLCC2, "mmg", data, data.runs, SETTINGS)
+    exchanged = exchange(KVLCC2, "mmg", data, data.runs, SETTINGS)
     for path, value in KVLCC2.parameters.items():
-        assert found.vessel.parameters[path] == pytest.approx(value, rel=1e-4, abs=1e-6), path
-    assert max(found.misfit.values()) < 1e-6
+        assert exchanged.vessel.parameters[path] == pytest.approx(value, rel=1e-4, abs=1e-6), path
+    assert max(exchanged.misfit.values()) < 1e-6
     present = exchange(KVLCC2, PRESENT, data, data.runs, SETTINGS)
     assert present.vessel is KVLCC2
     assert present.settings is SETTINGS
@@ -78,11 +78,11 @@ def test_the_same_structure_is_found_again() -> None:
 
 def test_numbers_outside_of_the_hull_stay_as_the_settings_say() -> None:
     data = trials(KVLCC2, runs=2, steps=40)
-    found = exchange(KVLCC2, "cubic", data, data.runs, SETTINGS).settings
-    assert {"added_mass.Y_vdot", "thruster.rudder.f_alpha"} <= set(found.parameters)
-    assert not [path for path in found.parameters if path.startswith("hull.mmg")]
-    assert found.prior["added_mass.Y_vdot"] == 0.2
-    assert found.bounds == {"thruster.rudder.f_alpha": (0.5, 2.0)}
+    exchanged = exchange(KVLCC2, "cubic", data, data.runs, SETTINGS).settings
+    assert {"added_mass.Y_vdot", "thruster.rudder.f_alpha"} <= set(exchanged.parameters)
+    assert not [path for path in exchanged.parameters if path.startswith("hull.mmg")]
+    assert exchanged.prior["added_mass.Y_vdot"] == 0.2
+    assert exchanged.bounds == {"thruster.rudder.f_alpha": (0.5, 2.0)}
     polynomial = exchange(KVLCC2, "abkowitz", data, data.runs, SETTINGS)
     assert "thruster.rudder.f_alpha" not in polynomial.settings.parameters  # that rudder is gone, its gear is not
     rudder, before = (one.document["thruster"]["rudder"] for one in (polynomial.vessel, KVLCC2))

@@ -14,10 +14,12 @@ from tests.identification.voyages import SETTINGS, guess, voyages
 def test_a_first_guess_becomes_a_ship_that_predicts() -> None:
     data = voyages(6, 40.0, 80.0)
     settings = SETTINGS.model_copy(update={"step": 0.5})
-    found = run_identification(guess().vessel, data, settings, held_out=data.runs[4:], ahead=30.0)
-    assert len(found.solution.paths) == 20
-    assert found.solution.status == "ok"
-    errors = found.errors[(found.errors["set"] == "test") & (found.errors["run"] == ALL)].set_index("model")
+    identified = run_identification(guess().vessel, data, settings, held_out=data.runs[4:], ahead=30.0)
+    assert len(identified.solution.paths) == 20
+    assert identified.solution.status == "ok"
+    errors = identified.errors[(identified.errors["set"] == "test") & (identified.errors["run"] == ALL)].set_index(
+        "model"
+    )
     for signal in ("u", "v", "r", "position"):
         assert errors[signal]["after"] < 0.5 * errors[signal]["before"]
-    assert np.isfinite(found.statistics.errors[~found.solution.at_bound]).all()
+    assert np.isfinite(identified.statistics.errors[~identified.solution.at_bound]).all()

@@ -1,4 +1,4 @@
-"""Trials that shipid's own simulator sails: random orders held for a while, logged once a step, without noise."""
+"""Trials by the simulator of shipid: random orders held for a while, logged once a step, without noise."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def trials(
     seed: int = 1,
     *,
     step: float = 1.0,
-    told: Mapping[str, np.ndarray] | None = None,
+    true_commands: Mapping[str, np.ndarray] | None = None,
     weather: Mapping[str, np.ndarray] | None = None,
     parameters: np.ndarray | None = None,
     method: str = "rk4",
 ) -> Dataset:
     """Sail the runs and log them.
 
-    told : commands in force where they differ from those logged. weather : channel -> (runs,), not logged.
+    true_commands : commands in force where they differ from those logged. weather : channel -> (runs,), not logged.
     parameters : (runs, P), of each run.
     """
     model = dynamics(vessel)
@@ -59,7 +59,7 @@ def trials(
         path = rollout(
             vessel,
             {key: value[[i]] for key, value in start.items()},
-            {key: value[:-1, [i]] for key, value in (told or logged).items()},
+            {key: value[:-1, [i]] for key, value in (true_commands or logged).items()},
             {key: value[[i]] for key, value in environment.items()},
             step=step,
             num_steps=steps,

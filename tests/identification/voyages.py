@@ -59,8 +59,8 @@ def voyages(runs: int, shortest: float = 100.0, longest: float = 300.0, seed: in
     frames = []
     for run, length in enumerate(rng.uniform(shortest, longest, runs)):
         rows = round(length / STEP) + 1
-        own = {name: x[:rows, run] + rng.normal(0, NOISE.get(name, 0.0), rows) for name, x in columns.items()}
-        frames.append(pd.DataFrame({"run": f"R{run + 1:02d}", "t": t[:rows], **own}))
+        measured = {name: x[:rows, run] + rng.normal(0, NOISE.get(name, 0.0), rows) for name, x in columns.items()}
+        frames.append(pd.DataFrame({"run": f"R{run + 1:02d}", "t": t[:rows], **measured}))
     frame = pd.concat(frames, ignore_index=True)
     frame["flags"] = 0
     return Dataset(frame, {"clock": "run", "flags": []})

@@ -51,7 +51,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Verdict:
-    """`right`, `said` (wrong, and the guess says that it is unsure or fails) or `silent`; with reasons."""
+    """`right`, `reported` (wrong, and the guess says that it is unsure or fails) or `silent`; with reasons."""
 
     word: str
     reasons: tuple[str, ...]
@@ -257,7 +257,7 @@ def _plan(layout: str, ship: Ship, random: np.random.Generator) -> dict[str, Any
         "shaft": shaft,
         "no shaft": random.random() < 0.06,
         "pair": ship.pair,
-        "units said": one_of("names", "row", "none", p=[0.5, 0.12, 0.38]),
+        "units written": one_of("names", "row", "none", p=[0.5, 0.12, 0.38]),
         "extra": [
             w
             for w in ("roll", "pitch", "wind", "water speed", "rudder order", "heading order", "other", "other")
@@ -454,7 +454,7 @@ def _names(
         unit = "" if column.unit is None or column.word in ("latitude", "longitude") else column.unit
         units.append(str(random.choice(UNIT_TEXT[unit])) if unit else "")
         if (
-            plan["units said"] == "names"
+            plan["units written"] == "names"
             and unit
             and not any(mark in base for mark in "[(")
             and "rpm" not in base.lower()
@@ -463,7 +463,7 @@ def _names(
         while base in names:
             base += "_2" if style != "spaced" else " 2"
         names.append(base)
-    form["units"] = units if plan["units said"] == "row" and style not in ("numbers",) else None
+    form["units"] = units if plan["units written"] == "row" and style not in ("numbers",) else None
     return names
 
 
@@ -601,28 +601,30 @@ def _write_folder(
 
 
 def judge(drawn: Drawn) -> Verdict:
-    """Guess, import as drafted, compare: every quantity right, or wrong and said, or wrong and silent."""
+    """Guess, import as drafted, compare: every quantity right, or wrong and reported, or wrong and silent."""
     try:
         guessed = guess(drawn.path)
     except ShipidError as error:
-        return Verdict("right" if drawn.impossible else "said", (f"refused: {error.message}",))
+        return Verdict("right" if drawn.impossible else "reported", (f"refused: {error.message}",))
     file = drawn.path.parent / f"{drawn.path.stem}-draft.toml"
     file.write_text(draft_mapping(guessed, manoeuvres=False), encoding="utf-8")
     try:
         whole = read_mapping(file).model_copy(update={"segment": ()})
         frame = import_log(whole, drawn.path).frame
     except ShipidError as error:
-        return Verdict("right" if drawn.impossible else "said", (f"not imported: {error.path or ''}: {error.message}",))
+        return Verdict(
+            "right" if drawn.impossible else "reported", (f"not imported: {error.path or ''}: {error.message}",)
+        )
     if drawn.impossible:
-        said = _unsure(guessed, "psi", "north", "east", "latitude")
-        return Verdict("said" if said else "silent", ("imported what has no position or no heading",))
+        reported = _unsure(guessed, "psi", "north", "east", "latitude")
+        return Verdict("reported" if reported else "silent", ("imported what has no position or no heading",))
     wrong = _compare(drawn, frame, guessed)
-    if any(said and reason.startswith("psi") for said, reason in wrong):  # the rest follows from the heading
+    if any(reported and reason.startswith("psi") for reported, reason in wrong):  # the rest follows from the heading
         wrong = [(True, reason) for _, reason in wrong]
     if not wrong:
         return Verdict("right", ())
-    word = "said" if all(said for said, _ in wrong) else "silent"
-    return Verdict(word, tuple(("said: " if said else "SILENT: ") + reason for said, reason in wrong))
+    word = "reported" if all(reported for reported, _ in wrong) else "silent"
+    return Verdict(word, tuple(("reported: " if reported else "SILENT: ") + reason for reported, reason in wrong))
 
 
 def _unsure(guessed: Guess, *names: str) -> bool:

@@ -74,7 +74,7 @@ def test_download_keeps_the_checksum(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("absolute", [True, False])
-def test_download_of_an_own_mapping_stays_in_the_cache(
+def test_download_of_a_users_mapping_stays_in_the_cache(
     absolute: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, cache, folder = b"tvec\n", tmp_path / "cache", tmp_path / "mine"

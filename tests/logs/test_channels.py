@@ -1,4 +1,4 @@
-"""Channels with clocks, delays and frames of their own become one dataset, equal to the motion that made them."""
+"""Channels with different clocks, delays and frames become one dataset, equal to the motion that made them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,7 +43,7 @@ GAP = ('from = "time"', 'from = "time"\nmax_gap = 3.0')
 
 
 def test_irregular_clocks_and_latencies(tmp_path: Path) -> None:
-    """GPS of 1 s and compass of 0.3 to 0.7 s in files of their own, each late by its own delay."""
+    """GPS of 1 s and compass of 0.3 to 0.7 s in separate files, each with another delay."""
     random = np.random.default_rng(0)
     dense = turning(np.arange(0.0, 125.0, 0.01))
     gps = dense.iloc[::100]
@@ -96,7 +96,7 @@ latency = {late["compass"]}
     assert digest_of(read_mapping(mapping), log) != one  # the digest covers every file
 
 
-def test_own_step_holds_orders_and_passes_north(tmp_path: Path) -> None:
+def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> None:
     mapping = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.2'))
     frame = import_log(read_mapping(mapping), logged(turning(T), tmp_path)).frame
     np.testing.assert_allclose(np.diff(frame["t"]), 0.2)
@@ -213,8 +213,8 @@ class TestHsva:
         overshoots = {"10_10_P": (9.73, 17.77), "10_10_S": (9.69, 20.54)}
         for run, expected in overshoots.items():
             psi = np.degrees(dataset.frame.loc[dataset.frame["run"] == run, "psi"])
-            found = sorted([-psi.min() - 10.0, psi.max() - 10.0])
-            np.testing.assert_allclose(found, sorted(expected), atol=0.05)
+            ends = sorted([-psi.min() - 10.0, psi.max() - 10.0])
+            np.testing.assert_allclose(ends, sorted(expected), atol=0.05)
 
     def test_velocities_left_out_are_estimated(self, folder: Path, hsva: Dataset, tmp_path: Path) -> None:
         """From position and heading alone: within 1 % of what each varies by, and no further off than it says."""
@@ -224,12 +224,12 @@ class TestHsva:
         kept = [f"[columns.{block}" for block in blocks if block.partition("]")[0] not in ("u", "v", "r")]
         noise = "position = 0.001\nheading_deg = 0.02\nacceleration = 0.01\nangular_acceleration_deg = 0.3\n"
         (tmp_path / "m.toml").write_text(f"{head}\n{''.join(kept)}\n[estimate]\n{noise}")
-        found = import_log(read_mapping(tmp_path / "m.toml"), folder).frame
+        frame = import_log(read_mapping(tmp_path / "m.toml"), folder).frame
         logged = hsva.frame[hsva.frame["run"].str.startswith("20_10")].reset_index(drop=True)
         for name in ("u", "v", "r"):
-            error = found[name] - logged[name]
+            error = frame[name] - logged[name]
             assert np.sqrt((error**2).mean()) < 0.01 * logged[name].std()
-            assert (error.abs() < 3 * found[f"std_{name}"]).mean() > 0.99
+            assert (error.abs() < 3 * frame[f"std_{name}"]).mean() > 0.99
 
     def test_the_names_of_the_publication_fail_them(self, folder: Path, tmp_path: Path) -> None:
         """Before the repairs of names: u, v taken as body velocities, and the roll angle as the yaw rate."""

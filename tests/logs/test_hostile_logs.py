@@ -181,11 +181,11 @@ WRONG_UNITS: dict[str, tuple[Write, str]] = {
 
 def shipid(*arguments: str) -> tuple[int, str]:
     """Run a command as the entry point does: its status, and the one line of an error."""
-    found = CliRunner().invoke(app, list(arguments))
-    if isinstance(found.exception, ShipidError):
-        return 1, str(found.exception)
-    assert found.exception is None or isinstance(found.exception, SystemExit), found.exception
-    return found.exit_code, found.output
+    result = CliRunner().invoke(app, list(arguments))
+    if isinstance(result.exception, ShipidError):
+        return 1, str(result.exception)
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result.exit_code, result.output
 
 
 def left(folder: Path) -> set[str]:
@@ -198,8 +198,10 @@ def test_there_are_enough() -> None:
 
 def test_the_log_they_come_from_is_good(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(GOOD)
-    status, said = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", str(tmp_path / "o.parquet"))
-    assert status == 0, said
+    status, output = shipid(
+        "data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", str(tmp_path / "o.parquet")
+    )
+    assert status == 0, output
 
 
 @pytest.mark.parametrize("name", IMPORTS)
@@ -208,17 +210,17 @@ def test_import(name: str, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     write(log, GOOD)
     before = left(tmp_path)
-    status, said = shipid("data", "import", str(PLAIN), str(log), "--out", str(tmp_path / "out" / "o.parquet"))
+    status, output = shipid("data", "import", str(PLAIN), str(log), "--out", str(tmp_path / "out" / "o.parquet"))
     assert status == 1
-    assert_one_line(said, log, part)
+    assert_one_line(output, log, part)
     assert left(tmp_path) == before
 
 
-def assert_one_line(said: str, log: Path, part: str) -> None:
-    assert said.startswith(str(log))
-    assert part in said
-    assert said.isprintable()
-    assert len(said) < 800
+def assert_one_line(message: str, log: Path, part: str) -> None:
+    assert message.startswith(str(log))
+    assert part in message
+    assert message.isprintable()
+    assert len(message) < 800
 
 
 @pytest.mark.parametrize("name", IMPORTS)
@@ -227,24 +229,24 @@ def test_guess(name: str, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     IMPORTS[name][0](log, GOOD)
     before = left(tmp_path)
-    status, said = shipid("data", "import", "--guess", str(log), "--out", str(tmp_path / "draft.toml"))
+    status, output = shipid("data", "import", "--guess", str(log), "--out", str(tmp_path / "draft.toml"))
     if status == 0:
         assert left(tmp_path) == before | {"draft.toml", ".shipid", ".shipid/mapping.schema.json"}
         return
-    assert_one_line(said, log, "")
+    assert_one_line(output, log, "")
     assert left(tmp_path) == before
 
 
 @pytest.mark.parametrize("name", WRONG_UNITS)
-def test_wrong_units_are_told_by_the_checks(name: str, tmp_path: Path) -> None:
+def test_wrong_units_are_reported_by_the_checks(name: str, tmp_path: Path) -> None:
     write, part = WRONG_UNITS[name]
     write(tmp_path / "log.csv", GOOD)
     out = str(tmp_path / "o.parquet")
-    status, said = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", out)
-    assert status == 0, said
-    status, said = shipid("data", "check", out)
+    status, output = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", out)
+    assert status == 0, output
+    status, output = shipid("data", "check", out)
     assert status == 1
-    assert part in said.partition("what to look at")[2]
+    assert part in output.partition("what to look at")[2]
 
 
 def a_folder(folder: Path) -> Path:
@@ -270,9 +272,9 @@ def test_no_file(name: str, arguments: tuple[str, ...], tmp_path: Path) -> None:
     log = SPECIAL[name](tmp_path)
     before = left(tmp_path)
     ending = "toml" if "--guess" in arguments else "parquet"
-    status, said = shipid(*arguments, str(log), "--out", str(tmp_path / f"o.{ending}"))
+    status, output = shipid(*arguments, str(log), "--out", str(tmp_path / f"o.{ending}"))
     assert status == 1
-    assert_one_line(said, log, "cannot be read")
+    assert_one_line(output, log, "cannot be read")
     assert left(tmp_path) == before
 
 
@@ -292,9 +294,9 @@ def test_damaged_files_of_other_formats(kind: str, tmp_path: Path) -> None:
     before = left(tmp_path)
     for arguments in (("data", "import", str(mapping), str(log)), ("data", "import", "--guess", str(log))):
         ending = "toml" if "--guess" in arguments else "parquet"
-        status, said = shipid(*arguments, "--out", str(tmp_path / f"o.{ending}"))
+        status, output = shipid(*arguments, "--out", str(tmp_path / f"o.{ending}"))
         assert status == 1
-        assert_one_line(said, log, "")
+        assert_one_line(output, log, "")
         assert left(tmp_path) == before
 
 
@@ -303,6 +305,6 @@ def test_a_place_where_one_may_not_write(tmp_path: Path) -> None:
     as_log(turning(T), tmp_path / "log.csv")
     (tmp_path / "closed").mkdir(mode=0o500)
     out = str(tmp_path / "closed" / "o.parquet")
-    status, said = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", out)
+    status, output = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", out)
     assert status == 1
-    assert "cannot be written" in said
+    assert "cannot be written" in output

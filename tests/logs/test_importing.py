@@ -1,4 +1,4 @@
-"""The real log is imported to known facts; defects put into synthetic logs are found and healed."""
+"""The real log is imported to known facts; defects put into synthetic logs are detected and repaired."""
 
 import csv
 from collections.abc import Callable
@@ -42,8 +42,8 @@ class TestGunnerus:
         with (gunnerus_log.parent / "test_segments.csv").open() as stream:
             tests = [(row["name"], float(row["t0"]), float(row["t1"])) for row in csv.DictReader(stream)]
         times = gunnerus.frame.groupby("run", sort=False)["t"].agg(["min", "max"])
-        found = [(run.partition(" (")[0], start, end) for run, start, end in times.itertuples()]
-        assert found == tests
+        spans = [(run.partition(" (")[0], start, end) for run, start, end in times.itertuples()]
+        assert spans == tests
 
     def test_ranges(self, gunnerus_log: Path) -> None:
         raw = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("scale", "heading_offset", "lever_arm"))
@@ -161,9 +161,9 @@ def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping:
     with pytest.raises(DataError, match="appears twice"):
         import_log(read_mapping(plain_mapping()), log)
     mapping = plain_mapping("", ('from = "time"', f'from = "time"\nevery = {step}'))
-    found = import_log(read_mapping(mapping), log).frame["t"].to_numpy()
-    np.testing.assert_allclose(np.diff(found), step, rtol=1e-9)
-    np.testing.assert_allclose(found, t, atol=rounded)
+    times = import_log(read_mapping(mapping), log).frame["t"].to_numpy()
+    np.testing.assert_allclose(np.diff(times), step, rtol=1e-9)
+    np.testing.assert_allclose(times, t, atol=rounded)
 
 
 def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
@@ -258,7 +258,7 @@ def test_mapping_is_frozen_and_digested(plain_mapping: Write) -> None:
 def test_wind_felt_on_board_becomes_the_wind_over_ground(
     seed: int, direction: str, plain_mapping: Write, tmp_path: Path
 ) -> None:
-    """A ship that turns and drifts in one wind feels the wind less her own velocity, from another side each second."""
+    """A ship that turns and drifts feels the true wind less the ship's velocity, from another side each second."""
     rng = np.random.default_rng(seed)
     motion = turning(T, u=rng.uniform(2, 6), v=rng.uniform(-2, 2), psi0=rng.uniform(0, 6))
     speed, towards = rng.uniform(1, 12), rng.uniform(0, 2 * np.pi)

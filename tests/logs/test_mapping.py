@@ -78,7 +78,7 @@ def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "replace", "path", "said"),
+    ("more", "replace", "path", "message"),
     [
         ('digest = "x"\n', None, "digest", "computed, not written"),
         ("", ('unit = "rpm"', 'unit = "deg"'), "columns.propeller.n.unit", "unknown unit 'deg'"),
@@ -99,12 +99,12 @@ def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
     ],
 )
 def test_a_contradiction_is_refused_with_its_key(
-    more: str, replace: tuple[str, str] | None, path: str, said: str, plain_mapping: Write
+    more: str, replace: tuple[str, str] | None, path: str, message: str, plain_mapping: Write
 ) -> None:
     file = plain_mapping("", replace or ("", ""))
     text = file.read_text()
     file.write_text(more + text if more.startswith("digest") else f"{text}\n{more}")
-    with pytest.raises(DocumentError, match=said) as caught:
+    with pytest.raises(DocumentError, match=message) as caught:
         read_mapping(file)
     assert str(caught.value.path).startswith(path)
     assert "mapping.toml" in str(caught.value)

@@ -10,11 +10,11 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.logs.measuring import measure_dataset
 from shipid.measures import zigzag
-from tests.measures.sailed import SAILED, every
+from tests.measures.made_records import RECORDS, every
 
 
 def rows_of(kind: str, run: str) -> pd.DataFrame:
-    record = every(SAILED[kind](), 0.5)
+    record = every(RECORDS[kind](), 0.5)
     states = {name: getattr(record, name) for name in ("t", "north", "east", "psi", "u", "v", "r")}
     shaft = np.full(len(record.t), 2.0) if record.shaft is None else record.shaft
     return pd.DataFrame({"run": run, **states, "rudder.delta": record.helm, "main.n": shaft, "flags": 0})
@@ -31,21 +31,21 @@ def dataset() -> Dataset:
 
 
 def test_each_run_is_measured_as_what_it_is(dataset: Dataset) -> None:
-    found = measure_dataset(dataset, length=50.0)
-    kinds = found.measures.groupby("run", sort=False)["kind"].unique().map(list).to_dict()
+    measured = measure_dataset(dataset, length=50.0)
+    kinds = measured.measures.groupby("run", sort=False)["kind"].unique().map(list).to_dict()
     assert kinds == {"Z": ["zigzag"], "P": ["turning", "pull-out"], "S": ["stop"], "T/1": ["turning"]}
-    assert set(found.left) == {"still", "T/2"}
-    first = found.measures.set_index(["run", "measure"]).loc[("Z", "overshoot 1")]
-    exact = zigzag(every(SAILED["zigzag"](), 0.5))["overshoot_1"].value
+    assert set(measured.left) == {"still", "T/2"}
+    first = measured.measures.set_index(["run", "measure"]).loc[("Z", "overshoot 1")]
+    exact = zigzag(every(RECORDS["zigzag"](), 0.5))["overshoot_1"].value
     assert (first["value"], first["unit"]) == (pytest.approx(np.degrees(exact)), "deg")
-    assert set(found.criteria["run"]) == {"Z", "P", "S", "T/1"}
+    assert set(measured.criteria["run"]) == {"Z", "P", "S", "T/1"}
 
 
 def test_a_kind_may_be_declared(dataset: Dataset) -> None:
-    found = measure_dataset(dataset, "pull-out")
-    assert set(found.measures["kind"]) == {"pull-out"}
-    assert not found.left
-    stop = found.measures[found.measures["run"] == "S"]
+    measured = measure_dataset(dataset, "pull-out")
+    assert set(measured.measures["kind"]) == {"pull-out"}
+    assert not measured.left
+    stop = measured.measures[measured.measures["run"] == "S"]
     assert (stop["note"] != "").any()
     with pytest.raises(DataError, match="--manoeuvre: no manoeuvre is called 'zigzap'"):
         measure_dataset(dataset, "zigzap")

@@ -102,13 +102,13 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
 def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     """From a minute before midnight; a time of day goes on after it."""
     moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
-    found = seconds(pd.Series(moments.strftime(style)))
-    np.testing.assert_allclose(found, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+    times = seconds(pd.Series(moments.strftime(style)))
+    np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
 
 
 def test_what_is_no_date_is_not_a_number() -> None:
-    found = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
-    np.testing.assert_array_equal(found, [1666857600.0, np.nan, 1666857601.0])
+    times = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
+    np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
 
 
 @pytest.mark.parametrize(("day", "time"), [("%d.%m.%Y", "%H:%M:%S.%f"), ("%Y-%m-%d", "%H:%M:%S,%f")])
@@ -172,8 +172,8 @@ def test_what_blocks_cannot_read_is_left_to_the_thorough_way(
 
 
 def test_a_device_and_a_folder_are_no_logs(tmp_path: Path) -> None:
-    for path, said in ((Path("/dev/zero"), "a device or a pipe, not a file"), (tmp_path, "it is a folder")):
-        with pytest.raises(DataError, match=said):
+    for path, message in ((Path("/dev/zero"), "a device or a pipe, not a file"), (tmp_path, "it is a folder")):
+        with pytest.raises(DataError, match=message):
             require_file(path)
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(DataError, match="a device or a pipe"):
@@ -286,7 +286,7 @@ def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, p
         psi = np.degrees(row.psi) % 360
         ahead, abeam = 8 * np.sin(row.psi) - row.u, 8 * np.cos(row.psi) - row.v
         comes_from = (np.degrees(np.arctan2(abeam, ahead)) + 180) % 360
-        said = [
+        bodies = [
             f"GPRMC,{stamp},A,{where},{speed[index]:.6f},{course[index]:.5f},271022,,,A",
             f"HEHDT,{psi:.5f},T",
             f"TIROT,{np.degrees(row.r) * 60:.5f},A",
@@ -294,7 +294,7 @@ def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, p
             "AGRSA,10.0,A,,",
         ]
         before = f"{row.t:.1f} " if time == "line" else ""
-        lines += [before + sentence(body) for body in said]
+        lines += [before + sentence(body) for body in bodies]
     return "\r\n".join(lines) + "\r\n", motion
 
 

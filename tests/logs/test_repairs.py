@@ -85,7 +85,7 @@ def wrapped_and_interpolated(tmp_path: Path, early: float) -> tuple[Path, int]:
 
 
 @pytest.mark.parametrize("early", [-0.02, 0.0, 0.02])  # 0.02 s: an outer false sample is only 5 deg wrong
-def test_interpolated_wraps_are_found_and_healed(
+def test_interpolated_wraps_are_detected_and_repaired(
     early: float, plain_mapping: Callable[..., Path], tmp_path: Path
 ) -> None:
     log, wraps = wrapped_and_interpolated(tmp_path, early)

@@ -9,7 +9,7 @@ from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria, first_limit, second_limit
 from shipid.measures.record import Measures
 from shipid.units import DEGREE
-from tests.measures.sailed import SAILED, every
+from tests.measures.made_records import RECORDS, every
 
 
 @pytest.mark.parametrize(
@@ -22,19 +22,19 @@ def test_limits_of_the_overshoots(ratio: float, first: float, second: float) -> 
 
 
 def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[float, float, bool | None, str]]:
-    measures = MEASURES[kind](every(SAILED[kind](), 0.5))
+    measures = MEASURES[kind](every(RECORDS[kind](), 0.5))
     changed = Measures()
     for name, one in measures.items():
-        changed.add(name, values.get(name, one.value), one.unit, one.why or "was not found")
-    found = criteria(kind, changed, length)
-    return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in found}
+        changed.add(name, values.get(name, one.value), one.unit, one.why or "is missing")
+    judgements = criteria(kind, changed, length)
+    return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in judgements}
 
 
 def test_a_turning_circle() -> None:
     assert judged("turning", 200.0, advance=880.0, tactical_diameter=1010.0) == {
         "5.3.1": (pytest.approx(5.05), 5.0, False, "")
     }
-    rows = criteria("turning", MEASURES["turning"](every(SAILED["turning"](), 0.5)), 200.0)
+    rows = criteria("turning", MEASURES["turning"](every(RECORDS["turning"](), 0.5)), 200.0)
     assert [(one.limit, one.met) for one in rows] == [(4.5, True), (5.0, True)]
     value, _, met, note = judged("turning", 200.0, helm=20 * DEGREE)["5.3.1"]
     assert np.isfinite(value)
@@ -43,10 +43,10 @@ def test_a_turning_circle() -> None:
 
 
 def test_a_zigzag() -> None:
-    found = judged("zigzag", 200.0, approach_speed=5.0, overshoot_1=19 * DEGREE, overshoot_2=41 * DEGREE)
-    assert list(found) == ["5.3.2", "5.3.3.1", "5.3.3.2"]
-    assert found["5.3.3.1"] == (pytest.approx(19 * DEGREE), pytest.approx(20 * DEGREE), True, "")
-    assert found["5.3.3.2"][1:] == (pytest.approx(40 * DEGREE), False, "")
+    by_claim = judged("zigzag", 200.0, approach_speed=5.0, overshoot_1=19 * DEGREE, overshoot_2=41 * DEGREE)
+    assert list(by_claim) == ["5.3.2", "5.3.3.1", "5.3.3.2"]
+    assert by_claim["5.3.3.1"] == (pytest.approx(19 * DEGREE), pytest.approx(20 * DEGREE), True, "")
+    assert by_claim["5.3.3.2"][1:] == (pytest.approx(40 * DEGREE), False, "")
     both = {"helm": 20 * DEGREE, "execute_heading": 20 * DEGREE}
     assert list(judged("zigzag", 200.0, **both)) == ["5.3.3.3"]
     assert judged("zigzag", 200.0, helm=20 * DEGREE) == {}
@@ -61,5 +61,5 @@ def test_a_stop() -> None:
 
 def test_what_is_not_judged_says_why() -> None:
     assert judged("stop", None)["5.3.4"][2:] == (None, "the length of the ship is not known")
-    assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "was not found")
+    assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "is missing")
     assert "100 m and more" in judged("stop", 50.0)["5.3.4"][3]

@@ -29,12 +29,12 @@ def columns_of(hsva: Dataset, name: str) -> dict[str, np.ndarray]:
 def test_overshoots_are_those_of_the_readme(hsva: Dataset, name: str) -> None:
     """About the ordered course, 0, to 0.03 deg; about the heading at the execute to 0.1 deg."""
     record = record_of(columns_of(hsva, name))
-    exact, found = zigzag(record, course=0.0), zigzag(record)
-    assert found["execute_heading"].value == pytest.approx(10 * DEGREE)
-    assert found["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
+    exact, measures = zigzag(record, course=0.0), zigzag(record)
+    assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
+    assert measures["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
     for number, angle in enumerate(READ_OFF[name], start=1):
         assert exact[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.03)
-        assert found[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.1)
+        assert measures[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.1)
 
 
 @pytest.mark.parametrize("name", READ_OFF)
@@ -57,8 +57,8 @@ def test_every_zigzag_is_recognised_with_its_execute_heading(hsva: Dataset, name
 
 
 def test_a_short_log_leaves_measures_out_with_a_sentence(hsva: Dataset) -> None:
-    found = zigzag(record_of(columns_of(hsva, "10_10_P")))
-    assert np.isnan(found["period"].value)
-    assert found["period"].why == "the log ends before the fourth execute"
-    judged = {one.name: one for one in criteria("zigzag", found, 7.0)}
+    measures = zigzag(record_of(columns_of(hsva, "10_10_P")))
+    assert np.isnan(measures["period"].value)
+    assert measures["period"].why == "the log ends before the fourth execute"
+    judged = {one.name: one for one in criteria("zigzag", measures, 7.0)}
     assert judged["yaw checking: 10/10 first overshoot (5.3.3.1)"].met is True  # 9.7 against 10 at L/V = 6 s

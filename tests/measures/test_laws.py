@@ -13,25 +13,25 @@ from shipid.measures.recognise import kinds_of
 from shipid.measures.record import Measures, Record
 from shipid.measures.rows import measure_rows
 from shipid.units import DEGREE
-from tests.measures.sailed import SAILED, every, rows
+from tests.measures.made_records import RECORDS, every, rows
 
 KINDS = list(MEASURES)
-DENSE = {kind: every(sail(), 0.05) for kind, sail in SAILED.items()}
+DENSE = {kind: every(sail(), 0.05) for kind, sail in RECORDS.items()}
 SIGNED = ("lateral_deviation", "neutral_helm")  # to starboard
 TOLERANCE = {"rad": 0.02 * DEGREE, "m": 0.1, "s": 0.02, "m/s": 0.002, "rad/s": 0.002 * DEGREE, "-": 0.002}
 
 
-def same(found: Measures, expected: Measures, scale: float = 1.0) -> None:
+def same(measures: Measures, expected: Measures, scale: float = 1.0) -> None:
     """Equal to `scale` of the stated tolerance."""
-    assert list(found) == list(expected)
+    assert list(measures) == list(expected)
     for name, one in expected.items():
         close = pytest.approx(one.value, abs=scale * TOLERANCE[one.unit], nan_ok=True)
-        assert found[name].value == close, name
-        assert found[name].why == one.why, name
+        assert measures[name].value == close, name
+        assert measures[name].why == one.why, name
 
 
-def test_every_kind_is_sailed() -> None:
-    assert set(SAILED) == set(MEASURES)
+def test_every_kind_has_a_record() -> None:
+    assert set(RECORDS) == set(MEASURES)
 
 
 @pytest.mark.parametrize("interval", [0.1, 0.5, 1.0])
@@ -40,7 +40,7 @@ def test_sampling_changes_nothing(kind: str, interval: float) -> None:
     """0.02 deg, 0.1 m, 0.02 s and 0.2 % between 20 Hz and 1 Hz; all that can be measured is."""
     dense = MEASURES[kind](DENSE[kind])
     assert all(np.isfinite(one.value) for one in dense.values())
-    same(MEASURES[kind](every(SAILED[kind](), interval)), dense)
+    same(MEASURES[kind](every(RECORDS[kind](), interval)), dense)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -65,10 +65,12 @@ def test_place_course_and_clock_change_nothing(kind: str) -> None:
 def test_port_mirrors_starboard(kind: str) -> None:
     one = DENSE[kind]
     mirrored = replace(one, **{name: -getattr(one, name) for name in ("east", "psi", "v", "r", "helm")})
-    expected, found = MEASURES[kind](one), MEASURES[kind](mirrored)
+    expected, measures = MEASURES[kind](one), MEASURES[kind](mirrored)
     for name in expected:
         signed = name in SIGNED or (kind == "stop" and name == "heading_change")
-        assert found[name].value == pytest.approx(-expected[name].value if signed else expected[name].value, abs=1e-9)
+        assert measures[name].value == pytest.approx(
+            -expected[name].value if signed else expected[name].value, abs=1e-9
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -85,10 +87,10 @@ def test_models_scale_to_ships_by_froude(kind: str) -> None:
         r=one.r / time,
     )
     factors = {"rad": 1.0, "-": 1.0, "m": length, "s": time, "m/s": length / time, "rad/s": 1 / time}
-    expected, found = MEASURES[kind](one), MEASURES[kind](grown)
+    expected, measures = MEASURES[kind](one), MEASURES[kind](grown)
     for name in expected:
         factor = factors[expected[name].unit]
-        assert found[name].value == pytest.approx(factor * expected[name].value, rel=1e-6, abs=1e-9)
+        assert measures[name].value == pytest.approx(factor * expected[name].value, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -99,9 +101,9 @@ def test_what_is_missing_says_why(kind: str) -> None:
     still = Record(one.t, *(np.zeros_like(one.t) for _ in range(7)))
     for record in (*short, still, *(every(DENSE[other], 0.2) for other in KINDS)):
         for measure in MEASURES.values():
-            found = measure(record)
-            assert all(np.isfinite(m.value) == (m.why == "") for m in found.values()), found
-            measure_rows(found, 100.0)
+            measures = measure(record)
+            assert all(np.isfinite(m.value) == (m.why == "") for m in measures.values()), measures
+            measure_rows(measures, 100.0)
         criteria(kind, MEASURES[kind](record), 100.0)
         kinds_of(record)
 
@@ -109,7 +111,7 @@ def test_what_is_missing_says_why(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_kinds_are_recognised(kind: str) -> None:
     """A spiral is seen to be one; which, the user has to say."""
-    found, why = kinds_of(every(DENSE[kind], 0.2))
+    kinds, why = kinds_of(every(DENSE[kind], 0.2))
     expected = {"pull-out": ("turning", "pull-out"), "spiral": (), "reverse-spiral": ()}
-    assert found == expected.get(kind, (kind,))
+    assert kinds == expected.get(kind, (kind,))
     assert ("a spiral or a reverse-spiral" in why) == ("spiral" in kind)

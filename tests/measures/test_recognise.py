@@ -10,23 +10,23 @@ from shipid.measures import turning, zigzag
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.record import Record
 from shipid.units import DEGREE
-from tests.measures.sailed import GAIN, SAILED, START, clock, every, nomoto, sailed
+from tests.measures.made_records import GAIN, RECORDS, START, clock, every, made_record, nomoto
 
 
 def columns(record: Record) -> dict[str, np.ndarray]:
     return {name: getattr(record, name) for name in ("t", "north", "east", "psi", "u", "v", "r")}
 
 
-@pytest.mark.parametrize("kind", [kind for kind in SAILED if kind not in ("stop", "reverse-spiral")])
+@pytest.mark.parametrize("kind", [kind for kind in RECORDS if kind not in ("stop", "reverse-spiral")])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_helm_is_counted_by_what_it_does(kind: str, sign: float) -> None:
-    record = every(SAILED[kind](), 0.5)
+    record = every(RECORDS[kind](), 0.5)
     angles = {"rudder.delta": sign * record.helm, "bow.alpha": -sign * record.helm, "idle.alpha": 0 * record.helm}
     np.testing.assert_allclose(record_of(columns(record) | angles).helm, record.helm)
 
 
 def test_shafts_that_run_and_columns_that_lack() -> None:
-    record = every(SAILED["stop"](), 0.5)
+    record = every(RECORDS["stop"](), 0.5)
     given = columns(record) | {"port.n": record.shaft, "bow.n": 0 * record.t, "actual.port.n": 9 + 0 * record.t}
     np.testing.assert_array_equal(record_of(given).shaft, record.shaft)
     assert record_of(columns(record)).shaft is None
@@ -39,7 +39,7 @@ def run(legs: list[tuple[float, float]], end: float) -> Record:
     """Nomoto's ship with these orders (s, deg), at 10 Hz."""
     t = clock(end)
     psi, r, helm = nomoto(t, [(begin, angle * DEGREE) for begin, angle in legs])
-    return every(sailed(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
+    return every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
 
 
 def test_a_turn_ends_where_the_helm_is_let_go() -> None:
@@ -47,17 +47,17 @@ def test_a_turn_ends_where_the_helm_is_let_go() -> None:
     plain = run([(40.0, 20)], 340.0)
     trial = run([(5.0, 2), (8.0, -2), (11.0, 0), (40.0, 20), (340.0, -30), (343.0, 0), (346.0, 5)], 420.0)
     assert kinds_of(trial) == (("turning",), "")
-    found, expected = turning(trial), turning(plain)
-    assert found["helm"].value == pytest.approx(20 * DEGREE)
-    assert found["execute"].value == pytest.approx(40.0)
-    assert found["steady_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-3)
-    assert found["tactical_diameter"].value == pytest.approx(expected["tactical_diameter"].value, rel=0.01)
+    measures, expected = turning(trial), turning(plain)
+    assert measures["helm"].value == pytest.approx(20 * DEGREE)
+    assert measures["execute"].value == pytest.approx(40.0)
+    assert measures["steady_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-3)
+    assert measures["tactical_diameter"].value == pytest.approx(expected["tactical_diameter"].value, rel=0.01)
 
 
 def test_a_helm_left_over_from_before_is_no_execute() -> None:
     t = clock(200.0)
     psi, r, helm = nomoto(t, [(0.0, 12 * DEGREE), (30.0, 0.0), (110.0, 10 * DEGREE), (120.0, -10 * DEGREE)])
-    record = every(sailed(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
+    record = every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
     later = Record(*(getattr(record, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
     assert zigzag(later)["execute"].value == pytest.approx(110.0)
     assert zigzag(record)["execute"].value == pytest.approx(0.0)  # put over there: she goes straight

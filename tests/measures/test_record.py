@@ -9,7 +9,7 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.measures.record import crossing, departure, extreme, plateaus, value_at
-from tests.measures.sailed import every, stopped
+from tests.measures.made_records import every, stopped
 
 T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
 
@@ -51,12 +51,12 @@ def test_an_order_holds_from_its_row_on() -> None:
     assert departure(t, np.where(t >= 4, -10.0, 2.0), 4) == 4.0
 
 
-def test_plateaus_are_told_from_the_way_between_them() -> None:
+def test_plateaus_are_distinguished_from_the_way_between_them() -> None:
     t = np.arange(0, 90.0, 0.5)
     values = np.where(t < 30, 5.0, np.where(t < 60, 0.0 + 5 * np.exp(-(t - 30) / 3), -5 + 5 * np.exp(-(t - 60) / 3)))
-    found = plateaus(t, values, 0.1)
-    assert [round(values[b]) for _, b in found] == [5, 0, -5]
-    assert [t[b] for _, b in found] == [30.0, 60.0, 89.5]  # a row at the jump belongs to both
+    levels = plateaus(t, values, 0.1)
+    assert [round(values[b]) for _, b in levels] == [5, 0, -5]
+    assert [t[b] for _, b in levels] == [30.0, 60.0, 89.5]  # a row at the jump belongs to both
 
 
 @pytest.mark.parametrize(

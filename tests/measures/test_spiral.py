@@ -10,15 +10,15 @@ import pytest
 from shipid.measures import reverse_spiral, spiral
 from shipid.measures.spiral import levels
 from shipid.units import DEGREE
-from tests.measures.sailed import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral
+from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral
 
 
 def test_a_stable_ship_has_no_loop() -> None:
     record = every(stable_spiral(), 0.5)
-    found, points = spiral(record), levels(record)
-    assert found["loop_width"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
-    assert found["loop_height"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
-    assert found["levels"].value == len(LEVELS)
+    measures, points = spiral(record), levels(record)
+    assert measures["loop_width"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
+    assert measures["loop_height"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
+    assert measures["levels"].value == len(LEVELS)
     np.testing.assert_allclose(points.helm, np.array(LEVELS) * DEGREE, atol=1e-9)
     np.testing.assert_allclose(points.rate, GAIN * np.array(LEVELS) * DEGREE, atol=1e-5)
 
@@ -28,15 +28,15 @@ def test_a_loop_as_wide_as_it_was_made() -> None:
     record = every(stable_spiral(), 0.5)
     back = record.t >= START + HOLD * 8
     jump = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.2 * DEGREE, 0.0)
-    found = spiral(replace(record, r=record.r + jump))
-    assert found["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
-    assert found["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
-    assert found["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
+    measures = spiral(replace(record, r=record.r + jump))
+    assert measures["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
+    assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
+    assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
 
 
 def test_reverse_spiral_finds_the_folds() -> None:
     """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
-    found = reverse_spiral(every(reverse(), 0.5))
-    assert found["levels"].value == len(RATES)
-    assert found["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
-    assert found["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
+    measures = reverse_spiral(every(reverse(), 0.5))
+    assert measures["levels"].value == len(RATES)
+    assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
+    assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)

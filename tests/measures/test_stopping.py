@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from shipid.measures import stop
-from tests.measures.sailed import DECELERATION, SPEED, START, VEER, every, stopped
+from tests.measures.made_records import DECELERATION, SPEED, START, VEER, every, stopped
 
 
 @pytest.mark.parametrize("interval", [0.1, 1.0])
 def test_reaches_of_a_constant_deceleration(interval: float) -> None:
     """Track U^2 / 2a in U / a; head reach and deviation as the integral of U cos, sin of the heading."""
-    found, time = stop(every(stopped(), interval)), SPEED / DECELERATION
+    measures, time = stop(every(stopped(), interval)), SPEED / DECELERATION
     s = np.linspace(0, time, 200001)
     u = SPEED - DECELERATION * s
-    assert found["execute"].value == START
-    assert found["stopping_time"].value == pytest.approx(time, abs=1e-6)
-    assert found["track_reach"].value == pytest.approx(SPEED**2 / 2 / DECELERATION, abs=1e-3)
-    assert found["head_reach"].value == pytest.approx(np.trapezoid(u * np.cos(VEER * s), s), abs=1e-3)
-    assert found["lateral_deviation"].value == pytest.approx(np.trapezoid(u * np.sin(VEER * s), s), abs=1e-3)
-    assert found["heading_change"].value == pytest.approx(VEER * time, abs=1e-6)
+    assert measures["execute"].value == START
+    assert measures["stopping_time"].value == pytest.approx(time, abs=1e-6)
+    assert measures["track_reach"].value == pytest.approx(SPEED**2 / 2 / DECELERATION, abs=1e-3)
+    assert measures["head_reach"].value == pytest.approx(np.trapezoid(u * np.cos(VEER * s), s), abs=1e-3)
+    assert measures["lateral_deviation"].value == pytest.approx(np.trapezoid(u * np.sin(VEER * s), s), abs=1e-3)
+    assert measures["heading_change"].value == pytest.approx(VEER * time, abs=1e-6)
 
 
 def test_without_a_shaft_nothing_is_known() -> None:
-    found = stop(replace(every(stopped(), 1.0), shaft=None))
-    assert all(one.why == "the shaft is not ordered to stop or astern" for one in found.values())
+    measures = stop(replace(every(stopped(), 1.0), shaft=None))
+    assert all(one.why == "the shaft is not ordered to stop or astern" for one in measures.values())

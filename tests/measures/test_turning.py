@@ -9,12 +9,12 @@ import pytest
 
 from shipid.measures import pull_out, turning
 from shipid.units import DEGREE
-from tests.measures.sailed import DRIFT, GAIN, RATE, SPEED, START, circle, every, perfect_circle, released, rows
+from tests.measures.made_records import DRIFT, GAIN, RATE, SPEED, START, circle, every, perfect_circle, released, rows
 
 
 def test_a_perfect_circle_has_exact_measures() -> None:
     """x = R (sin(psi - b) + sin b), y = R (cos b - cos(psi - b)) with R = V / r and drift b."""
-    found, radius = turning(every(perfect_circle(), 0.1)), SPEED / RATE
+    measures, radius = turning(every(perfect_circle(), 0.1)), SPEED / RATE
     exact = {
         "execute": START,
         "helm": 35 * DEGREE,
@@ -33,9 +33,9 @@ def test_a_perfect_circle_has_exact_measures() -> None:
         "steady_drift": DRIFT,
         "speed_loss": 0.0,
     }
-    assert set(found) == set(exact)
+    assert set(measures) == set(exact)
     for name, value in exact.items():
-        assert found[name].value == pytest.approx(value, abs=2e-3), name
+        assert measures[name].value == pytest.approx(value, abs=2e-3), name
 
 
 def test_an_unsteady_turn_has_no_steady_diameter() -> None:
@@ -54,11 +54,11 @@ def test_steady_rate_of_nomoto() -> None:
 
 def test_pull_out_of_a_stable_and_of_an_unstable_ship() -> None:
     record = every(released(), 0.5)
-    found = pull_out(record)
-    assert found["turning_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-4)
-    assert found["residual_rate"].value == pytest.approx(0.0, abs=1e-5)
+    measures = pull_out(record)
+    assert measures["turning_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-4)
+    assert measures["residual_rate"].value == pytest.approx(0.0, abs=1e-5)
     left = 0.3 * DEGREE
-    found = pull_out(replace(record, r=record.r + left * (record.t > 110)))
-    assert found["residual_rate"].value == pytest.approx(left, rel=1e-3)
+    measures = pull_out(replace(record, r=record.r + left * (record.t > 110)))
+    assert measures["residual_rate"].value == pytest.approx(left, rel=1e-3)
     early = pull_out(rows(record, slice(0, 2 * 120)))
     assert "still changes" in early["residual_rate"].why

@@ -9,7 +9,7 @@ import pytest
 
 from shipid.measures import zigzag
 from shipid.units import DEGREE
-from tests.measures.sailed import GAIN, START, TIME, clock, every, nomoto, sailed, zigzag_10, zigzag_legs
+from tests.measures.made_records import GAIN, START, TIME, clock, every, made_record, nomoto, zigzag_10, zigzag_legs
 
 
 @pytest.mark.parametrize(("helm", "heading"), [(10, 10), (20, 20), (20, 10), (10, 5), (15, 1)])
@@ -19,17 +19,17 @@ def test_overshoots_and_times_of_nomoto(helm: float, heading: float, interval: f
     legs, peaks = zigzag_legs(helm * DEGREE, heading * DEGREE, 8)
     t = clock(200.0)
     psi, r, order = nomoto(t, legs)
-    found = zigzag(every(sailed(t, psi, r, order, np.full_like(t, 5.0), 0 * t), interval))
-    assert found["execute_heading"].value == pytest.approx(heading * DEGREE)
-    assert found["execute"].value == pytest.approx(START)
+    measures = zigzag(every(made_record(t, psi, r, order, np.full_like(t, 5.0), 0 * t), interval))
+    assert measures["execute_heading"].value == pytest.approx(heading * DEGREE)
+    assert measures["execute"].value == pytest.approx(START)
     # the helm jumps, so the heading has kinks in its third derivative, which 1 Hz rounds off
     angle, time = (1e-4, 1e-3) if interval < 1 else (0.02, 0.02)
     for number, (overshoot, check) in enumerate(peaks[:4], start=1):
-        assert found[f"overshoot_{number}"].value / DEGREE == pytest.approx(overshoot / DEGREE, abs=angle)
-        assert found[f"time_to_check_{number}"].value == pytest.approx(check, abs=time)
-    assert found["initial_turning_time"].value == pytest.approx(legs[1][0] - START, abs=time)
-    assert found["initial_turning"].value == pytest.approx(5.0 * (legs[1][0] - START), abs=5 * time)
-    assert found["period"].value == pytest.approx(legs[3][0] - legs[1][0], abs=time)
+        assert measures[f"overshoot_{number}"].value / DEGREE == pytest.approx(overshoot / DEGREE, abs=angle)
+        assert measures[f"time_to_check_{number}"].value == pytest.approx(check, abs=time)
+    assert measures["initial_turning_time"].value == pytest.approx(legs[1][0] - START, abs=time)
+    assert measures["initial_turning"].value == pytest.approx(5.0 * (legs[1][0] - START), abs=5 * time)
+    assert measures["period"].value == pytest.approx(legs[3][0] - legs[1][0], abs=time)
     assert GAIN * helm * DEGREE * TIME > 0
 
 
@@ -37,8 +37,8 @@ def test_overshoots_count_from_the_execute_heading_not_from_the_helm() -> None:
     """Where a measured rudder follows 0.5 s after the order, the overshoot still counts from the execute heading."""
     record = every(zigzag_10(), 0.1)
     late = replace(record, helm=np.append(np.zeros(5), record.helm[:-5]))
-    found, expected = zigzag(late, course=0.0)["overshoot_1"], zigzag(record, course=0.0)["overshoot_1"]
-    assert found.value == pytest.approx(expected.value, abs=1e-9)
+    measures, expected = zigzag(late, course=0.0)["overshoot_1"], zigzag(record, course=0.0)["overshoot_1"]
+    assert measures.value == pytest.approx(expected.value, abs=1e-9)
     assert zigzag(late)["execute_heading"].value == pytest.approx(10 * DEGREE)
 
 

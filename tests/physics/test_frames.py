@@ -69,10 +69,10 @@ def test_rate_of_a_steady_current_is_its_derivative_along_the_motion(seed: int) 
     nu_c, rate = current(eta, nu, 0.8, 2.1)
     by_chain_rule = ca.jtimes(nu_c, eta, kinematics(eta, nu))
     function = ca.Function("both", [eta], [rate, by_chain_rule, nu_c])
-    found, expected, velocity = (np.array(x).ravel() for x in function(rng.uniform(-0.8, 0.8, 6)))
-    np.testing.assert_allclose(found, expected, atol=1e-14)
+    computed, expected, velocity = (np.array(x).ravel() for x in function(rng.uniform(-0.8, 0.8, 6)))
+    np.testing.assert_allclose(computed, expected, atol=1e-14)
     assert np.linalg.norm(velocity) == pytest.approx(0.8)
-    assert np.abs(found).max() > 1e-3
+    assert np.abs(computed).max() > 1e-3
 
 
 def test_current_rate_in_the_plane() -> None:

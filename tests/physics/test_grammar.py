@@ -122,7 +122,7 @@ def test_prime_scale(name: str, expected: float) -> None:
     assert float(prime_scale(name, ca.SX(1000.0), ca.SX(20.0), ca.SX(4.0))) == pytest.approx(expected, rel=1e-14)
 
 
-def test_a_prime_derivative_is_told_from_an_si_one() -> None:
+def test_a_prime_derivative_is_distinguished_from_an_si_one() -> None:
     assert PRIME_DERIVATIVES.unit("Y_v") == "prime"
     with pytest.raises(ValueError, match="same monomial"):
         PRIME_DERIVATIVES.check(["Y_rv", "Y_vr"])

@@ -1,4 +1,4 @@
-"""Helmsmen's laws on their own: what they order and remember, number by number."""
+"""Helmsmen's laws alone: what they order and remember, number by number."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_angles_steer_and_shafts_do_not() -> None:
 
 @pytest.mark.parametrize("make", [zigzag, yaw_rate])
 def test_one_helmsman_per_set_of_commands(make: Any) -> None:
-    """One object, one compilation; he is told every command."""
+    """One object, one compilation; he gets every command."""
     assert make(COMMANDS) is make(COMMANDS)
     assert make(COMMANDS) != make(COMMANDS[:2])
     assert dict(list(make(COMMANDS).inputs.items())[:3]) == dict(zip(COMMANDS, ("rev/s", "rad", "rad"), strict=True))
@@ -36,45 +36,45 @@ def test_one_helmsman_per_set_of_commands(make: Any) -> None:
 )
 def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side: int, after: int) -> None:
     """With execute heading 0.2 rad either side of a course of 1 rad; the mirror image does the mirror image."""
-    told = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "course": 1.0}
-    told["execute_heading"] = 0.2 * first
+    inputs = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "course": 1.0}
+    inputs["execute_heading"] = 0.2 * first
     seen, memory = {"psi": 1.0 + turned * first * 1.0000001}, {"side": ca.DM(side)}
     helmsman = zigzag(COMMANDS)
-    ordered = numbers(helmsman.orders(seen, told, memory))
+    ordered = numbers(helmsman.orders(seen, inputs, memory))
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
-    assert numbers(helmsman.advance(seen, told, memory, 0.1)) == {"side": after}
+    assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after}
 
 
 def test_yaw_rate_law() -> None:
-    told = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "rate": 0.03, "gain": 10.0, "reset": 4.0}
+    inputs = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "rate": 0.03, "gain": 10.0, "reset": 4.0}
     helmsman = yaw_rate(COMMANDS)
     assert helmsman.advance is not None
-    ordered = numbers(helmsman.orders({"r": 0.01}, told, {"integral": 0.1}))
+    ordered = numbers(helmsman.orders({"r": 0.01}, inputs, {"integral": 0.1}))
     assert ordered == pytest.approx({"port.n": 2.0, "port.alpha": -0.5 * 0.3, "rudder.delta": 0.6 * 0.3})
-    after = numbers(helmsman.advance({"r": 0.01}, told, {"integral": 0.1}, 0.2))
+    after = numbers(helmsman.advance({"r": 0.01}, inputs, {"integral": 0.1}, 0.2))
     assert after["integral"] == pytest.approx(0.1 + 10 / 4 * 0.02 * 0.2)
-    hard_over = numbers(helmsman.orders({"r": 1.0}, told, {"integral": 0.9}))
+    hard_over = numbers(helmsman.orders({"r": 1.0}, inputs, {"integral": 0.9}))
     assert hard_over["port.alpha"] == 0.5
-    assert numbers(helmsman.advance({"r": 9.0}, told, {"integral": 0.9}, 9.0)) == {"integral": -1.0}
+    assert numbers(helmsman.advance({"r": 9.0}, inputs, {"integral": 0.9}, 9.0)) == {"integral": -1.0}
 
 
 UNITS = (
     Unit("port", (50.0, 0.0, -40.0), (0.0, 50.0, 3.0), (0.0, 1.0)),
     Unit("starboard", (50.0, 0.0, 40.0), (0.0, 50.0, 3.0), (0.0, -1.0)),
 )
-TOLD = {"north": 3.0, "east": 4.0, "heading": 0.5, "omega": 0.1, "n_bias": 1.0, "n_max": 3.0}
+ORDERS = {"north": 3.0, "east": 4.0, "heading": 0.5, "omega": 0.1, "n_bias": 1.0, "n_max": 3.0}
 
 
 def holding() -> Helmsman:
     return station_keeping(UNITS, ("bow.n",))
 
 
-def thrusts(seen: dict[str, float], **told: float) -> np.ndarray:
+def thrusts(seen: dict[str, float], **changes: float) -> np.ndarray:
     """n^2 (cos, sin) of each unit, (units, 2)."""
-    found = numbers(holding().orders(seen, {**TOLD, **told}, dict.fromkeys(("north", "east", "heading"), 0.0)))
-    assert found.pop("bow.n") == 0.0
-    polar = [(found[f"{unit.name}.n"] ** 2, found[f"{unit.name}.alpha"]) for unit in UNITS]
+    forces = numbers(holding().orders(seen, {**ORDERS, **changes}, dict.fromkeys(("north", "east", "heading"), 0.0)))
+    assert forces.pop("bow.n") == 0.0
+    polar = [(forces[f"{unit.name}.n"] ** 2, forces[f"{unit.name}.alpha"]) for unit in UNITS]
     return np.array([[square * np.cos(angle), square * np.sin(angle)] for square, angle in polar])
 
 
@@ -100,14 +100,14 @@ def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
 
 
 def test_a_unit_keeps_to_its_greatest_speed() -> None:
-    far = numbers(holding().orders(at(north=-1e4), TOLD, dict.fromkeys(("north", "east", "heading"), 0.0)))
+    far = numbers(holding().orders(at(north=-1e4), ORDERS, dict.fromkeys(("north", "east", "heading"), 0.0)))
     assert far["port.n"] == far["starboard.n"] == 3.0
 
 
 def test_the_angle_is_continuous_through_zero_thrust_on_the_bias_side() -> None:
     """From one side of the bias to the other; the jump lies opposite the bias."""
     angles = [
-        numbers(holding().orders(at(u=u), TOLD, dict.fromkeys(("north", "east", "heading"), 0.0)))["port.alpha"]
+        numbers(holding().orders(at(u=u), ORDERS, dict.fromkeys(("north", "east", "heading"), 0.0)))["port.alpha"]
         for u in np.linspace(-1, 1, 201)
     ]
     assert np.abs(np.diff(angles)).max() < 0.2
@@ -118,5 +118,5 @@ def test_the_angle_is_continuous_through_zero_thrust_on_the_bias_side() -> None:
 def test_memory_integrates_the_error() -> None:
     helmsman = holding()
     assert helmsman.advance is not None
-    after = numbers(helmsman.advance(at(north=1.0), TOLD, {"north": 0.5, "east": 0.0, "heading": 0.0}, 0.1))
+    after = numbers(helmsman.advance(at(north=1.0), ORDERS, {"north": 0.5, "east": 0.0, "heading": 0.0}, 0.1))
     assert after == pytest.approx({"north": 0.7, "east": 0.0, "heading": 0.0})

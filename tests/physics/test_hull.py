@@ -51,7 +51,7 @@ def test_cross_flow_converges_to_the_integral() -> None:
     assert errors[2] < 2e-4
 
 
-def test_cross_flow_along_the_hull_gives_force_and_moment_their_own_coefficients() -> None:
+def test_cross_flow_along_the_hull_has_coefficients_for_force_and_for_moment() -> None:
     """Pure sway: the force of C_d, its centre k_fwd L / 6 forward. Pure yaw about the middle: 1 + k_ends / 2."""
     uniform, along = (cross_flow(400, 0.5, 0.0, **more) for more in ({}, {"k_fwd": 0.4, "k_ends": 0.6}))
     assert along[1] == pytest.approx(uniform[1], rel=1e-4)
@@ -114,8 +114,8 @@ def test_astern_the_hull_has_more_resistance() -> None:
 def test_prime_derivatives_are_si_ones_at_their_speed() -> None:
     """Y_v' = -0.3: Y = -0.3 x 1/2 rho L^2 U v; the floor of the speed does not show at 4 m/s."""
     u, v = 4.0, 0.3
-    found = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), UPRIGHT, L_pp=20.0, rho=1000.0, Y_v=-0.3))
-    assert found[1] == pytest.approx(-0.3 * 0.5 * 1000 * 400 * np.hypot(u, v) * v, rel=1e-5)
+    forces = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), UPRIGHT, L_pp=20.0, rho=1000.0, Y_v=-0.3))
+    assert forces[1] == pytest.approx(-0.3 * 0.5 * 1000 * 400 * np.hypot(u, v) * v, rel=1e-5)
 
 
 def test_heel_is_a_factor_without_a_scale() -> None:
@@ -135,10 +135,10 @@ def test_bis_derivatives_by_hand() -> None:
     m, L, g, (u, v, r) = 1025.0 * 5000, 76.2, 9.81, (0.8, -0.3, 0.01)
     values = {"X_u": -0.0358, "Y_ur": -0.7, "N_uv": -0.45, "N_r": -0.03, "K_p": -0.01}
     nu_r = ca.SX(ca.DM([u, v, 0, 0.02, 0, r]))
-    found = numbers(hull.bis_derivatives(nu_r, UPRIGHT, nabla=5000.0, L_pp=L, rho=1025.0, g=g, **values))
+    forces = numbers(hull.bis_derivatives(nu_r, UPRIGHT, nabla=5000.0, L_pp=L, rho=1025.0, g=g, **values))
     rate = np.sqrt(g / L)
     expected = [-0.0358 * m * rate * u, -0.7 * m * u * r, 0, -0.01 * m * L**2 * rate * 0.02, 0]
-    np.testing.assert_allclose(found, [*expected, m * -0.45 * u * v - 0.03 * m * L**2 * rate * r], rtol=1e-12)
+    np.testing.assert_allclose(forces, [*expected, m * -0.45 * u * v - 0.03 * m * L**2 * rate * r], rtol=1e-12)
 
 
 def test_the_mmg_hull_is_its_formula() -> None:
@@ -150,8 +150,8 @@ def test_the_mmg_hull_is_its_formula() -> None:
     X = force * (-0.02 - 0.04 * v_**2 + 0.77 * v_**4)
     Y, N = force * (-0.315 * v_ + 0.083 * r_), force * L * (-0.049 * r_ - 0.294 * v_**2 * r_)
     values = {"X_vv": -0.04, "X_vvvv": 0.77, "Y_v": -0.315, "Y_r": 0.083, "N_r": -0.049, "N_vvr": -0.294}
-    found = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
-    np.testing.assert_allclose(numbers(found), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
+    forces = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
+    np.testing.assert_allclose(numbers(forces), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
 
 
 def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
@@ -166,6 +166,6 @@ def test_abkowitz_counts_speed_from_that_of_service() -> None:
     """With Y_uv = Y_v the force goes with u v at any speed."""
     values = {"L_pp": 160.0, "U_0": 7.5, "rho": 1025.0, "Y_v": -0.01, "Y_uv": -0.01, "N_vvv": 0.02}
     for u, v in ((7.5, 0.4), (3.0, -0.5)):
-        found = numbers(hull.abkowitz(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), **values))
-        assert found[1] == pytest.approx(-0.01 * 0.5 * 1025 * 160**2 * u * v)
-        assert found[5] == pytest.approx(0.02 * 0.5 * 1025 * 160**3 * v**3 / 7.5)
+        forces = numbers(hull.abkowitz(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), **values))
+        assert forces[1] == pytest.approx(-0.01 * 0.5 * 1025 * 160**2 * u * v)
+        assert forces[5] == pytest.approx(0.02 * 0.5 * 1025 * 160**3 * v**3 / 7.5)

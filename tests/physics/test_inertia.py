@@ -66,9 +66,9 @@ def test_planar_closed_form(seed: int) -> None:
     M = np.zeros((6, 6))
     M[0, 0], M[1, 1], M[1, 5], M[5, 1], M[5, 5] = rng.uniform(1, 5, 5)
     u, v, r = rng.uniform(-2, 2, 3)
-    found = numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM([u, v, 0, 0, 0, r])))).ravel()[[0, 1, 5]]
+    forces = numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM([u, v, 0, 0, 0, r])))).ravel()[[0, 1, 5]]
     sway = M[1, 1] * v + (M[1, 5] + M[5, 1]) / 2 * r
-    np.testing.assert_allclose(found, [-sway * r, M[0, 0] * u * r, sway * u - M[0, 0] * u * v], atol=1e-13)
+    np.testing.assert_allclose(forces, [-sway * r, M[0, 0] * u * r, sway * u - M[0, 0] * u * v], atol=1e-13)
 
 
 def test_free_rigid_body_keeps_its_momentum() -> None:

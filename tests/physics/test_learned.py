@@ -36,8 +36,8 @@ def test_the_formula_by_hand() -> None:
 
 def test_it_is_bounded_however_large_the_weights() -> None:
     large = {name: [1e6 * value for value in WEIGHTS[name]] for name in OUTPUTS}  # type: ignore[attr-defined]
-    found = np.abs(force(np.array([6.0, 2.0, 0, 0, 0, 0.2]), **large))
-    np.testing.assert_allclose(found[[0, 1, 5]], [WEIGHTS[name] for name in ("X_max", "Y_max", "N_max")], rtol=1e-12)
+    size = np.abs(force(np.array([6.0, 2.0, 0, 0, 0, 0.2]), **large))
+    np.testing.assert_allclose(size[[0, 1, 5]], [WEIGHTS[name] for name in ("X_max", "Y_max", "N_max")], rtol=1e-12)
 
 
 def test_without_output_weights_there_is_exactly_no_force() -> None:

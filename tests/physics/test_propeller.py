@@ -113,12 +113,12 @@ ASTERN = {"1": 0.25, "J": 0.30, "JJ": 0.05}
 
 
 @pytest.mark.parametrize("u", [1.0, 0.0, -0.6])
-def test_astern_thrust_has_its_own_curve(u: float) -> None:
+def test_astern_thrust_has_a_separate_curve(u: float) -> None:
     """X = -(1 - t_P) k_astern rho n^2 D^4 K(J), J = 0.6 u / (n D), negative on a ship that still goes ahead."""
     n, J = -9.0, 0.6 * u / (-9.0 * 0.216)
     K = 0.25 + 0.30 * J + 0.05 * J**2
-    found = thrust(u, n, K_T_astern=ASTERN, k_astern=0.9)[0]
-    assert found == pytest.approx(-0.78 * 0.9 * RHO * 81 * 0.216**4 * K)
+    X = thrust(u, n, K_T_astern=ASTERN, k_astern=0.9)[0]
+    assert pytest.approx(-0.78 * 0.9 * RHO * 81 * 0.216**4 * K) == X
     assert thrust(u, n, K_T_astern=SCREW["K_T"])[0] == thrust(u, n)[0]
     assert thrust(u, 9.0, K_T_astern=ASTERN)[0] == thrust(u, 9.0)[0]
 
@@ -152,13 +152,13 @@ def test_a_screw_astern_pushes_the_stern_aside() -> None:
     """Y = rho n^2 D^4 Y_astern(J), N = rho n^2 D^5 N_astern(J), only astern; a left-handed screw is its mirror."""
     aside = {"Y_astern": {"1": -0.03, "J": 0.02}, "N_astern": {"1": 0.4}}
     n, u, unit = -8.0, 0.5, RHO * 64 * 0.216**4
-    found = thrust(u, n, **aside)
+    forces = thrust(u, n, **aside)
     J = 0.6 * u / (n * 0.216)
-    np.testing.assert_allclose(found[[1, 5]], [unit * (-0.03 + 0.02 * J), unit * 0.216 * 0.4])
-    assert found[0] == thrust(u, n)[0]
+    np.testing.assert_allclose(forces[[1, 5]], [unit * (-0.03 + 0.02 * J), unit * 0.216 * 0.4])
+    assert forces[0] == thrust(u, n)[0]
     np.testing.assert_array_equal(thrust(u, 8.0, **aside), thrust(u, 8.0))
     left = {"Y_astern": {"1": 0.03, "J": -0.02}, "N_astern": {"1": -0.4}}
-    np.testing.assert_allclose(thrust(u, n, **left), found * [1, -1, 1, -1, 1, -1])
+    np.testing.assert_allclose(thrust(u, n, **left), forces * [1, -1, 1, -1, 1, -1])
 
 
 def test_a_screw_astern_draws_water_past_the_rudder() -> None:
@@ -167,9 +167,9 @@ def test_a_screw_astern_draws_water_past_the_rudder() -> None:
     J = u_P / (n * 0.216)
     K = 0.2931 - 0.2753 * J - 0.1385 * J**2
     added = np.sqrt(u_P**2 + 8 / np.pi * K * (n * 0.216) ** 2) - u_P
-    found = washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4)
-    np.testing.assert_allclose(found, [u_P - 0.4 * added, u_P - 0.4 * added, 0.216], rtol=1e-3)
-    assert found[0] < 0.1 * u_P
+    flow = washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4)
+    np.testing.assert_allclose(flow, [u_P - 0.4 * added, u_P - 0.4 * added, 0.216], rtol=1e-3)
+    assert flow[0] < 0.1 * u_P
     np.testing.assert_array_equal(washed([1.0, 0, 0, 0, 0, 0], 9.0, k_suction=0.4), washed([1.0, 0, 0, 0, 0, 0], 9.0))
     near = [washed([1.0, 0, 0, 0, 0, 0], n, k_suction=0.4) for n in (-1e-5, 1e-5)]
     np.testing.assert_allclose(*near, atol=1e-3)
@@ -222,8 +222,8 @@ def test_quadratic_thrust_by_hand() -> None:
     """T = T_nn n|n| - T_nu |n| u - T_uu u|u|; Y and N are shares of T."""
     u, n = 0.7, 20.0
     T = 3.6e-3 * 400 - 1.5e-4 * 20 * u - 0.2 * u**2
-    found = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2)
-    np.testing.assert_allclose(found, [0.9 * T, 0.04 * T, 0, 0, 0, -0.3 * T - 0.2 * 0.9 * T], atol=1e-12)
+    forces = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2)
+    np.testing.assert_allclose(forces, [0.9 * T, 0.04 * T, 0, 0, 0, -0.3 * T - 0.2 * 0.9 * T], atol=1e-12)
     astern = quadratic_wrench(u, -n, k_astern=1.4, dT_nu=3e-4)[0]
     assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 4.5e-4 * 20 * u)
 

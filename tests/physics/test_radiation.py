@@ -28,9 +28,11 @@ TABLED = {
 
 def blocks(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """[radiation.heave_pitch] and [radiation.roll] without their words."""
-    found = load_vessel(name).document["radiation"]
-    own = [{key: value for key, value in found[kind].items() if key != "source"} for kind in ("heave_pitch", "roll")]
-    return own[0], own[1]
+    radiation = load_vessel(name).document["radiation"]
+    modes = [
+        {key: value for key, value in radiation[kind].items() if key != "source"} for kind in ("heave_pitch", "roll")
+    ]
+    return modes[0], modes[1]
 
 
 def driven(name: str, velocity: np.ndarray, step: float) -> np.ndarray:
@@ -38,14 +40,16 @@ def driven(name: str, velocity: np.ndarray, step: float) -> np.ndarray:
     upright, rolling = blocks(name)
     count, extra = 4 * len(upright["sigma"]), 2 * len(rolling["sigma"])
     state, nu = ca.SX.sym("state", count + extra), ca.SX.sym("nu", 6)
-    own, other = state[:count], state[count:]
+    heave_pitch_states, other = state[:count], state[count:]
     modes = {key: upright[key] for key in ("sigma", "omega")}
     rates = ca.vertcat(
-        heave_pitch_rates(ca.SX(6, 1), nu, own, **modes),
+        heave_pitch_rates(ca.SX(6, 1), nu, heave_pitch_states, **modes),
         roll_rates(nu, other, sigma=rolling["sigma"], omega=rolling["omega"]),
     )
     kernels = {key: value for key, value in upright.items() if key.startswith("K")}
-    wrench = heave_pitch(own, **kernels) + roll(other, K44_cos=rolling["K44_cos"], K44_sin=rolling["K44_sin"])
+    wrench = heave_pitch(heave_pitch_states, **kernels) + roll(
+        other, K44_cos=rolling["K44_cos"], K44_sin=rolling["K44_sin"]
+    )
     f, force = ca.Function("f", [state, nu], [rates]), ca.Function("force", [state], [ca.densify(wrench)])
     A = np.array(ca.Function("A", [state, nu], [ca.jacobian(rates, state)])(0, 0))
     B = np.array(ca.Function("B", [state, nu], [ca.jacobian(rates, nu)])(0, 0))[:, [2, 3, 4]]
@@ -91,12 +95,12 @@ def test_states_are_the_convolution(name: str) -> None:
     step, count = 0.05, 400
     time = step / 2 * np.arange(2 * count + 1)
     velocity, K = band_limited(time, 1), kernel(name, time)
-    own = driven(name, velocity, step)
+    forces = driven(name, velocity, step)
     for row in (100, 250, 400):
         last = 2 * row
         integrand = np.einsum("tij,tj->ti", K[last::-1], velocity[: last + 1])
         expected = -np.trapezoid(integrand, dx=step / 2, axis=0)
-        assert (np.abs(own[row] - expected) <= 2e-3 * np.abs(own).max(axis=0)).all()
+        assert (np.abs(forces[row] - expected) <= 2e-3 * np.abs(forces).max(axis=0)).all()
 
 
 @pytest.mark.parametrize("name", HULLS)

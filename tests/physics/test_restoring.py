@@ -29,7 +29,7 @@ def stiffness(**values: float) -> np.ndarray:
 
 
 def test_columns_of_water() -> None:
-    """A wall-sided body of columns: each is pushed up by its extra depth, its own buoyancy leans with it.
+    """A wall-sided body of columns: each is pushed up by its extra depth, its buoyancy leans with it.
 
     Moments of the weight and the buoyancy at rest, W (z_B - z_G) times the angle, are Fossen (2021), eq. 4.27.
     """
@@ -45,7 +45,7 @@ def test_columns_of_water() -> None:
         expected[:, i] = [push.sum(), push @ y, -push @ x]
     expected[1, 1] += rho * g * nabla * (z_G - z_B)
     expected[2, 2] += rho * g * nabla * (z_G - z_B)
-    own = stiffness(
+    computed = stiffness(
         A_wp=area.sum(),
         x_F=(x @ area) / area.sum(),
         nabla=nabla,
@@ -54,7 +54,7 @@ def test_columns_of_water() -> None:
         rho=rho,
         g=g,
     )
-    np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", list(HULLS))

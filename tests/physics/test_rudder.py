@@ -42,8 +42,8 @@ def test_the_formulae_of_the_paper(v: float, r: float, delta: float) -> None:
     X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
     N = -(-0.5 + 0.312 * -0.464) * L * F_N * np.cos(delta)
     u_P = u * (1 - w_P)
-    found = wrench([u, v, 0, 0, 0, r], delta, [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P])
-    np.testing.assert_allclose(found[[0, 1, 5]], [X, Y, N], rtol=2e-3, atol=1e-3)
+    forces = wrench([u, v, 0, 0, 0, r], delta, [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P])
+    np.testing.assert_allclose(forces[[0, 1, 5]], [X, Y, N], rtol=2e-3, atol=1e-3)
 
 
 def test_helm_to_starboard_turns_to_starboard_and_costs_speed() -> None:
@@ -65,11 +65,11 @@ def test_derivatives_by_hand() -> None:
     """Y = 1/2 rho L^2 U_0^2 (Y_delta delta + Y_udelta u' delta + Y_vvdelta v'^2 delta), N with L^3."""
     values = {"Y_delta": -0.003, "Y_udelta": -0.006, "Y_vvdelta": -0.01, "N_delta": 0.0014}
     nu_r = ca.SX(np.array([6.0, -1.0, 0, 0, 0, 0.01]))
-    found = ca.evalf(rudder_derivatives(nu_r, ca.SX(0.2), L_pp=160.0, U_0=7.5, rho=1025.0, **values))
+    forces = ca.evalf(rudder_derivatives(nu_r, ca.SX(0.2), L_pp=160.0, U_0=7.5, rho=1025.0, **values))
     force = 1025 / 2 * 160**2 * 7.5**2
     u, v = 6.0 / 7.5 - 1, -1.0 / 7.5
     Y = force * 0.2 * (-0.003 - 0.006 * u - 0.01 * v**2)
-    np.testing.assert_allclose(np.array(found).ravel(), [0, Y, 0, 0, 0, force * 160 * 0.0014 * 0.2], rtol=1e-12)
+    np.testing.assert_allclose(np.array(forces).ravel(), [0, Y, 0, 0, 0, force * 160 * 0.0014 * 0.2], rtol=1e-12)
 
 
 def side_force(delta: float, **other: float) -> float:
@@ -118,8 +118,8 @@ def test_a_rudder_with_a_polynomial_flow_by_hand() -> None:
     X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
     N = (3.5 + 0.312 * 3.248) * F_N * np.cos(delta)
     given = ca.SX(np.array([u, v, 0, 0, 0, r])), ca.SX(delta), ca.SX(np.array([u_P, race, D_P]))
-    found = np.array(ca.evalf(rudder_polynomial(*given, **POLYNOMIAL))).ravel()
-    np.testing.assert_allclose(found, [X, Y, 0, -0.2 * Y, 0.2 * X, N], rtol=2e-4)
+    forces = np.array(ca.evalf(rudder_polynomial(*given, **POLYNOMIAL))).ravel()
+    np.testing.assert_allclose(forces, [X, Y, 0, -0.2 * Y, 0.2 * X, N], rtol=2e-4)
 
 
 def test_rudder_coefficients_by_hand() -> None:
@@ -128,7 +128,7 @@ def test_rudder_coefficients_by_hand() -> None:
     u, v, delta = 2.0, -0.4, 0.3
     c, beta = 1.5 + 0.5 * (2.5 - 1.5), np.arctan2(-v, u)
     given = ca.SX(np.array([u, v, 0, 0, 0, 0])), ca.SX(delta), ca.SX(np.array([1.5, 2.5, D_P]))
-    found = np.array(ca.evalf(rudder_coefficients(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))).ravel()
+    forces = np.array(ca.evalf(rudder_coefficients(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))).ravel()
     force = 500 * L**2 * c**2
     Y, N = force * (-0.02 * delta - 0.001 * delta), force * L * 0.03 * abs(beta) * beta * delta
-    np.testing.assert_allclose(found, [force * -0.01 * delta**2, Y, 0, 0, 0, N], rtol=1e-9)
+    np.testing.assert_allclose(forces, [force * -0.01 * delta**2, Y, 0, 0, 0, N], rtol=1e-9)

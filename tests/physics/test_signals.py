@@ -52,7 +52,7 @@ def test_a_command_can_be_drawn_checked_and_guessed(name: str) -> None:
     assert not (is_shaft(name) and steers(name))
 
 
-def test_commands_are_told_by_their_last_name() -> None:
+def test_commands_are_recognised_by_their_last_name() -> None:
     assert [is_shaft(name) for name in COMMANDS] == [True, False, False, False]
     assert [steers(name) for name in COMMANDS] == [False, True, True, False]
     assert [mirror_sign(name) for name in COMMANDS] == [1, -1, -1, 1]
@@ -106,8 +106,8 @@ def test_units_of_sailors() -> None:
     ],
 )
 def test_a_name_in_a_log_is_one_signal_at_most(called: str, signal: str | None) -> None:
-    found = [name for name, row in SIGNALS.items() if row.names and re.fullmatch(row.names, called)]
-    assert found == ([signal] if signal else [])
+    matches = [name for name, row in SIGNALS.items() if row.names and re.fullmatch(row.names, called)]
+    assert matches == ([signal] if signal else [])
 
 
 def test_what_nobody_knows_has_no_row() -> None:

@@ -36,10 +36,10 @@ def test_azimuth_against_the_published_samples(shared_data: Path) -> None:
     n, alpha = revs / 60, np.radians(angle)
     at_unit = np.zeros((6, len(u)))
     at_unit[0], at_unit[1] = u, v
-    found = np.array(azimuth().map(len(u))(at_unit, n, alpha))
+    forces = np.array(azimuth().map(len(u))(at_unit, n, alpha))
     turn = np.stack([np.cos(alpha), np.sin(alpha)])
     scale = 1025.0 * n**2 * 1.9**4
-    difference = np.stack([found[0] - F_x, found[1] - F_y]) / scale
+    difference = np.stack([forces[0] - F_x, forces[1] - F_y]) / scale
     along = turn[0] * difference[0] + turn[1] * difference[1]
     across = -turn[1] * difference[0] + turn[0] * difference[1]
     under_way = u >= 2
@@ -55,7 +55,7 @@ def test_azimuth_against_the_published_samples(shared_data: Path) -> None:
 
 
 def test_bollard_pull() -> None:
-    """68.5 kN at 150 rpm and 121.7 kN at 200 rpm, standing still: samples' own axial thrust, within 1.4 kN."""
+    """68.5 kN at 150 rpm and 121.7 kN at 200 rpm, at rest: axial thrust of the samples, within 1.4 kN."""
     for rpm, kN in ((150, 68.5), (200, 121.7)):
         wrench = numbers(azimuth()(np.zeros(6), rpm / 60, 0.0))
         assert wrench[0] == pytest.approx(kN * 1e3, abs=1.4e3)
@@ -185,7 +185,7 @@ def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
         K_x -= 0.1 * (J + 0.3)
     K_y -= (0.6 + 0.4 * max(J_c, 0)) * (J_y - y)
     scale = rho * n**2 * D_p**4
-    water = np.array([J * n * D_p, J_y * abs(n) * D_p, 0, 0, 0, 0])  # J counts along the shaft's own sense
+    water = np.array([J * n * D_p, J_y * abs(n) * D_p, 0, 0, 0, 0])  # J counts along the shaft's sense
     wrench = numbers(azimuth()(water, n, 0.0))
     reduction = 1.0 if sense > 0 else -0.65
     np.testing.assert_allclose(wrench[:2], [reduction * scale * K_x, scale * K_y], rtol=1e-12)

@@ -60,12 +60,12 @@ def test_a_moving_ship_meets_the_waves_at_the_frequency_of_encounter(beta_deg: i
     speed, psi, beta = 3.0, 0.4, np.radians(beta_deg)
     met = OMEGA - K * speed * np.cos(beta)
 
-    def sailed(t: float) -> np.ndarray:
+    def load_at(t: float) -> np.ndarray:
         return force(t, speed * t * np.cos(psi), speed * t * np.sin(psi), psi, psi + beta)
 
     period = 2 * np.pi / met
-    np.testing.assert_allclose(sailed(2.0 + period), sailed(2.0), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(sailed(2.0 + period / 2), -sailed(2.0), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(load_at(2.0 + period), load_at(2.0), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(load_at(2.0 + period / 2), -load_at(2.0), rtol=1e-9, atol=1e-9)
 
 
 def test_port_and_starboard() -> None:
@@ -76,15 +76,15 @@ def test_port_and_starboard() -> None:
 def test_drift_is_a_series_in_the_relative_heading() -> None:
     eta, chi = ca.SX.sym("eta", 6), ca.SX.sym("chi")
     wrench = drift(eta, ca.cos(chi), ca.sin(chi), ca.DM(DRIFT.ravel()))
-    own = ca.Function("drift", [eta, chi], [ca.densify(wrench)])
+    compiled = ca.Function("drift", [eta, chi], [ca.densify(wrench)])
     m = np.arange(COUNT)
     for psi in (-2.0, 0.0, 1.3):
         beta = CHI - psi
         X, Y, N = DRIFT[0] @ np.cos(m * beta), DRIFT[1] @ np.sin(m * beta), DRIFT[2] @ np.sin(m * beta)
-        found = np.array(own([5, 6, 0.1, 0.02, 0.01, psi], CHI)).ravel()
-        np.testing.assert_allclose(found, [X, Y, 0, 0, 0, N], atol=1e-12)
-        mirrored = np.array(own([5, -6, 0.1, -0.02, 0.01, -psi], -CHI)).ravel()
-        np.testing.assert_allclose(mirrored, MIRROR * found, atol=1e-12)
+        forces = np.array(compiled([5, 6, 0.1, 0.02, 0.01, psi], CHI)).ravel()
+        np.testing.assert_allclose(forces, [X, Y, 0, 0, 0, N], atol=1e-12)
+        mirrored = np.array(compiled([5, -6, 0.1, -0.02, 0.01, -psi], -CHI)).ravel()
+        np.testing.assert_allclose(mirrored, MIRROR * forces, atol=1e-12)
 
 
 def test_waves_travel_with_the_water() -> None:

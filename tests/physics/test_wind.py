@@ -63,8 +63,8 @@ def test_a_ship_drifting_with_the_wind_feels_none() -> None:
 def test_interpolation_is_piecewise_linear_and_flat_beyond() -> None:
     grid, values = [0.0, 1.0, 3.0, 4.0], [2.0, -1.0, 5.0, 5.5]
     x = np.linspace(-1, 5, 61)
-    found = [float(wind.interpolate(ca.SX(at), ca.SX(ca.DM(grid)), ca.SX(ca.DM(values)))) for at in x]
-    np.testing.assert_allclose(found, np.interp(x, grid, values), atol=1e-14)
+    computed = [float(wind.interpolate(ca.SX(at), ca.SX(ca.DM(grid)), ca.SX(ca.DM(values)))) for at in x]
+    np.testing.assert_allclose(computed, np.interp(x, grid, values), atol=1e-14)
 
 
 @pytest.mark.parametrize("gamma_deg", [0, 30, 75, 90, 120, 180])
@@ -81,8 +81,8 @@ def test_blendermann_by_hand(gamma_deg: float) -> None:
     N = q * A_L * L * (s_L / L - 0.18 * (gamma - np.pi / 2)) * C_Y
     K = q * A_L * (A_L / L) * kappa * s_H / (A_L / L) * C_Y
     towards = ca.SX(np.pi - gamma)  # from gamma off the port bow
-    found = numbers(wind.blendermann(AT_REST, ca.SX(0), ca.SX(V_w), towards, **parameters("gunnerus-33.9", rho_a)))
-    np.testing.assert_allclose(found, [X, q * A_L * C_Y, 0, K, 0, N], rtol=1e-9, atol=1e-6)
+    forces = numbers(wind.blendermann(AT_REST, ca.SX(0), ca.SX(V_w), towards, **parameters("gunnerus-33.9", rho_a)))
+    np.testing.assert_allclose(forces, [X, q * A_L * C_Y, 0, K, 0, N], rtol=1e-9, atol=1e-6)
 
 
 def test_blendermann_is_continuous_on_the_beam() -> None:

@@ -197,9 +197,7 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
             Sentence("These data say nothing about waves."),
         ],
         findings=[
-            Finding(
-                "R1", "Cooperative beats its own physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."
-            ),
+            Finding("R1", "Cooperative beats its physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."),
             Finding("R2", "Inaccurate and compensated is as good as accurate alone.", "undecided", "2.05 m, 2.10 m."),
             Finding("R4", "Pure data-driven is worst over the whole horizon.", "refuted", "Not in the first 2 s."),
         ],

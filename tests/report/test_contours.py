@@ -65,9 +65,9 @@ def test_smoothing_keeps_what_is_smooth_and_calms_what_is_not():
 def test_smoothing_neither_fills_gaps_nor_takes_from_them():
     values = np.full((8, 9), 2.0)
     values[3, 4] = np.nan
-    found = smoothed(values, (2.0, 1.0))
-    assert np.isnan(found[3, 4])
-    assert np.isnan(found).sum() == 1
-    np.testing.assert_allclose(found[np.isfinite(found)], 2.0)
+    smooth = smoothed(values, (2.0, 1.0))
+    assert np.isnan(smooth[3, 4])
+    assert np.isnan(smooth).sum() == 1
+    np.testing.assert_allclose(smooth[np.isfinite(smooth)], 2.0)
     few = np.arange(1.0, 13.0).reshape(3, 4)
     np.testing.assert_allclose(smoothed(few, (2.0, 1.0)), few)

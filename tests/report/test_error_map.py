@@ -145,7 +145,7 @@ def test_without_data_driven_nothing_is_compared(simulation):
     assert len(figure.views["0"][0].figure.data[1].x) == 0
 
 
-def test_a_model_without_accuracy_has_a_strip_of_its_own(simulation):
+def test_a_model_without_accuracy_has_a_separate_strip(simulation):
     lost = simulation.models.A.where(simulation.models.model != "high-2")
     cells = simulation.cells.assign(A=simulation.cells.A.where(simulation.cells.model != "high-2"))
     figure = flat(replace(simulation, models=simulation.models.assign(A=lost), cells=cells))

@@ -91,7 +91,7 @@ def test_takeaway_of_the_horizon(full_scale):
     assert expected in horizon(full_scale).takeaway
 
 
-def test_commands_share_the_time_axis_and_have_their_own_units(full_scale):
+def test_commands_share_the_time_axis_but_not_the_unit(full_scale):
     figure = over_time(full_scale)
     plot = figure.views["0-0"][0].figure
     titles = [plot.layout[name].title.text for name in ("yaxis", "yaxis2", "yaxis3")]

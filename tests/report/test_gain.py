@@ -9,10 +9,10 @@ from shipid.report.gain import gain
 
 def traces(figure: Figure, view: str) -> dict[str, list]:
     """Traces of a view by name."""
-    found: dict[str, list] = {}
+    by_name: dict[str, list] = {}
     for trace in figure.views[view][0].figure.data:
-        found.setdefault(trace.name, []).append(trace)
-    return found
+        by_name.setdefault(trace.name, []).append(trace)
+    return by_name
 
 
 @pytest.mark.parametrize(("view", "column", "floor"), [("0-0", "H", 5.01), ("1-0", "H_90", 11.2), ("2-1", "rms", 6.3)])
@@ -41,7 +41,7 @@ def test_a_failed_size_leaves_a_gap(simulation):
     assert "Not plotted: high-1 at N_D = 30 (diverged)" in figure.how
 
 
-def test_a_seed_that_failed_is_told_from_a_cell_that_failed(simulation):
+def test_a_seed_that_failed_is_distinguished_from_a_cell_that_failed(simulation):
     cells = simulation.cells.copy()
     failed = cells.model.eq("high-1") & cells.N_D.eq(30) & cells.seed.eq(1)
     cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
@@ -66,7 +66,7 @@ def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
 
 
 def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
-    drawn = {name: found[0] for name, found in traces(gain(simulation), "0-0").items()}
+    drawn = {name: lines[0] for name, lines in traces(gain(simulation), "0-0").items()}
     assert drawn["no model"].line.color == "var(--ink)"
     assert drawn["no model"].line.width > drawn["nominal"].line.width
     models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]

@@ -24,6 +24,6 @@ def test_words_are_left_alone() -> None:
 
 
 def test_no_text_becomes_a_tag() -> None:
-    said = glossed('<b onclick="x">H_90</b> & more')
-    assert "<b" not in said
-    assert plain(said) == "&lt;b onclick=&#34;x&#34;&gt;H_90&lt;/b&gt; &amp; more"
+    markup = glossed('<b onclick="x">H_90</b> & more')
+    assert "<b" not in markup
+    assert plain(markup) == "&lt;b onclick=&#34;x&#34;&gt;H_90&lt;/b&gt; &amp; more"

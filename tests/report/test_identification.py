@@ -21,7 +21,7 @@ def content(held_out: tuple[str, ...] = ("T <1>",), name: str = "a <b>ship</b>")
     factor = np.array([1.1, 0.8, 3.0])
     half = np.array([0.1, 0.2, np.inf])
     estimates = pd.DataFrame(
-        {"name": NAMES, "path": [f"hull.{own}" for own in NAMES], "with": ["", "hull.N_v", ""], "unit": "kg"}
+        {"name": NAMES, "path": [f"hull.{each}" for each in NAMES], "with": ["", "hull.N_v", ""], "unit": "kg"}
     ).assign(
         base=10.0, value=10 * factor, error=half * 5, factor=factor, factor_low=factor - half,
         factor_high=factor + half, identified=[True, True, False], reason="because",
@@ -98,12 +98,12 @@ def test_the_page_fetches_nothing_and_every_link_leads_somewhere(held_out: tuple
 
 
 def test_the_answer_counts_compares_and_warns() -> None:
-    told = [sentence.text for sentence in content().answer]
-    assert told[0] == "2 of 3 parameters are identified by these runs."
-    assert "1 run held out" in told[1]
-    assert "u from 1 to 0.1 m/s" in told[1]
-    assert "r from 0.57 to 0.057 deg/s" in told[1]
-    assert told[2] == "Careful: the horizon is short."
+    sentences = [sentence.text for sentence in content().answer]
+    assert sentences[0] == "2 of 3 parameters are identified by these runs."
+    assert "1 run held out" in sentences[1]
+    assert "u from 1 to 0.1 m/s" in sentences[1]
+    assert "r from 0.57 to 0.057 deg/s" in sentences[1]
+    assert sentences[2] == "Careful: the horizon is short."
     assert "fitted runs" in content(()).answer[1].text
 
 
@@ -133,10 +133,10 @@ def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
 
 
 def test_a_base_that_diverges_leaves_the_map_whole() -> None:
-    own = content()
-    series = own.series.copy()
+    page = content()
+    series = page.series.copy()
     series.loc[series["model"] == "before", ["north", "east", "u", "v", "r"]] = np.nan
-    figure = identification.free_runs(replace(own, series=series)).views["0"][3].figure
+    figure = identification.free_runs(replace(page, series=series)).views["0"][3].figure
     assert np.isfinite(figure.layout.xaxis.range).all()
 
 
@@ -154,9 +154,9 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
 
 
 def test_what_was_not_asked_for_is_left_out(tmp_path: Path) -> None:
-    own = replace(content(), profiles=pd.DataFrame(), programme=pd.DataFrame(), unseen=[])
-    assert identification.profiles(own) is None
-    assert identification.programme(own) is None
-    assert identification.unseen(own) is None
-    page = Page(write_identification(own, tmp_path / "page.html").read_text())
+    bare = replace(content(), profiles=pd.DataFrame(), programme=pd.DataFrame(), unseen=[])
+    assert identification.profiles(bare) is None
+    assert identification.programme(bare) is None
+    assert identification.unseen(bare) is None
+    page = Page(write_identification(bare, tmp_path / "page.html").read_text())
     assert "What to run next" not in " ".join(words for _, words in page.all("h2"))

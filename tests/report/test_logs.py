@@ -20,7 +20,7 @@ def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
         assert away(mine, kept).max() < extent / 1500
 
 
-def test_the_test_lies_on_top_in_its_own_colour(simulation):
+def test_the_test_lies_on_top_in_another_colour(simulation):
     plot = manoeuvres(simulation).views[""][0].figure
     colours = [trace.line.color for trace in plot.data]
     assert set(colours[-4:]) == {"var(--category-1)"}

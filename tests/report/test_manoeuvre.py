@@ -15,22 +15,22 @@ from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import levels
 from shipid.report import manoeuvre
 from shipid.report.manoeuvre import FIRST, ManoeuvreContent, write_manoeuvre
-from tests.measures.sailed import SAILED, every
+from tests.measures.made_records import RECORDS, every
 from tests.report.test_page import Page
 
 
 def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
-    record = every(SAILED[kind](), 0.5)
+    record = every(RECORDS[kind](), 0.5)
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
-    found, points = MEASURES[kind](record), levels(record)
+    measures, points = MEASURES[kind](record), levels(record)
     return ManoeuvreContent(
         title=f"{name}: {kind}",
         name=kind,
         kind=kind,
         log=pd.DataFrame({**columns, "shaft": shaft}),
-        measures=pd.DataFrame(measure_rows(found, 120.0)),
-        criteria=pd.DataFrame(criterion_rows(criteria(kind, found, 120.0))),
+        measures=pd.DataFrame(measure_rows(measures, 120.0)),
+        criteria=pd.DataFrame(criterion_rows(criteria(kind, measures, 120.0))),
         outline=np.array([[60.0, 0.0], [40.0, 10.0], [-60.0, 10.0], [-60.0, -10.0], [40.0, -10.0]]),
         levels=pd.DataFrame(
             {"helm": points.helm, "rate": points.rate} if kind == "spiral" else {"helm": [], "rate": []}
@@ -53,7 +53,7 @@ def test_every_kind_has_a_page_that_fetches_nothing(kind: str, tmp_path: Path) -
         assert (attributes.get("href") or "#").startswith("#")
         if attributes.get("href"):
             assert str(attributes["href"])[1:] in anchors
-    words = " ".join(said for _, said in page.all("li", "td", "th"))
+    words = " ".join(line for _, line in page.all("li", "td", "th"))
     for measure in FIRST[kind]:
         assert measure in words.lower()
     assert ("spiral" in anchors) == (kind == "spiral")

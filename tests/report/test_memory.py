@@ -109,8 +109,8 @@ def test_the_gain_counts_intervals_free_of_zero(past: ReportContent) -> None:
     assert "With N_D = 30, 1 of 3 comparisons lower H and 1 raise it" in figure.takeaway
     assert "−0.40 m [−0.60, −0.20]" in figure.takeaway
     points = [trace for trace in figure.views["0"][0].figure.data if trace.yaxis == "y2"]
-    found = {value for trace in points for value in np.asarray(trace.y, dtype=float).round(4)}
-    assert found == {-0.1, -0.05, -0.6, -0.4, 0.3}
+    heights = {value for trace in points for value in np.asarray(trace.y, dtype=float).round(4)}
+    assert heights == {-0.1, -0.05, -0.6, -0.4, 0.3}
     bars = next(trace for trace in points if NASTY not in trace.name and "none" not in trace.name and len(trace.y) == 2)
     assert bars.error_y.arrayminus is not None
 

@@ -40,33 +40,33 @@ def content(rows: pd.DataFrame) -> MethodsContent:
 
 def test_the_sentences_name_the_least_error_among_methods_that_never_failed() -> None:
     rows = frame(1)
-    for said, (condition, N_D) in zip(
+    for sentence, (condition, N_D) in zip(
         verdicts(rows), [("calm", 3), ("calm", 30), ("rough", 3), ("rough", 30)], strict=True
     ):
         mine = rows[rows.condition.eq(condition) & rows.family.eq(EVERY) & rows.N_D.eq(N_D) & rows.failed.eq(0)]
         best = mine.loc[mine.H.idxmin()]
-        assert said.startswith(f"{condition.capitalize()}, N_D = {N_D}: {best.method} errs least")
-        assert "c (1 of 4) and lost (4 of 4)" in said
+        assert sentence.startswith(f"{condition.capitalize()}, N_D = {N_D}: {best.method} errs least")
+        assert "c (1 of 4) and lost (4 of 4)" in sentence
 
 
 @pytest.mark.parametrize("conditions", [("",), ("calm", "rough")])
 def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: tuple[str, ...]) -> None:
     rows = frame(2, conditions)
-    drawn, told = methods(content(rows)), table(content(rows))
+    drawn, printed = methods(content(rows)), table(content(rows))
     assert drawn is not None
-    assert told is not None
+    assert printed is not None
     assert len(drawn.views) == len(conditions) * 2
     assert all(len(panels) == 2 for panels in drawn.views.values())
-    assert len(told.rows) == len(rows)
-    assert {len(row) for row in told.rows} == {len(told.columns)} == {len(told.numeric)}
-    for given, shown in zip(rows.to_dict("records"), told.rows, strict=True):
+    assert len(printed.rows) == len(rows)
+    assert {len(row) for row in printed.rows} == {len(printed.columns)} == {len(printed.numeric)}
+    for given, shown in zip(rows.to_dict("records"), printed.rows, strict=True):
         texts = [cell.text for cell in shown]
         assert given["method"] in texts
         assert ("–" if np.isnan(given["H"]) else f"{given['H']:.2f}") in texts
         assert any(cell.bad for cell in shown) == bool(given["failed"])
 
 
-def test_the_page_is_one_file_that_escapes_what_it_is_told(tmp_path: Path) -> None:
+def test_the_page_is_one_file_that_escapes_its_texts(tmp_path: Path) -> None:
     text = write_comparison(content(frame(3)), tmp_path / "report.html").read_text()
     assert "Which is &lt;best&gt;?" in text
     assert 'id="methods-table"' in text

@@ -224,26 +224,26 @@ def test_axes_have_units(sections):
 
 def test_a_line_of_a_model_has_one_colour_in_overviews_and_one_in_close_ups(sections, simulation, simulation_drawn):
     """Of many models the colour is the accuracy; a close-up of a few gives each a colour of its group."""
-    found: dict[str, set[str]] = {}
+    colours_of: dict[str, set[str]] = {}
     for section in sections:
         for item in section.items:
             for panel in [p for panels in getattr(item, "views", {}).values() for p in panels]:
                 for trace in panel.figure.data:
                     for key in trace.meta or []:
                         if key.startswith("model:"):
-                            found.setdefault(key, set()).add(trace.line.color or trace.marker.color)
+                            colours_of.setdefault(key, set()).add(trace.line.color or trace.marker.color)
             for chip in getattr(item, "chips", ()):
                 if chip.key.startswith("model:"):
-                    found.setdefault(chip.key, set()).add(chip.colour)
-    assert len(found) >= 4
-    allowed: dict[str, set[str]] = {key: colours for key, colours in found.items() if len(colours) == 1}
+                    colours_of.setdefault(chip.key, set()).add(chip.colour)
+    assert len(colours_of) >= 4
+    allowed: dict[str, set[str]] = {key: colours for key, colours in colours_of.items() if len(colours) == 1}
     if sections is simulation_drawn:
         looks, close = styles(simulation), close_styles(simulation)
         allowed = {
             f"model:{name}": {style.colour, close[name].colour if name in close else style.colour}
             for name, style in looks.items()
         }
-    assert {key: colours for key, colours in found.items() if not colours <= allowed.get(key, set())} == {}
+    assert {key: colours for key, colours in colours_of.items() if not colours <= allowed.get(key, set())} == {}
 
 
 def test_views_exist_for_every_choice(sections):
@@ -299,13 +299,13 @@ def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
     assert "#tide" not in [a["href"] for a, _ in without.all("a")]
 
 
-def test_it_stands_on_cells_alone(full_scale):
+def test_it_is_written_from_cells_alone(full_scale):
     content = ReportContent("Question?", "bare", [], [], full_scale.cells, full_scale.naive, full_scale.models)
     page = Page(render(content))
     assert [a["id"] for a, _ in page.all("figure")] == ["gain"]
 
 
-def test_it_stands_when_every_cell_failed(full_scale):
+def test_it_is_written_when_every_cell_failed(full_scale):
     cells = full_scale.cells.assign(H=np.nan, H_90=np.nan, rms=np.nan, status="failed", sentence="no memory left")
     text = render(replace(full_scale, cells=cells))
     assert "No cell gave a result." in text

@@ -14,7 +14,7 @@ def scale(dark: bool) -> list[float]:
     return [luminance(c) for c in re.findall(r"--scale-\d+: (rgb\([^)]*\))", variables(dark))]
 
 
-def test_the_scale_is_ordered_and_stands_out_from_both_pages():
+def test_the_scale_is_ordered_and_has_contrast_on_both_pages():
     for dark, page in ((False, "#ffffff"), (True, "#12151a")):
         levels = scale(dark)
         assert len(levels) == 24
@@ -24,7 +24,7 @@ def test_the_scale_is_ordered_and_stands_out_from_both_pages():
         assert min(contrast) > 2
 
 
-def test_named_colours_are_distinct_and_the_first_stands_out():
+def test_named_colours_are_distinct_and_the_first_has_most_contrast():
     for dark, page in ((False, "#ffffff"), (True, "#12151a")):
         named = re.findall(r"--category-\d: (#\w{6})", variables(dark))
         assert len(set(named)) == 6

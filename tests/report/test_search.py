@@ -69,8 +69,8 @@ def test_the_rank_correlation_is_within_cells():
 
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
-    found = importance(simulation.trials, "learning_rate")
-    text = f"learning rate is most correlated with it, rank correlation {found:.2f}.".replace("-", "−")
+    correlation = importance(simulation.trials, "learning_rate")
+    text = f"learning rate is most correlated with it, rank correlation {correlation:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
 
@@ -96,10 +96,10 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     assert list(drawn) == ["motion scale", "mirror"]
     assert list(drawn["mirror"].figure.layout.xaxis.ticktext) == ["no", "yes"]
     assert [chip.label for chip in search(content).chips] == ["trial", "chosen", "median"]
-    found = table(content)
-    assert "504 trials in 42 cells: none stopped early, none diverged" in found.takeaway
-    assert "Tried: motion scale 2 to 13, mirror yes or no." in found.takeaway
-    row = dict(zip(found.columns, found.rows[0], strict=True))
+    printed = table(content)
+    assert "504 trials in 42 cells: none stopped early, none diverged" in printed.takeaway
+    assert "Tried: motion scale 2 to 13, mirror yes or no." in printed.takeaway
+    row = dict(zip(printed.columns, printed.rows[0], strict=True))
     assert "epochs [1]" not in row
     assert row["chosen motion scale [1]"].text == "2 / 3.5 / 5"
     assert row["share of chosen mirror [1]"].text == "0.75"

@@ -32,9 +32,9 @@ class Linear:
     @cached_property
     def M(self) -> np.ndarray:
         """Rigid-body mass."""
-        own = self.document["inertia"]
-        m, x, z = own["m"], own["x_G"], own["z_G"]
-        M = np.diag([m, m, m, own["I_x"], own["I_y"], own["I_z"]])
+        inertia = self.document["inertia"]
+        m, x, z = inertia["m"], inertia["x_G"], inertia["z_G"]
+        M = np.diag([m, m, m, inertia["I_x"], inertia["I_y"], inertia["I_z"]])
         for i, j, value in ((0, 4, m * z), (1, 3, -m * z), (1, 5, m * x), (2, 4, -m * x)):
             M[i, j] = M[j, i] = value
         return M
@@ -60,11 +60,11 @@ class Linear:
     @cached_property
     def C(self) -> np.ndarray:
         """Restoring."""
-        own, constants = self.document["restoring"]["hydrostatic"], self.document["constants"]
-        stiffness, weight = (constants["rho"] * constants["g"] * own[name] for name in ("A_wp", "nabla"))
+        hydrostatic, constants = self.document["restoring"]["hydrostatic"], self.document["constants"]
+        stiffness, weight = (constants["rho"] * constants["g"] * hydrostatic[name] for name in ("A_wp", "nabla"))
         C = np.zeros((6, 6))
-        C[2, 2], C[3, 3], C[4, 4] = stiffness, weight * own["GM_T"], weight * own["GM_L"]
-        C[2, 4] = C[4, 2] = -own["x_F"] * stiffness
+        C[2, 2], C[3, 3], C[4, 4] = stiffness, weight * hydrostatic["GM_T"], weight * hydrostatic["GM_L"]
+        C[2, 4] = C[4, 2] = -hydrostatic["x_F"] * stiffness
         return C
 
     def memory(self, omega: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What commands do, found by asking the equations; the steady approach; how units share a load."""
+"""What commands do, by the equations; the steady approach; how units share a load."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ def test_an_approach_is_that_of_the_vessel_whoever_asked_before() -> None:
 
 
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
-    """Speeds of the 2015 derivatives, found on their own in NumPy: 75, 145, 200 rpm."""
+    """Speeds of the 2015 derivatives, computed separately in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
-    found = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
-    state = found.state
+    approach = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    state = approach.state
     np.testing.assert_allclose(state["u"], [2.27, 4.39, 6.06], atol=0.02)
-    assert found.memory == {}
+    assert approach.memory == {}
     for shaft, u in zip(n, state["u"], strict=True):
         assert np.abs(acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
     for name in ("north", "east", "psi", "v", "r"):
@@ -101,8 +101,8 @@ def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
 
 def test_hidden_states_and_actuators_are_steady_too() -> None:
     vessel = load_vessel("gunnerus-28.9-6dof")
-    found = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
-    state, memory = found.state, found.memory
+    approach = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
+    state, memory = approach.state, approach.memory
     assert set(state) == {*dynamics(vessel).state, *dynamics(vessel).hidden}
     assert memory == {name: pytest.approx(2.0 if name.endswith(".n") else 0.0) for name in dynamics(vessel).memory}
     for name in ("p", "q"):
@@ -110,7 +110,7 @@ def test_hidden_states_and_actuators_are_steady_too() -> None:
     assert state["w"][0] == pytest.approx(state["u"][0] * np.tan(state["theta"][0]), abs=1e-3)  # trimmed, not heaving
 
 
-def test_an_approach_that_never_settles_or_diverges_is_told() -> None:
+def test_an_approach_that_never_settles_or_diverges_is_reported() -> None:
     gains = Controls.of(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
     with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
         steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
@@ -145,25 +145,25 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
     how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
     with pytest.raises(NotStraight, match="helmsman"):
         steady(controls, np.array(n), **how)  # type: ignore[arg-type]
-    found = steady(controls, np.array(n), held=True, **how)  # type: ignore[arg-type]
-    assert set(found.helm) == set(controls.helm)
-    assert set(found.memory) == set(model.memory)
+    approach = steady(controls, np.array(n), held=True, **how)  # type: ignore[arg-type]
+    assert set(approach.helm) == set(controls.helm)
+    assert set(approach.memory) == set(model.memory)
     for place, shaft in enumerate(n):
-        helm = {name: values[place] for name, values in found.helm.items()}
+        helm = {name: values[place] for name, values in approach.helm.items()}
         orders = {name: shaft if name in controls.drives else 0.0 for name in model.commands} | helm
-        state = [found.state[name][place] for name in (*model.state, *model.hidden)]
-        memory = [found.memory[name][place] for name in model.memory]
+        state = [approach.state[name][place] for name in (*model.state, *model.hidden)]
+        memory = [approach.memory[name][place] for name in model.memory]
         rates = np.array(
             model.rates(
                 state, memory, [orders[name] for name in model.commands], np.zeros(len(model.environment)),
                 list(vessel.parameters.values()), np.zeros(model.num_dof),
             )
         ).ravel()  # fmt: skip
-        assert np.abs(rates[3:]).max() < 1e-4 * found.state["u"][place]
-        assert abs(found.state["r"][place]) < 1e-4
+        assert np.abs(rates[3:]).max() < 1e-4 * approach.state["u"][place]
+        assert abs(approach.state["r"][place]) < 1e-4
         assert 0.001 < max(map(abs, helm.values())) < 0.3
     alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
-    assert alone.state["u"][0] == found.state["u"][0]  # whatever the company
+    assert alone.state["u"][0] == approach.state["u"][0]  # whatever the company
 
 
 def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:

@@ -84,7 +84,7 @@ def test_every_command_of_every_vessel_takes_orders(vessel: Vessel) -> None:
             assert caught.value.path == f"truth.manoeuvre.0.{missing}"
 
 
-def test_one_command_may_have_orders_of_its_own() -> None:
+def test_one_command_may_have_separate_orders() -> None:
     """The tunnel unit stays still while the azimuths run: `bow.n_rpm = 0` of TOML is a table."""
     ship = SHIP.with_values({"thruster.bow.off": False})
     for given in ({"bow.n_rpm": 0.0}, {"bow": {"n_rpm": 0.0}}):
@@ -161,7 +161,7 @@ def test_seeds_are_drawn_unless_given() -> None:
 
 
 @pytest.mark.parametrize(
-    ("block", "said"),
+    ("block", "message"),
     [
         ({"kind": "zigzags", **SHAFT}, "did you mean 'zigzag'"),
         ({"kind": "zigzag", "n_rpm": [150.0, 80.0]}, "n_rpm has low > high"),
@@ -174,8 +174,8 @@ def test_seeds_are_drawn_unless_given() -> None:
         ({"kind": "turning", "share": 0.0, **SHAFT}, "greater than 0"),
     ],
 )
-def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValidationError, match=said):
+def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
         truth(block)
 
 

@@ -12,22 +12,22 @@ def test_horizontal_velocities_are_those_of_the_rotation() -> None:
     rng = np.random.default_rng(3)
     body = {name: rng.normal(size=50) for name in ("u", "v", "w", "q", "r")}
     body |= {"phi": rng.uniform(-0.5, 0.5, 50), "theta": rng.uniform(-0.3, 0.3, 50)}
-    found = horizontal(body)
+    velocities = horizontal(body)
     for k in range(50):
         c, s = np.cos(body["phi"][k]), np.sin(body["phi"][k])
         roll = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
         c, s = np.cos(body["theta"][k]), np.sin(body["theta"][k])
         trim = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         level = trim @ roll @ [body[name][k] for name in ("u", "v", "w")]
-        np.testing.assert_allclose([found["u"][k], found["v"][k]], level[:2], atol=1e-12)
+        np.testing.assert_allclose([velocities["u"][k], velocities["v"][k]], level[:2], atol=1e-12)
         rate = (body["q"][k] * np.sin(body["phi"][k]) + body["r"][k] * np.cos(body["phi"][k])) / c
-        np.testing.assert_allclose(found["r"][k], rate, atol=1e-12)
-    back = aboard({**body, **found})
+        np.testing.assert_allclose(velocities["r"][k], rate, atol=1e-12)
+    back = aboard({**body, **velocities})
     for name in ("u", "v", "r"):
         np.testing.assert_allclose(back[name], body[name], atol=1e-12)
 
 
-def test_a_level_ship_logs_its_own_velocities() -> None:
+def test_a_level_ship_logs_the_velocities_of_its_body() -> None:
     level = {name: np.array([value]) for name, value in (("u", 2.0), ("v", -0.3), ("r", 0.05))}
     assert {name: values[0] for name, values in horizontal(level).items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
 

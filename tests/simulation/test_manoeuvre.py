@@ -121,16 +121,16 @@ def test_together_is_one_at_a_time() -> None:
     ]
     wind = {"V_w": np.arange(6.0), "beta_w": np.full(6, 0.4)}
     together = perform(LAGGED, mixed, step=0.1, environment=wind)
-    assert list(together["run"].unique()) == [own.name for own in mixed]
-    for number, own in enumerate(mixed):
-        alone = one(LAGGED, own, environment={name: float(values[number]) for name, values in wind.items()})
-        log = together[together["run"] == own.name].reset_index(drop=True)
+    assert list(together["run"].unique()) == [manoeuvre.name for manoeuvre in mixed]
+    for number, manoeuvre in enumerate(mixed):
+        alone = one(LAGGED, manoeuvre, environment={name: float(values[number]) for name, values in wind.items()})
+        log = together[together["run"] == manoeuvre.name].reset_index(drop=True)
         pd.testing.assert_frame_equal(log, alone, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(("n_rpm", "u", "v", "r"), [(145, 2.76, 0.60, 3.54), (200, 3.81, 0.72, 4.95)])
 def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: float, r: float) -> None:
-    """Steady turns at 35 deg of the 2015 derivatives, integrated on their own in NumPy [m/s, m/s, deg/s]."""
+    """Steady turns at 35 deg of the 2015 derivatives, integrated separately in NumPy [m/s, m/s, deg/s]."""
     to_either = [TurningCircle(n_rpm=n_rpm, duration=200, side=side) for side in ("starboard", "port")]
     for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
         end = log.iloc[-1]
@@ -149,7 +149,7 @@ def test_turning_takes_commands_as_the_vessel_does() -> None:
 
 
 def test_steps_hold_levels_in_their_ranges() -> None:
-    """Levels differ, each holds for 2 to 5 s, shaft and angle change at their own times; another seed, other orders."""
+    """Levels differ, each holds for 2 to 5 s, shaft and angle change at different times; another seed, other orders."""
     steps = Steps(orders={"n_rpm": (60, 90), "alpha_deg": (-20, 10)}, hold=(2.0, 5.0), seed=3, duration=60)
     log = one(SHIP, steps)
     for signal, unit, low, high in (("n", 1 / 60, 60, 90), ("alpha", DEGREE, -20, 10)):
@@ -169,20 +169,20 @@ def test_steps_hold_levels_in_their_ranges() -> None:
 
 
 @pytest.mark.parametrize(
-    ("orders", "path", "said"),
+    ("orders", "path", "message"),
     [
         ({"n_rpm": 120}, "manoeuvre.alpha_deg", "give alpha_deg"),
         ({"n_rpm": 120, "alpha_deg": 5, "delta_deg": 5}, "manoeuvre.delta_deg", "orders no command of R/V Gunnerus"),
         ({"n_rpm": 120, "alpha_deg": 5, "bow.n_rpm": 5}, "manoeuvre.bow.n_rpm", "orders no command"),
     ],
 )
-def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, said: str) -> None:
-    with pytest.raises(DocumentError, match=said) as caught:
+def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, message: str) -> None:
+    with pytest.raises(DocumentError, match=message) as caught:
         one(SHIP, Turning(orders=orders, duration=20))
     assert caught.value.path == path
 
 
-def test_zigzag_turns_back_at_its_helm_angle_unless_told() -> None:
+def test_zigzag_turns_back_at_its_helm_angle_by_default() -> None:
     assert Zigzag(n_rpm=100, angle_deg=10, duration=60).reversal_deg == 10
     assert Zigzag(n_rpm=100, angle_deg=10, execute_heading_deg=20, duration=60).reversal_deg == 20
 
@@ -288,7 +288,7 @@ def test_station_keeping_holds_in_wind(name: str) -> None:
         assert log[["port.n", "starboard.n"]].max().max() * 60 <= 200
 
 
-def test_station_keeping_goes_where_it_is_told() -> None:
+def test_station_keeping_goes_to_its_target() -> None:
     log = one(SHIP, StationKeeping(duration=400, north=5, east=-3, heading_deg=-170, course_deg=170), step=0.2)
     end = log.iloc[-1]
     assert end["north"] == pytest.approx(5, abs=0.05)

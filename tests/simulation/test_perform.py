@@ -163,7 +163,7 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
     pd.testing.assert_frame_equal(each, batch, rtol=1e-9, atol=1e-9)
 
 
-def test_variants_keep_to_their_own_numbers() -> None:
+def test_variants_keep_to_their_numbers() -> None:
     """Vessels of one structure share the equations, not the outcome."""
     heavy = SHIP.with_values({"inertia.m": 5e5})
     logs = [perform(vessel, [Zigzag(n_rpm=145, duration=30)], step=0.1) for vessel in (SHIP, heavy, SHIP)]
@@ -172,7 +172,7 @@ def test_variants_keep_to_their_own_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("manoeuvres", "how", "said"),
+    ("manoeuvres", "how", "message"),
     [
         ([], {}, "no manoeuvre is given"),
         ([CIRCLE], {"interval": 0.25}, "interval 0.25 s must be a multiple of step 0.1 s"),
@@ -181,8 +181,8 @@ def test_variants_keep_to_their_own_numbers() -> None:
         ([CIRCLE], {"environment": {"V_c": 1.0}}, "has no environment channel 'V_c'"),
     ],
 )
-def test_what_cannot_be_performed_is_told(manoeuvres: list[Manoeuvre], how: dict[str, Any], said: str) -> None:
-    with pytest.raises(ShipidError, match=said):
+def test_what_cannot_be_performed_is_reported(manoeuvres: list[Manoeuvre], how: dict[str, Any], message: str) -> None:
+    with pytest.raises(ShipidError, match=message):
         perform(SHIP, manoeuvres, **{"step": 0.1, **how})
 
 
@@ -216,13 +216,13 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"environment": {"V_w": [3.0, 4.0, 5.0]}}, "environment 'V_w' must be one value or 2"),
         ({"components": {"waves.drift": np.zeros((1, 1, 41))}}, "for 1 ships, and there are 2 manoeuvres"),
         ({"interval": 0.0}, "interval 0 s must be a multiple"),
     ],
 )
-def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], said: str) -> None:
-    with pytest.raises(ShipidError, match=said):
+def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ShipidError, match=message):
         perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], step=0.1, **given)

@@ -65,7 +65,7 @@ def test_kvlcc2_approaches_at_the_speed_of_the_tests(kvlcc2: dict[str, pd.DataFr
 @pytest.mark.parametrize("nu", [(1.1, 0.0, 0.0), (0.9, -0.3, 0.12), (1.0, 0.2, -0.08)])
 @pytest.mark.parametrize("delta", [0.0, 0.6, -0.3])
 def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, float], delta: float) -> None:
-    """Yasukawa and Yoshimura (2015), eqs. 4-27 with table 3, amidships, in their own primes."""
+    """Yasukawa and Yoshimura (2015), eqs. 4-27 with table 3, amidships, in their prime system."""
     u, v, r = nu
     L, d, rho, n, D, x_G = 7.0, 0.46, 1000.0, 10.4, 0.216, 0.25
     U, beta = np.hypot(u, v), np.arctan2(-v, u)
@@ -93,19 +93,19 @@ def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, fl
     M = np.array([[m + m_x, 0, 0], [0, m + m_y, x_G * m], [0, x_G * m, I_z + x_G**2 * m + J_z]])
     turning = [(m + m_y) * v * r + x_G * m * r**2, -(m + m_x) * u * r, -x_G * m * u * r]
     expected = np.linalg.solve(M, np.array([X, Y, N]) + turning)
-    found = accelerations(load_vessel("kvlcc2-l7"), nu, delta, n)
-    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=2e-4)
+    computed = accelerations(load_vessel("kvlcc2-l7"), nu, delta, n)
+    np.testing.assert_allclose(computed, expected, rtol=5e-3, atol=2e-4)
 
 
 # Free-running tests of the 7 m model at MARIN (SIMMAN 2008), as compared with in Yasukawa and Yoshimura (2015),
 # tables 4 and 5: advance and tactical diameter over L at 35 deg; first and second overshoot [deg].
 TURNS = {"starboard": (3.25, 3.34), "port": (3.11, 3.08)}
-CALCULATED = (3.31, 3.36)  # their own, to starboard
+CALCULATED = (3.31, 3.36)  # theirs, to starboard
 
 
 @pytest.mark.parametrize("side", SIDES)
 def test_kvlcc2_turns_as_the_free_model(kvlcc2: dict[str, pd.DataFrame], side: str) -> None:
-    """To 8 %: the paper's own calculation is off by as much to port."""
+    """To 8 %: the paper's calculation is off by as much to port."""
     np.testing.assert_allclose(turn(kvlcc2[f"turn {side}"], 7.0), TURNS[side], rtol=0.08)
 
 
@@ -125,9 +125,9 @@ def test_kvlcc2_overshoots_near_those_of_another_tank(
     kvlcc2: dict[str, pd.DataFrame], side: str, measured: tuple[float, float]
 ) -> None:
     """10/10 at HSVA (SIMMAN 2008), read off the records: the method falls short, by up to 8, as in the paper."""
-    found = overshoots(kvlcc2[f"10 {side}"], 10)
-    assert (found > np.array(measured) - 8.5).all()
-    assert (found < np.array(measured)).all()
+    angles = overshoots(kvlcc2[f"10 {side}"], 10)
+    assert (angles > np.array(measured) - 8.5).all()
+    assert (angles < np.array(measured)).all()
 
 
 def test_kvlcc2_is_course_unstable_as_the_ship(kvlcc2: dict[str, pd.DataFrame]) -> None:

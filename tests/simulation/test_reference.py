@@ -55,8 +55,8 @@ def calm_run(name: str, rpm: np.ndarray, deg: np.ndarray, u: np.ndarray, seconds
 def test_steady_speeds(name: str) -> None:
     """To the printed digits; below 100 rpm the printed run had not settled (still 0.01 m/s in 100 s)."""
     rpm = np.array(list(SPEEDS[name]))
-    found = calm_run(name, rpm, 0 * rpm, rpm / 33.0, 900)
-    error = np.abs(found["u"][-1, 0] - list(SPEEDS[name].values()))
+    path = calm_run(name, rpm, 0 * rpm, rpm / 33.0, 900)
+    error = np.abs(path["u"][-1, 0] - list(SPEEDS[name].values()))
     assert (error < np.where(rpm < 100, 0.015, 0.0051)).all()
 
 
@@ -68,23 +68,23 @@ def test_step_turns(name: str) -> None:
     """
     rpm, deg = np.array(list(STEP_TURNS[name]), dtype=float).T
     before = np.array([SPEEDS[name][int(n)] for n in rpm])
-    found = calm_run(name, rpm, deg, before, 600)
+    path = calm_run(name, rpm, deg, before, 600)
     peak, u, v, r = np.array(list(STEP_TURNS[name].values())).T
-    np.testing.assert_allclose(np.degrees(np.abs(found["r"][:, 0]).max(axis=0)), peak, atol=0.1)
-    np.testing.assert_allclose(found["u"][-1, 0], u, atol=0.0051)
-    np.testing.assert_allclose(found["v"][-1, 0], v, atol=0.0051)
-    np.testing.assert_allclose(-np.degrees(found["r"][-1, 0]), r, atol=0.0051)
+    np.testing.assert_allclose(np.degrees(np.abs(path["r"][:, 0]).max(axis=0)), peak, atol=0.1)
+    np.testing.assert_allclose(path["u"][-1, 0], u, atol=0.0051)
+    np.testing.assert_allclose(path["v"][-1, 0], v, atol=0.0051)
+    np.testing.assert_allclose(-np.degrees(path["r"][-1, 0]), r, atol=0.0051)
 
 
 @pytest.mark.parametrize(("column", "name"), list(enumerate(SPEEDS)))
 def test_steady_turns_of_the_trials(column: int, name: str) -> None:
     """To what the printed digits of angle (0.05 deg) and shaft speed (0.5 rpm) leave open."""
     deg, rpm = np.array(list(STEADY_TURNS)).T
-    found = calm_run(name, rpm, deg, rpm / 40, 900)
+    path = calm_run(name, rpm, deg, rpm / 40, 900)
     u, v, r = np.array([columns[column] for columns in STEADY_TURNS.values()]).T
-    np.testing.assert_allclose(found["u"][-1, 0], u, atol=0.02)
-    np.testing.assert_allclose(found["v"][-1, 0], v, atol=0.02)
-    np.testing.assert_allclose(np.degrees(found["r"][-1, 0]), r, atol=0.02)
+    np.testing.assert_allclose(path["u"][-1, 0], u, atol=0.02)
+    np.testing.assert_allclose(path["v"][-1, 0], v, atol=0.02)
+    np.testing.assert_allclose(np.degrees(path["r"][-1, 0]), r, atol=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -107,17 +107,17 @@ def test_turn_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
     }
     commands = {f"{side}.n": np.array([100 / 60]) for side in ("port", "starboard")}
     commands |= {f"{side}.alpha": np.radians([20.0]) for side in ("port", "starboard")}
-    found = rollout(vessel, start, commands, step=0.1, num_steps=1600, every=10, method="rk4")
+    path = rollout(vessel, start, commands, step=0.1, num_steps=1600, every=10, method="rk4")
 
     def rms(name: str, recorded: np.ndarray, unit: float = 1.0) -> float:
-        return float(np.sqrt(np.mean((found[name][:, 0, 0] / unit - recorded) ** 2)))
+        return float(np.sqrt(np.mean((path[name][:, 0, 0] / unit - recorded) ** 2)))
 
     assert rms("u", turn["surge_vel"]) < 0.03
     assert rms("v", turn["sway_vel"]) < 0.02
     assert rms("r", turn["yaw_vel"], np.pi / 180) < 0.04
-    apart = np.hypot(found["north"][:, 0, 0] - turn["N"], found["east"][:, 0, 0] - turn["E"])
+    apart = np.hypot(path["north"][:, 0, 0] - turn["N"], path["east"][:, 0, 0] - turn["E"])
     assert apart.max() < 5.0
-    assert found["psi"][-1, 0, 0] < found["psi"][0, 0, 0]  # to port
+    assert path["psi"][-1, 0, 0] < path["psi"][0, 0, 0]  # to port
 
 
 def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
@@ -125,13 +125,13 @@ def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> No
     from shipid.physics.thruster import azimuth  # one term alone
 
     recorded = [turn[f"bodyforce{i}_{axis}"] for axis in ("surge", "sway") for i in (0, 1)]
-    found = []
+    computed = []
     for name in ("port", "starboard"):
         block = load_vessel("gunnerus-28.9").document["thruster"][name]
         values = {k: v for k, v in block.items() if k not in ("kind", "source")} | {"rho": 1025.0}
         motions = zip(turn["surge_vel"], turn["sway_vel"], np.radians(turn["yaw_vel"]), strict=True)
         wrenches = [azimuth(np.array([u, v, 0, 0, 0, r]), 100 / 60, np.radians(20), **values) for u, v, r in motions]
-        found.append(np.array([[float(w[0]), float(w[1])] for w in wrenches]))
+        computed.append(np.array([[float(w[0]), float(w[1])] for w in wrenches]))
     for axis, kept, rtol in ((0, recorded[:2], 0.03), (1, recorded[2:], 0.06)):
-        forces, late = np.stack([f[:, axis] for f in found]), slice(40, None)
+        forces, late = np.stack([f[:, axis] for f in computed]), slice(40, None)
         np.testing.assert_allclose(forces[:, late], np.stack(kept)[:, late], rtol=rtol)

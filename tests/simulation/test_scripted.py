@@ -43,11 +43,11 @@ def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
         Zigzag(name="zz", n_rpm=80, angle_deg=10, execute_heading_deg=5, duration=60),
         Zigzag(n_rpm=80, angle_deg=20, execute_heading_deg=10, duration=40),
     ]
-    found = simulated(SHIP, written(tmp_path, GIVEN))
+    frame = simulated(SHIP, written(tmp_path, GIVEN))
     wanted = perform(SHIP, runs, step=0.5, interval=1.0)
-    pd.testing.assert_frame_equal(found, wanted[list(found)])
-    assert list(found["run"].unique()) == ["zz", "M002"]
-    assert not [name for name in found if str(name).startswith("actual.")]
+    pd.testing.assert_frame_equal(frame, wanted[list(frame)])
+    assert list(frame["run"].unique()) == ["zz", "M002"]
+    assert not [name for name in frame if str(name).startswith("actual.")]
 
 
 def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
@@ -64,14 +64,14 @@ n_rpm = [60.0, 80.0]
 delta_deg = [-20.0, 20.0]
 start_speed = [4.0, 6.0]
 """
-    found = simulated(SHIP, written(tmp_path, text))
+    frame = simulated(SHIP, written(tmp_path, text))
     block = {"n_rpm": [60.0, 80.0], "delta_deg": [-20.0, 20.0], "start_speed": [4.0, 6.0]}
     truth = Truth(vessel="mariner", manoeuvres=2, duration=20.0, step=0.5, manoeuvre=[block])  # type: ignore[list-item]
-    pd.testing.assert_frame_equal(found, simulate(truth, SHIP))
+    pd.testing.assert_frame_equal(frame, simulate(truth, SHIP))
 
 
 @pytest.mark.parametrize(
-    ("text", "path", "said"),
+    ("text", "path", "message"),
     [
         ("question = 'none'", None, "holds no manoeuvres"),
         (GIVEN.replace('"zigzag"', '"zigzak"', 1), "manoeuvre.0.kind", "did you mean 'zigzag'"),
@@ -81,8 +81,8 @@ start_speed = [4.0, 6.0]
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, said: str, tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match=said) as caught:
+def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, message: str, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=message) as caught:
         simulated(SHIP, written(tmp_path, text))
     assert caught.value.path == path
     assert str(caught.value).startswith(str(tmp_path / "runs.toml"))

@@ -72,7 +72,7 @@ def test_elevation_has_the_standard_deviation_of_the_sea_and_does_not_repeat() -
 
 
 def test_draws_of_a_sample_depend_on_its_name_alone() -> None:
-    """Not on how many there are, nor on where it stands, nor on the direction."""
+    """Not on their number, nor on the row, nor on the direction."""
     few = draw_components(SEA, np.array([0.1, 0.2]), ["a", "b"])
     many = draw_components(SEA, np.array([0.3, 0.2, 2.0, 0.1]), ["c", "b", "d", "a"])
     for name in ("omega", "epsilon", "amplitude", "chi"):
@@ -118,9 +118,9 @@ def test_fourier_series_pass_through_the_table() -> None:
         rows = np.searchsorted(np.unique(columns["omega"]), columns["omega"])
         for sign in (1, -1):
             basis = np.cos(np.outer(beta, m)) if side > 0 else np.sin(sign * np.outer(beta, m))
-            own, expected = (series[rows] * basis).sum(axis=1), values if side > 0 else sign * values
+            summed, expected = (series[rows] * basis).sum(axis=1), values if side > 0 else sign * values
             # a sine series is zero at 0 and 180 deg, where the table holds rounding of the mesh
-            np.testing.assert_allclose(own, expected, rtol=0, atol=1e-3 * np.abs(values).max())
+            np.testing.assert_allclose(summed, expected, rtol=0, atol=1e-3 * np.abs(values).max())
         np.testing.assert_array_equal(fourier(columns, values, side, 6), series[:, :7])
 
 
@@ -138,13 +138,13 @@ def simulated_loads(vessel: Vessel, drawn: dict[str, np.ndarray], t: float, pose
     state = dict.fromkeys((*model.state, *model.hidden), 0.0)
     state |= dict(zip(("north", "east", "psi"), pose, strict=True)) | {"waves.first_order.t": t}
     rest = [0.0] * len(model.memory), [0.0] * len(model.commands), [0.0] * len(model.environment)
-    found = {}
+    by_term = {}
     for term in model.drawn:
         one = [
             term.function([*state.values()], *rest, [*vessel.parameters.values()], row) for row in loads[term.path][0]
         ]
-        found[term.path] = np.array(sum(one)).ravel()
-    return found
+        by_term[term.path] = np.array(sum(one)).ravel()
+    return by_term
 
 
 @pytest.mark.parametrize("spreading", [None, 4])
@@ -158,15 +158,15 @@ def test_loads_are_those_of_the_table(seed: int, spreading: int | None) -> None:
     transfer = np.einsum("kb,kbj->kj", weights, lagrange(omega, *ship.table))
     phase = omega * t - omega**2 / GRAVITY * (pose[0] * np.cos(chi) + pose[1] * np.sin(chi)) + epsilon
     expected = (transfer * (amplitude * np.exp(1j * phase))[:, None]).sum(axis=0).real
-    own = simulated_loads(SHIP, drawn, t, np.array(pose))
+    loads = simulated_loads(SHIP, drawn, t, np.array(pose))
     scale = np.sqrt((np.abs(transfer * amplitude[:, None]) ** 2).sum(axis=0))
-    assert (np.abs(own["waves.first_order"] - expected) < 1e-3 * scale).all()
+    assert (np.abs(loads["waves.first_order"] - expected) < 1e-3 * scale).all()
 
     columns = {name: np.array(values) for name, values in SHIP.document["waves"]["drift"]["table"].items()}
     half = np.stack([columns[f"{axis}_drift"] for axis in "XYN"], axis=-1).reshape(len(ship.table[0]), -1, 3)
     table = lagrange(omega, ship.table[0], all_round(half, np.array([1, -1, -1])))
     mean = np.einsum("k,kb,kbj->j", amplitude**2, weights, table)
-    np.testing.assert_allclose(own["waves.drift"][[0, 1, 5]], mean, rtol=0, atol=2e-3 * np.abs(mean).max())
+    np.testing.assert_allclose(loads["waves.drift"][[0, 1, 5]], mean, rtol=0, atol=2e-3 * np.abs(mean).max())
 
 
 def test_one_direction_is_one_drift_and_many_are_many() -> None:
@@ -193,13 +193,13 @@ def test_force_on_a_straight_course_has_the_spectrum_of_the_sea(beta_deg: int) -
     omega = np.linspace(*SEA.range, 1000)
     transfer = linear(SHIP).excitation(omega, beta)[:, 2]
     expected = np.sqrt(np.trapezoid(jonswap(omega, SEA) * np.abs(transfer) ** 2, omega))
-    time, rows, found = np.arange(0, 1800, 0.5), wave_loads(SHIP, drawn)["waves.first_order"], []
+    time, rows, forces = np.arange(0, 1800, 0.5), wave_loads(SHIP, drawn)["waves.first_order"], []
     for row in rows:
         w, k, c_chi, s_chi, epsilon = row[:, :5].T
         series = (row[:, 5:].reshape(len(row), 2, 6, 13)[:, :, 2] @ np.cos(np.arange(13) * beta)).T
         phase = np.outer(time, w - k * speed * (c_chi * np.cos(psi) + s_chi * np.sin(psi))) + epsilon
-        found.append(np.cos(phase) @ series[0] - np.sin(phase) @ series[1])
-    assert np.std(found) == pytest.approx(expected, rel=0.03)
+        forces.append(np.cos(phase) @ series[0] - np.sin(phase) @ series[1])
+    assert np.std(forces) == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize("name", list(HULLS))
@@ -218,5 +218,5 @@ def test_bundled_tables_are_those_of_the_data_base(name: str, shared_data: Path)
     expected = all_round(F, MIRROR)
     assert (np.abs(table - expected) <= 1e-4 * np.abs(expected).max(axis=(0, 1))).all()
     columns = load_vessel(name).document["waves"]["drift"]["table"]
-    own = np.stack([np.reshape(columns[f"{axis}_drift"], base["drift"].shape[:2]) for axis in "XYN"], axis=-1)
-    assert (np.abs(own - base["drift"]) <= 1e-4 * np.abs(base["drift"]).max(axis=(0, 1))).all()
+    drift = np.stack([np.reshape(columns[f"{axis}_drift"], base["drift"].shape[:2]) for axis in "XYN"], axis=-1)
+    assert (np.abs(drift - base["drift"]) <= 1e-4 * np.abs(base["drift"]).max(axis=(0, 1))).all()

@@ -102,10 +102,10 @@ class Linearised:
     def response(self, omega: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
         """Amplitudes (n,) of every state under forces (n, 6) of frequencies omega; positions are those of a straight
         course. The force itself does not depend on where she is: linear."""
-        own = [i for i, name in enumerate(self.names) if name not in ("north", "east") and not name.endswith(".t")]
-        system = 1j * omega[:, None, None] * np.eye(len(own)) - self.A[np.ix_(own, own)]
-        found = np.linalg.solve(system, (force @ self.B[own].T)[..., None])[..., 0]
-        result = {self.names[i]: found[:, k] for k, i in enumerate(own)}
+        rows = [i for i, name in enumerate(self.names) if name not in ("north", "east") and not name.endswith(".t")]
+        system = 1j * omega[:, None, None] * np.eye(len(rows)) - self.A[np.ix_(rows, rows)]
+        amplitudes = np.linalg.solve(system, (force @ self.B[rows].T)[..., None])[..., 0]
+        result = {self.names[i]: amplitudes[:, k] for k, i in enumerate(rows)}
         speed = self.steady.get("u", 0.0)
         return result | {
             "north": result["u"] / (1j * omega),
@@ -118,8 +118,8 @@ def linearised(vessel: Vessel, steady: Mapping[str, float] | None = None, n: flo
     model, steady = dynamics(vessel), steady or {}
     names = (*model.state, *model.hidden)
     x, tau = ca.SX.sym("x", len(names)), ca.SX.sym("tau", 6)
-    told = [[n if key.endswith(".n") else 0.0 for key in keys] for keys in (model.memory, model.commands)]
-    rates = model.rates(x, *told, [0.0] * len(model.environment), [*vessel.parameters.values()], tau)
+    levels = [[n if key.endswith(".n") else 0.0 for key in keys] for keys in (model.memory, model.commands)]
+    rates = model.rates(x, *levels, [0.0] * len(model.environment), [*vessel.parameters.values()], tau)
     jacobians = ca.Function("jacobians", [x, tau], [ca.jacobian(rates, x), ca.jacobian(rates, tau)])
     A, B = (np.array(part) for part in jacobians([steady.get(key, 0.0) for key in names], 0))
     return Linearised(names, A, B, steady)
@@ -135,7 +135,8 @@ def on_the_response(
 ) -> dict[str, np.ndarray]:
     """States (S,) at t = 0 of ships that have always been in these waves: nothing has to settle."""
     return {
-        key: steady.get(key, 0.0) + np.array([(own[key] @ a).real for own, a in zip(responses, wave, strict=True)])
+        key: steady.get(key, 0.0)
+        + np.array([(response[key] @ a).real for response, a in zip(responses, wave, strict=True)])
         for key in responses[0]
     }
 
@@ -170,10 +171,10 @@ def test_undamped_periods_are_those_of_the_data_base(name: str, axis: int) -> No
     Heave of the 33.9 m ship within 2 %: she has the 531 t of the trials for which her manoeuvring model was fitted,
     the data base the 574 t of her design draught.
     """
-    own, omega = linear(ship(name)), 1.4
+    theory, omega = linear(ship(name)), 1.4
     for _ in range(50):
-        inertia = about_centre_of_gravity(name, own.M + own.added_mass(np.array([omega]))[0])
-        omega = np.sqrt(own.C[axis, axis] / inertia[axis, axis])
+        inertia = about_centre_of_gravity(name, theory.M + theory.added_mass(np.array([omega]))[0])
+        omega = np.sqrt(theory.C[axis, axis] / inertia[axis, axis])
     exception = name == HULLS[1] and axis == HEAVE
     assert 2 * np.pi / omega == pytest.approx(PERIODS[name][axis], rel=0.02 if exception else 0.01)
 
@@ -184,9 +185,9 @@ def alone(name: str, axis: int) -> Vessel:
     return ship(name) if axis == ROLL else held(name).with_values(others[axis])
 
 
-def inertia_alone(own: Linear, axis: int) -> float:
+def inertia_alone(theory: Linear, axis: int) -> float:
     """Mass and added mass at infinite frequency that one direction feels."""
-    total, beside = own.M + own.A, [1, 5]
+    total, beside = theory.M + theory.A, [1, 5]
     inertia = total[axis, axis]
     if axis == ROLL:
         inertia -= total[axis, beside] @ np.linalg.solve(total[np.ix_(beside, beside)], total[beside, axis])
@@ -219,11 +220,11 @@ def test_forced_oscillation_resonates_at_the_natural_period(name: str, axis: int
 @pytest.mark.parametrize("axis", UPRIGHT)
 def test_free_decay_is_that_of_the_linear_ship(name: str, axis: int) -> None:
     """Let go at x_0 in calm water: x' is the cosine transform of Re[-C x_0 / (s^2 I + s (K + B) + C)], s = i omega."""
-    own, first = linear(ship(name)), 0.01
+    theory, first = linear(ship(name)), 0.01
     omega = np.linspace(0, 80, 40001)
     s = 1j * omega
-    K = own.memory(omega)[:, axis, axis] + own.B[axis, axis]
-    transform = -own.C[axis, axis] * first / (s**2 * inertia_alone(own, axis) + s * K + own.C[axis, axis])
+    K = theory.memory(omega)[:, axis, axis] + theory.B[axis, axis]
+    transform = -theory.C[axis, axis] * first / (s**2 * inertia_alone(theory, axis) + s * K + theory.C[axis, axis])
     fine = 0.05 * np.arange(401)
     rate = np.array([np.trapezoid(transform.real * np.cos(omega * t), omega) for t in fine]) * 2 / np.pi
     expected = first + np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2 * 0.05)])
@@ -236,20 +237,20 @@ def test_free_decay_is_that_of_the_linear_ship(name: str, axis: int) -> None:
 
 @BOTH
 def test_equations_at_rest_are_the_linear_ship_of_the_document(name: str) -> None:
-    """All six directions free, beam and bow waves: the rates' own linearisation against the document's matrices."""
-    omega, own = np.linspace(0.4, 3.0, 14), linear(ship(name))
+    """All six directions free, beam and bow waves: the linearised rates against the document's matrices."""
+    omega, theory = np.linspace(0.4, 3.0, 14), linear(ship(name))
     for beta in (np.pi / 2, 2.4):
-        found = linearised(ship(name)).response(omega, own.excitation(omega, beta))
-        expected = own.response(omega, beta, EVERY)
+        response = linearised(ship(name)).response(omega, theory.excitation(omega, beta))
+        expected = theory.response(omega, beta, EVERY)
         names = ("north", "east", "down", "phi", "theta", "psi")
-        np.testing.assert_allclose(np.stack([found[key] for key in names], axis=-1), expected, rtol=1e-7, atol=1e-12)
+        np.testing.assert_allclose(np.stack([response[key] for key in names], axis=-1), expected, rtol=1e-7, atol=1e-12)
 
 
 @pytest.mark.slow
 @BOTH
 def test_standard_deviations_in_irregular_waves(name: str) -> None:
     """Heave, roll, pitch, surge, sway, yaw held, U = 0: within 5 % of the spectral integral on five headings."""
-    vessel, own, count = held(name), linear(ship(name)), 12
+    vessel, theory, count = held(name), linear(ship(name)), 12
     beta = np.radians(np.repeat(BETA_DEG, count))
     psi = np.linspace(0, 6, len(beta))
     drawn = draw_components(LOW, psi + beta, list(range(len(beta))))
@@ -257,13 +258,13 @@ def test_standard_deviations_in_irregular_waves(name: str) -> None:
     omega = np.linspace(*LOW.range, 800)
     for beta_deg in BETA_DEG:
         use = np.isclose(np.degrees(beta), beta_deg)
-        expected = spectral(own.response(omega, np.radians(beta_deg)), omega, LOW)
+        expected = spectral(theory.response(omega, np.radians(beta_deg)), omega, LOW)
         for axis, value in zip(UPRIGHT, expected, strict=True):
-            found = path[OF[axis]][300:, 0][:, use]  # the first minute settles
+            motion = path[OF[axis]][300:, 0][:, use]  # the first minute settles
             if axis == ROLL and beta_deg in (0, 180):
-                assert found.std() < 1e-3 * expected[2]
+                assert motion.std() < 1e-3 * expected[2]
             else:
-                assert found.std() == pytest.approx(value, rel=0.05), f"{OF[axis]} at {beta_deg} deg"
+                assert motion.std() == pytest.approx(value, rel=0.05), f"{OF[axis]} at {beta_deg} deg"
 
 
 @BOTH
@@ -279,12 +280,12 @@ def test_motions_in_irregular_waves_follow_the_linear_response(name: str, thrust
         calm = run(vessel, {"u": np.array([4.5])}, 400.0, orders={"n": n}, interval=400.0)
         steady = {key: float(calm[key][-1, 0, 0]) for key in calm.names if not key.startswith("actual")}
         steady |= {"north": 0.0, "east": 0.0, "waves.first_order.t": 0.0}
-    model, own = linearised(vessel, steady, n if thrust else 0.0), linear(vessel)
+    model, theory = linearised(vessel, steady, n if thrust else 0.0), linear(vessel)
     beta = np.radians((90, 135, 180))
     drawn = draw_components(LOW, beta, ["beam", "bow", "head"])
     speed = steady.get("u", 0.0)
     met = drawn["omega"] - drawn["omega"] ** 2 / GRAVITY * speed * np.cos(beta)[:, None]
-    responses = [model.response(met[s], own.excitation(drawn["omega"][s], beta[s])) for s in range(3)]
+    responses = [model.response(met[s], theory.excitation(drawn["omega"][s], beta[s])) for s in range(3)]
     wave = elevation(drawn)
     start = on_the_response(responses, wave, steady)
     orders = {"n": n} if thrust else {}
@@ -307,13 +308,13 @@ def test_first_order_loads_do_not_drift_the_ship(name: str, beta_deg: int) -> No
     sea, count, beta = Sea(H_s=1.0, T_p=5.0), 24, np.radians(beta_deg)
     vessel = ship(name)
     drawn = draw_components(sea, np.full(count, beta), list(range(count)))
-    model, own = linearised(vessel), linear(vessel)
-    responses = [model.response(omega, own.excitation(omega, beta)) for omega in drawn["omega"]]
+    model, theory = linearised(vessel), linear(vessel)
+    responses = [model.response(omega, theory.excitation(omega, beta)) for omega in drawn["omega"]]
     start = on_the_response(responses, elevation(drawn), {})
     path = run(vessel, start, 40.0, components=first_order(vessel, drawn), keep=("north", "east"))
     time = path.interval * np.arange(len(path.states))
     channel, axis = ("east", 1) if beta_deg == 90 else ("north", 0)
-    mean = (own.M + own.A)[axis, axis] * 2 * np.polyfit(time, path[channel][:, 0], 2)[0].mean()
+    mean = (theory.M + theory.A)[axis, axis] * 2 * np.polyfit(time, path[channel][:, 0], 2)[0].mean()
     table = wave_loads(vessel, drawn)["waves.drift"][0, 0, 2:].reshape(3, -1)[axis]
     harmonics = np.arange(len(table)) * beta
     drift = table @ (np.cos(harmonics) if axis == 0 else np.sin(harmonics))
@@ -324,16 +325,16 @@ def test_first_order_loads_do_not_drift_the_ship(name: str, beta_deg: int) -> No
 def test_standard_deviations_beside_the_full_motion_transfer_function(name: str) -> None:
     """What option S costs: memory and frequency dependence of surge, sway and yaw are left out, their coupling to roll
     is that of infinite frequency; bands as the data base states them (heave, pitch a few per cent, roll up to 1.35)."""
-    own, sea = linear(ship(name)), Sea(H_s=1.0, T_p=5.0)
+    theory, sea = linear(ship(name)), Sea(H_s=1.0, T_p=5.0)
     omega = np.linspace(*sea.range, 800)
     bands = {HEAVE: (0.93, 1.04), ROLL: (1.0, 1.36), PITCH: (0.85, 1.04)}
     for column, beta_deg in enumerate(BETA_DEG):
-        found = spectral(own.response(omega, np.radians(beta_deg), EVERY), omega, sea)
+        deviations = spectral(theory.response(omega, np.radians(beta_deg), EVERY), omega, sea)
         for row, axis in enumerate(UPRIGHT):
             full = FULL[name][row][column] * (1 if axis == HEAVE else np.pi / 180)
             if full > 0:
                 low, high = bands[axis]
-                assert low < found[axis] / full < high, f"{OF[axis]} at {beta_deg} deg"
+                assert low < deviations[axis] / full < high, f"{OF[axis]} at {beta_deg} deg"
 
 
 # ---- long waves
@@ -356,11 +357,13 @@ def low_frequency(name: str) -> Vessel:
 
 def long_wave(vessel: Vessel, beta_deg: float) -> tuple[complex, complex, complex]:
     """Heave over elevation, roll and pitch over slope k a in a regular wave of 0.3 rad/s, 5 cm: simulated, all free."""
-    omega, own = 0.3, linear(vessel)
+    omega, theory = 0.3, linear(vessel)
     drawn = {"omega": omega, "amplitude": 0.05, "epsilon": 0.0, "chi": np.radians(beta_deg)}
     arrays = {key: np.array([[value]]) for key, value in drawn.items()}
-    found = linearised(vessel).response(np.array([omega]), own.excitation(np.array([omega]), np.radians(beta_deg)))
-    start = {key: 0.05 * value.real for key, value in found.items()}
+    response = linearised(vessel).response(
+        np.array([omega]), theory.excitation(np.array([omega]), np.radians(beta_deg))
+    )
+    start = {key: 0.05 * value.real for key, value in response.items()}
     path = run(vessel, start, 84.0, components=first_order(vessel, arrays), keep=tuple(OF.values()))
     time = path.interval * np.arange(len(path.states))
     basis = np.stack([np.cos(omega * time), -np.sin(omega * time), np.ones_like(time)], axis=-1)
@@ -403,20 +406,20 @@ def calm(name: str, **changes: Any) -> Truth:
 @BOTH
 def test_calm_water_is_the_manoeuvring_model(name: str) -> None:
     """Turns of 160 s from near rest, 50-200 rpm, +-50 deg, no wind: u, v within 0.02 m/s, r within 0.05 deg/s RMS."""
-    own = load_vessel(name)
-    lags = {f"thruster.{side}.actuator": own.document["thruster"][side]["actuator"] for side in ("port", "starboard")}
+    ship_ = load_vessel(name)
+    lags = {f"thruster.{side}.actuator": ship_.document["thruster"][side]["actuator"] for side in ("port", "starboard")}
     flat = load_vessel(name.removesuffix("-6dof")).with_values(lags)
     for orders in ({}, {"manoeuvres": 2, "n_rpm": (140.0, 140.0), "alpha_deg": (30.0, 30.0)}):
-        six, three = simulate(calm(name, **orders), own), simulate(calm(name, **orders), flat)
+        six, three = simulate(calm(name, **orders), ship_), simulate(calm(name, **orders), flat)
         for column, limit in (("u", 0.02), ("v", 0.02), ("r", np.radians(0.05))):
             error = (six[column] - three[column]) ** 2
             assert np.sqrt(error.groupby(six["run"]).mean()).max() < limit, column
 
 
 def test_a_sea_of_no_height_is_calm_water() -> None:
-    own = load_vessel(HULLS[0])
-    flat = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0, waves=Sea(H_s=0.0, T_p=5.0)), own)
-    none = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0), own)
+    vessel = load_vessel(HULLS[0])
+    flat = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0, waves=Sea(H_s=0.0, T_p=5.0)), vessel)
+    none = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0), vessel)
     np.testing.assert_allclose(flat["u"], none["u"], rtol=1e-12)
     np.testing.assert_allclose(flat["phi"], none["phi"], rtol=1e-9, atol=1e-15)
 
@@ -428,12 +431,12 @@ def test_a_disturbed_ship_only_loses_energy(name: str) -> None:
     rng, count = np.random.default_rng(2), 8
     scale = {"down": 0.05, "phi": 0.02, "theta": 0.01, "w": 0.05, "p": 0.02, "q": 0.01}
     start = {key: size * rng.normal(size=count) for key, size in scale.items()}
-    path, own = run(held(name), start, 60.0, keep=tuple(scale)), linear(ship(name))
+    path, theory = run(held(name), start, 60.0, keep=tuple(scale)), linear(ship(name))
     upright = np.ix_(UPRIGHT, UPRIGHT)
     position, velocity = (path.states[:, 0, :, part] for part in (slice(0, 3), slice(3, 6)))
     energy = sum(
         np.einsum("...i,ij,...j->...", x, matrix[upright], x) / 2
-        for x, matrix in ((position, own.C), (velocity, own.M + own.A))
+        for x, matrix in ((position, theory.C), (velocity, theory.M + theory.A))
     )
     assert (energy[1:] <= energy[0] * (1 + 1e-3)).all()
     assert (energy[-1] < 1e-3 * energy[0]).all()

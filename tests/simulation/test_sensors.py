@@ -1,4 +1,4 @@
-"""Sensors: each effect on its own, their order, and draws that keep to themselves."""
+"""Sensors: each effect alone, their order, and draws that keep to themselves."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "angles", "how", "said"),
+    ("name", "angles", "how", "message"),
     [
         ("zigzak", (), {}, "NAME: no manoeuvre is called 'zigzak': did you mean 'zigzag'?"),
         ("zigzag", (1, 2, 3), {}, "ANGLES: zigzag takes 2 angles"),
@@ -88,9 +88,9 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
     ],
 )
 def test_what_cannot_be_done_is_refused(
-    name: str, angles: tuple[float, ...], how: dict[str, object], said: str
+    name: str, angles: tuple[float, ...], how: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(ShipidError, match=f"^{re.escape(said)}"):
+    with pytest.raises(ShipidError, match=f"^{re.escape(message)}"):
         standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
 
 

@@ -71,7 +71,7 @@ def test_draws_fill_their_ranges() -> None:
         assert abs(values.mean() - (low + high) / 2) < 5 * width / np.sqrt(12 * count), name
     drawn = rows[list(ranges)].to_numpy()
     off_diagonal = np.corrcoef(drawn.T) - np.eye(len(ranges))
-    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity on its own
+    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity alone
 
 
 def test_orders_and_wind_hold_and_are_equal_on_both_sides() -> None:
@@ -120,7 +120,7 @@ def test_every_structure_logs_a_dataset(name: str) -> None:
     assert ("z" in columns) == (name == "six")
 
 
-def test_diverging_truth_is_told() -> None:
+def test_diverging_truth_is_reported() -> None:
     wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
     with pytest.raises(DocumentError, match=r"diverges in M00\d: take a smaller step") as caught:
         simulate(truth(start_speed=(2.0, 3.0)), wild)
@@ -128,7 +128,7 @@ def test_diverging_truth_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"interval": 0.25}, "multiple of step"),
         ({"duration": 0.5}, "holds no interval"),
@@ -139,8 +139,8 @@ def test_diverging_truth_is_told() -> None:
         ({"current_speed": (-1.0, 0.0)}, "greater than or equal to 0"),
     ],
 )
-def test_impossible_truths_are_refused(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValidationError, match=said):
+def test_impossible_truths_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
         truth(**changes)
 
 
@@ -148,7 +148,7 @@ SIX = load_vessel("gunnerus-28.9-6dof")
 SEA = {"H_s": 1.0, "T_p": 5.0, "components": 20}
 
 
-def test_waves_move_the_ship_and_are_its_own() -> None:
+def test_waves_move_the_ship_and_differ_by_run() -> None:
     """A sea heaves and rolls her; calm water does not; another manoeuvre has another sea."""
     calm, rough = simulate(truth(duration=20.0), SIX), simulate(truth(duration=20.0, waves=SEA), SIX)
     late = calm["t"] > 5.0
@@ -178,7 +178,7 @@ def test_gusts_are_logged_and_felt() -> None:
     assert np.abs(gusty["v"] - steady["v"]).max() > 1e-3
 
 
-def test_a_current_carries_every_ship_its_own_way() -> None:
+def test_a_current_carries_every_ship_at_its_speed() -> None:
     ship = SHIP.with_values({"current.kind": "uniform", "wind.off": True})
     still = simulate(truth(duration=10.0), ship)
     carried = simulate(truth(duration=10.0, current_speed=(0.5, 0.5)), ship)
@@ -191,28 +191,28 @@ def test_a_current_carries_every_ship_its_own_way() -> None:
 def test_sensors_disturb_what_they_measure_and_nothing_else() -> None:
     exact = simulate(truth(duration=10.0), SHIP)
     sensors = {"u": {"noise": 0.1}, "psi": {"bias": 0.02}, "north": {"latency": 0.5}}
-    found = simulate(truth(duration=10.0, sensors=sensors), SHIP)
-    assert 0.05 < (found["u"] - exact["u"]).std() < 0.2
-    per_run = (found["psi"] - exact["psi"]).groupby(found["run"])
+    measured = simulate(truth(duration=10.0, sensors=sensors), SHIP)
+    assert 0.05 < (measured["u"] - exact["u"]).std() < 0.2
+    per_run = (measured["psi"] - exact["psi"]).groupby(measured["run"])
     assert per_run.std().max() < 1e-9 < per_run.mean().abs().max()
     fine = simulate(truth(duration=10.0, interval=0.5), SHIP)
     late = fine.loc[np.isclose(fine["t"] % 1.0, 0.5), "north"].to_numpy()
-    np.testing.assert_allclose(found.loc[found["t"] > 0, "north"], late, atol=1e-9)
+    np.testing.assert_allclose(measured.loc[measured["t"] > 0, "north"], late, atol=1e-9)
     for name in ("east", "v", "r", "V_w", "port.n"):
-        np.testing.assert_allclose(found[name], exact[name], rtol=1e-9)
+        np.testing.assert_allclose(measured[name], exact[name], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("changes", "path", "said"),
+    ("changes", "path", "message"),
     [
         ({"waves": SEA}, "truth.waves", "has no [waves]"),
         ({"current_speed": (0.0, 1.0)}, "truth.current_speed", "has no [current]"),
     ],
 )
-def test_what_a_vessel_cannot_feel_is_refused(changes: dict[str, Any], path: str, said: str) -> None:
+def test_what_a_vessel_cannot_feel_is_refused(changes: dict[str, Any], path: str, message: str) -> None:
     with pytest.raises(DocumentError) as caught:
         simulate(truth(**changes), SHIP)
-    assert (caught.value.path, said in str(caught.value)) == (path, True)
+    assert (caught.value.path, message in str(caught.value)) == (path, True)
 
 
 @pytest.mark.parametrize(("T_p", "refused"), [(5.0, False), (12.0, False), (20.0, True), (2.5, True)])

@@ -36,12 +36,12 @@ def by_hand(
     runs: int = 1,
     changes: Mapping[str, Any] | None = None,
 ) -> Results:
-    """Results of cells (model, N_D, seed) -> H [m]; None has failed. Errors are equal at all steps unless said.
+    """Results of cells (model, N_D, seed) -> H [m]; None has failed. Errors are equal at all steps by default.
 
     runs : test manoeuvres of one window each; all errors are up to 10 % lower in the first and higher in the last.
     changes : further blocks of the study document.
 
-    family : members by family, called `<family>-<number>`; without it every model is a family of its own.
+    family : members by family, called `<family>-<number>`; without it every model is a family.
     """
     document = tiny_plan(folder).document
     document["family"] = (

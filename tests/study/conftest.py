@@ -17,13 +17,13 @@ from tests.study.tiny import tiny_plan
 
 @pytest.fixture
 def made(tmp_path: Path) -> Any:
-    """`by_hand` in a folder of its own."""
+    """`by_hand` in a new folder."""
     return partial(by_hand, tmp_path)
 
 
 @pytest.fixture
 def recorded(tmp_path: Path) -> Callable[..., tuple[Plan, Dataset]]:
-    """A plan on a recorded dataset of one's own."""
+    """A plan on a recorded dataset that the test makes."""
 
     def make(dataset: Dataset, **changes: Any) -> tuple[Plan, Dataset]:
         file = write_dataset(dataset, tmp_path / "log.parquet")

@@ -62,13 +62,13 @@ def table(
     runs, counts = size.runs, rng.integers(WINDOWS // 2, WINDOWS, size.runs).astype(float)
     hard, (amounts, seeds) = factor(rng, HARD, (runs,)), (len(size.amounts), size.seeds)
     drawn = factor(rng, DRAWN, (amounts, seeds, 1))
-    found = {}
+    errors = {}
     for model, means in H.items():
         suits = factor(rng, SUITS, (runs,)) * factor(rng, SUITS / 2, (amounts, 1, runs))
         spread = (trained or {}).get(model, TRAINED)
-        found[model] = means[:, None, None] * hard * suits * drawn * factor(rng, spread, (amounts, seeds, 1))
+        errors[model] = means[:, None, None] * hard * suits * drawn * factor(rng, spread, (amounts, seeds, 1))
     alone = {model: mean * hard * factor(rng, SUITS, (runs,)) for model, mean in A.items()}
-    return ErrorTable(size.amounts, counts, alone, found)
+    return ErrorTable(size.amounts, counts, alone, errors)
 
 
 def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> tuple[Grid, Grid]:

@@ -27,74 +27,75 @@ def text(results: Results) -> str:
 def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     """10 runs with `good` leave 1.5 m; without physics 30 runs leave 4 m and 60 leave 1.25 m."""
     H = {"good": (1.5, 1.0, 0.5), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 1.25)}
-    said = text(made(grid(H, (10, 30, 60))))
-    assert "With 60 runs, good (2.00 m mean error on its own) predicts 8 s ahead with 0.50 m mean" in said
-    assert "nine errors in ten are below 0.75 m" in said
+    advice = text(made(grid(H, (10, 30, 60))))
+    assert "With 60 runs, good (2.00 m mean error alone) predicts 8 s ahead with 0.50 m mean" in advice
+    assert "nine errors in ten are below 0.75 m" in advice
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
-    assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in said
-    assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in said
-    assert "leaves 25% to 25% of the error of physics alone (over 2 models)" in said
-    assert "Keeping u, v and r constant gives 10.0 m: at 60 runs every model beats it." in said
-    assert "At 60 runs 1 of 2 physics models does better than no physics; bad does worse." in said
+    assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
+    assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
+    assert "leaves 25% to 25% of the error of physics alone (over 2 models)" in advice
+    assert "Keeping u, v and r constant gives 10.0 m: at 60 runs every model beats it." in advice
+    assert "At 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
 
 
 def test_validation_chooses_and_never_the_test(made: Any) -> None:
-    said = text(
+    advice = text(
         made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}), losses={"good": 2.0, "bad": 1.0})
     )
-    assert "bad (best in validation)" in said
-    assert said.count("best in validation") == 1
-    assert "With 30 runs, bad (6.00 m mean error on its own)" in said
+    assert "bad (best in validation)" in advice
+    assert advice.count("best in validation") == 1
+    assert "With 30 runs, bad (6.00 m mean error alone)" in advice
 
 
-def test_harmful_compensation_is_told(made: Any) -> None:
+def test_harmful_compensation_is_reported(made: Any) -> None:
     """`good` alone has 2 m and `bad` 4 m."""
-    said = text(made(grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "none": (9.0, 4.0)})))
-    assert "Compensation harms good; good alone has 2.00 m, less than any compensated model." in said
+    advice = text(made(grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "none": (9.0, 4.0)})))
+    assert "Compensation harms good; good alone has 2.00 m, less than any compensated model." in advice
     assert "harms" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
 
 
 def test_no_amount_of_data_replaces_physics(made: Any) -> None:
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
-    assert "With 10 runs, good (best in validation) has 1.50 m mean error; without physics 30 runs are not" in said
-    assert "are not enough for that: they give 4.00 m" in said
-    assert "every physics model with a result does better than no physics" in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
+    assert "With 10 runs, good (best in validation) has 1.50 m mean error; without physics 30 runs are not" in advice
+    assert "are not enough for that: they give 4.00 m" in advice
+    assert "every physics model with a result does better than no physics" in advice
 
 
 def test_physics_worth_no_run_at_all(made: Any) -> None:
     """Where the least data does without physics what the best physics does, nobody needs more runs."""
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (1.25, 1.1)})))
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (1.25, 1.1)})))
     assert (
-        "good (best in validation) has 1.50 m mean error; without physics the same 10 runs do as well, 1.25 m." in said
+        "good (best in validation) has 1.50 m mean error; without physics the same 10 runs do as well, 1.25 m."
+        in advice
     )
 
 
-def test_harm_is_told_with_names(made: Any) -> None:
+def test_harm_is_reported_with_names(made: Any) -> None:
     """At 10 runs `bad` harms; at 30 it does not."""
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)})))
-    assert "At 10 runs 1 of 2 physics models does better than no physics; bad does worse." in said
-    assert "At 30 runs every physics model with a result does better than no physics." in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)})))
+    assert "At 10 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
+    assert "At 30 runs every physics model with a result does better than no physics." in advice
     both = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
     assert "At 30 runs none of 2 physics models does better than no physics; good, bad do worse." in both
     assert "every physics model" not in both
 
 
 def test_a_tie_is_no_help(made: Any) -> None:
-    said = text(made(grid({"good": (1.5, 3.0), "bad": (2.0, 2.0), "none": (4.0, 3.0)})))
-    assert "At 30 runs every physics model" not in said
+    advice = text(made(grid({"good": (1.5, 3.0), "bad": (2.0, 2.0), "none": (4.0, 3.0)})))
+    assert "At 30 runs every physics model" not in advice
 
 
-def test_data_that_did_not_help_is_told(made: Any) -> None:
-    said = text(made(grid({"good": (1.5, 1.6), "bad": (3.0, 2.0), "none": (4.0, 5.0)})))
-    assert "With 30 runs good, pure data-driven are no better than with 10." in said
+def test_data_that_did_not_help_is_reported(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.6), "bad": (3.0, 2.0), "none": (4.0, 5.0)})))
+    assert "With 30 runs good, pure data-driven are no better than with 10." in advice
     assert "no better than with" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)})))
 
 
 def test_constant_motion_that_is_not_beaten(made: Any) -> None:
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
-    assert "gives 2.50 m: at 30 runs pure data-driven does not beat it." in said
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.0))
-    assert "bad, pure data-driven do not beat it." in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
+    assert "gives 2.50 m: at 30 runs pure data-driven does not beat it." in advice
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.0))
+    assert "bad, pure data-driven do not beat it." in advice
 
 
 def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
@@ -102,9 +103,9 @@ def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
     cells |= {("bad", 10, seed): 4.0 for seed in range(3)} | {("none", 10, seed): 9.0 for seed in range(3)}
     assert "2.00 m mean error;" in text(made(cells))
     assert "1 test manoeuvre gives no interval, 5 would: every comparison here holds on this test" in text(made(cells))
-    said = text(made(cells, runs=8))
-    assert re.search(r"2\.00 m \[1\.\d\d, 2\.\d\d\] mean error", said)
-    assert "Brackets are 95 % intervals over 8 test manoeuvres" in said
+    advice = text(made(cells, runs=8))
+    assert re.search(r"2\.00 m \[1\.\d\d, 2\.\d\d\] mean error", advice)
+    assert "Brackets are 95 % intervals over 8 test manoeuvres" in advice
     table = by_model(made(cells)).set_index("model")
     assert table.loc["good", ["H", "seeds"]].tolist() == [2.0, 3]
 
@@ -113,30 +114,28 @@ def test_how_good_physics_must_be(made: Any) -> None:
     """H = A / 2 for five models, `none` has 3 m: physics pays below A = 6 m; with 30 runs it is all the same."""
     alone = {f"m{k}": 2.0**k for k in range(5)}
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.0)}
-    said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert re.search(
-        r"8 s ahead\? With 10 runs physics pays if its own error A is below about 6\.0 m \[\d\.\d, \d", said
-    )
-    assert "; with 30 runs the test cannot tell any of 5 physics models from no physics." in said
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert re.search(r"8 s ahead\? With 10 runs physics pays if its error A is below about 6\.0 m \[\d\.\d, \d", advice)
+    assert "; with 30 runs the test cannot tell any of 5 physics models from no physics." in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
-    said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics pays even with an error A of 16.0 m, the worst tried; with 30" in said
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "With 10 runs physics pays even with an error A of 16.0 m, the worst tried; with 30" in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
-    said = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in said
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
 
 
-def test_what_cannot_be_told_is_said_once(made: Any) -> None:
+def test_what_the_test_cannot_decide_is_reported_once(made: Any) -> None:
     H = {"good": (1.5, 1.0), "bad": (1.5, 1.0), "none": (1.5, 1.0)}
-    said = text(made(grid(H), runs=8))
-    assert "With 10 or 30 runs the test cannot tell any of 2 physics models from no physics." in said
-    assert "do better" not in said
+    advice = text(made(grid(H), runs=8))
+    assert "With 10 or 30 runs the test cannot tell any of 2 physics models from no physics." in advice
+    assert "do better" not in advice
 
 
 def test_names_are_those_that_the_test_can_tell(made: Any) -> None:
     """`bad` is 1 % below no physics in all eight manoeuvres; another training may differ by 3 %."""
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (8.91, 2.0), "none": (9.0, 4.0)}), runs=8))
-    assert "At 10 runs 1 of 2 physics models does better than no physics; for bad the test cannot tell." in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (8.91, 2.0), "none": (9.0, 4.0)}), runs=8))
+    assert "At 10 runs 1 of 2 physics models does better than no physics; for bad the test cannot tell." in advice
 
 
 def test_known_orders_are_an_upper_bound_where_they_may_react(made: Any) -> None:
@@ -158,9 +157,9 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     H = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "fitted": (0.8, 0.7), "none": (9.0, 4.0)})
     alone = {"good": 2.0, "bad": 6.0, "fitted": 3.0}
     results = made(H, alone=alone, changes={"family": family})
-    said = text(results)
+    advice = text(results)
     assert best_model(results) == "good"
-    assert "so they cannot be called best in validation: fitted has 0.70 m with 30 runs." in said
+    assert "so they cannot be called best in validation: fitted has 0.70 m with 30 runs." in advice
 
 
 def test_both_baselines_without_physics_are_named(made: Any) -> None:
@@ -173,35 +172,35 @@ def test_both_baselines_without_physics_are_named(made: Any) -> None:
 def test_incomplete_study_is_provisional(made: Any) -> None:
     cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
     del cells["bad", 10, 0]
-    said = text(made(cells, planned=6))
-    assert said.startswith("1 of 6 cells are not finished: what follows is provisional.")
+    advice = text(made(cells, planned=6))
+    assert advice.startswith("1 of 6 cells are not finished: what follows is provisional.")
 
 
-def test_failed_cells_are_told_and_not_counted(made: Any) -> None:
+def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
-    assert "1 of 6 cells have no result (bad: no training converged)" in said
-    assert "every physics model with a result does better than no physics" in said
-    assert "(over 1 model)" in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
+    assert "1 of 6 cells have no result (bad: no training converged)" in advice
+    assert "every physics model with a result does better than no physics" in advice
+    assert "(over 1 model)" in advice
 
 
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:
-    said = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, None)})))
-    assert "at 30 runs every physics model does better" not in said.lower()
-    assert "without physics not every cell has a result" in said
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, None)})))
+    assert "at 30 runs every physics model does better" not in advice.lower()
+    assert "without physics not every cell has a result" in advice
 
 
-def test_nothing_can_be_said(made: Any) -> None:
-    said = text(made(grid({"good": (None, None), "bad": (None, None), "none": (9.0, 4.0)})))
-    assert "nothing can be said yet" in said
-    assert "does better" not in said
-    assert "nothing can be said yet" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
+def test_without_results_there_is_no_conclusion(made: Any) -> None:
+    advice = text(made(grid({"good": (None, None), "bad": (None, None), "none": (9.0, 4.0)})))
+    assert "there is no conclusion yet" in advice
+    assert "does better" not in advice
+    assert "there is no conclusion yet" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
 
 
 def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     H = {"good": (0.1, 0.1), "bad": (3.0, 1.5), "none": (9.0, 4.0)}
-    said = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
-    assert "leaves 25% of the error of physics alone (over 1 model)" in said
+    advice = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
+    assert "leaves 25% of the error of physics alone (over 1 model)" in advice
 
 
 def test_the_map_carries_what_needs_it(made: Any) -> None:
@@ -218,12 +217,12 @@ def test_the_nominal_model_is_a_floor_and_no_degraded_model(made: Any) -> None:
     """It would be the best of all; the answer speaks of `good` and tells the floor once."""
     H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "exact": (0.5, 0.25), "none": (9.0, 4.0)}
     results = made(grid(H), alone={"good": 2.0, "bad": 6.0, "exact": 0.75}, claims={"nominal": "exact"})
-    said = text(results)
-    assert "good (best in validation)" in said
-    assert "(over 2 models)" in said
-    assert said.count("exact") == 1
-    assert "Exact coefficients (exact) leave 0.75 m alone, the floor" in said
-    assert "and 0.25 m compensated with 30 runs." in said
+    advice = text(results)
+    assert "good (best in validation)" in advice
+    assert "(over 2 models)" in advice
+    assert advice.count("exact") == 1
+    assert "Exact coefficients (exact) leave 0.75 m alone, the floor" in advice
+    assert "and 0.25 m compensated with 30 runs." in advice
 
 
 def test_a_long_list_of_names_is_cut(made: Any) -> None:

@@ -110,7 +110,7 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
 
 
-def test_too_few_runs_are_said(tiny_run: Path) -> None:
+def test_too_few_runs_are_reported(tiny_run: Path) -> None:
     results = read_results(tiny_run)  # 0.9 of 6 runs
     assert results.cells["coverage"].isna().all()
     assert "needs 9 runs or more" in bands.answer(results)[0][0]

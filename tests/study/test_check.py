@@ -15,9 +15,9 @@ from tests.study.tiny import tiny_plan
 
 
 def test_a_sound_folder_has_no_fault(tiny_run: Path) -> None:
-    found = check_folder(tiny_run)
-    assert found.lines == ["8 of 8 cells finished, 0 faults"]
-    assert not found.faults
+    check = check_folder(tiny_run)
+    assert check.lines == ["8 of 8 cells finished, 0 faults"]
+    assert not check.faults
 
 
 def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
@@ -27,9 +27,9 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
     (folder / "test.npz").write_bytes(b"half")
     (folder / f"{TEMPORARY}x-1-abc").mkdir()
     store.note_session(folder, {"shipid": "9.9"})
-    found = check_folder(folder)
-    assert sorted(fault.kind for fault in found.faults) == ["damaged", "missing"]
-    text = "\n".join(found.lines)
+    check = check_folder(folder)
+    assert sorted(fault.kind for fault in check.faults) == ["damaged", "missing"]
+    text = "\n".join(check.lines)
     for words in ("computes it again", "2 faults", "1 temporary folder", "computed in parts: shipid was"):
         assert words in text
 

@@ -75,11 +75,11 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
                 taken.append(i)
                 yield f"t{i}", i
 
-        found = []
+        done = []
         for number, result in enumerate(on_dask(address, napping(0.0), 10, tasks(), "x")):
             assert len(taken) <= number + cluster.AHEAD, "others may take what no worker needs yet"
-            found.append(result)
-        assert sorted(found) == [(i, 10 + i) for i in range(12)]
+            done.append(result)
+        assert sorted(done) == [(i, 10 + i) for i in range(12)]
 
         def failing(_: int, task: int) -> float:
             return 1 / task
@@ -112,10 +112,10 @@ def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     monkeypatch.setattr(cluster, "LOOK", 0.2)
     tasks = [(f"t{i}", i) for i in range(6)]
-    found: Done = []
+    done: Done = []
     with a_cluster(tmp_path) as (address, (_, first)):
         results = on_dask(address, napping(0.3), 10, tasks, "x")
-        found.append(next(results))
+        done.append(next(results))
         first.kill()
         second = subprocess.Popen(
             [sys.executable, "-c", f"import time, os; time.sleep(4); os.execv({sys.executable!r}, {_late(address)!r})"],
@@ -124,11 +124,11 @@ def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.Mon
             stderr=subprocess.DEVNULL,
         )
         try:
-            found += list(results)
+            done += list(results)
         finally:
             second.kill()
             second.wait()
-    assert sorted(found) == [(i, 10 + i) for i in range(6)]
+    assert sorted(done) == [(i, 10 + i) for i in range(6)]
     assert "has no workers: waiting for one" in caplog.text
 
 
@@ -145,8 +145,8 @@ def test_a_task_that_kills_its_workers_is_named_when_the_others_are_done(tmp_pat
         return task
 
     with a_cluster(tmp_path, workers=0) as (address, _), workers(address, tmp_path):
-        found: Done = []
+        done: Done = []
         with pytest.raises(ShipidError, match=r"perhaps for want of memory, at .*t1.* and larger workers") as caught:
-            found.extend(on_dask(address, hungry, 0, [("t0", 0), ("t1", 1)], "x"))
+            done.extend(on_dask(address, hungry, 0, [("t0", 0), ("t1", 1)], "x"))
     assert "\n" not in str(caught.value)
-    assert all(task != 1 for task, _ in found)
+    assert all(task != 1 for task, _ in done)

@@ -26,7 +26,7 @@ KNOWN = {"prediction.commands": "known"}
 
 
 def weaving(names: str = "abcdef") -> Dataset:
-    """Runs of the 28.9 m ship itself, each with a helm that goes over at times of its own."""
+    """Runs of the 28.9 m ship itself, each with a helm that goes over at other times."""
     ship, t = load_vessel("gunnerus-28.9"), np.arange(41.0)
     runs: dict[str, Mapping[str, Any]] = {}
     for number, name in enumerate(names):

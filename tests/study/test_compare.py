@@ -41,9 +41,9 @@ def test_worlds_of_one_study(tiny_run: Path, other_world: Path) -> None:
         ("wrong", 0),
         *((f, N) for f in ("right", "wrong", "none") for N in (4, 6)),
     }
-    own = [results.cells.query("family == 'wrong' and N_D == 4")["H"].mean() for results in (here, there)]
+    means = [results.cells.query("family == 'wrong' and N_D == 4")["H"].mean() for results in (here, there)]
     assert frame.loc[("wrong", 4), ["mean", "low", "high"]].tolist() == pytest.approx(
-        [sum(own) / 2, min(own), max(own)]
+        [sum(means) / 2, min(means), max(means)]
     )
     alone = [results.models.query("family == 'wrong'")["A"].mean() for results in (here, there)]
     assert frame.loc[("wrong", 0), "mean"] == pytest.approx(sum(alone) / 2)

@@ -14,7 +14,7 @@ from shipid.files import read_json
 from shipid.study import contents, seals
 from shipid.study.contents import report_content, share_pages, write_pages
 from shipid.study.results import read_results
-from tests.study.tiny import events_here, run_here, tiny_plan
+from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
 
 
 def test_content_holds_what_the_results_hold(tiny_run: Path) -> None:
@@ -55,32 +55,35 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     made, run = getattr(contents, at), [threading.Thread(target=run_here, args=(plan, folder))]
 
     def meanwhile(*args: Any) -> Any:
-        found = made(*args)
+        content = made(*args)
         if not run[0].is_alive():
             run[0].start()
             if at == "report_content":  # else the run waits for the tables that are written
                 run[0].join()
-        return found
+        return content
 
     monkeypatch.setattr(contents, at, meanwhile)
-    report = write_pages(folder)
+    with without_figures():
+        report = write_pages(folder)
     run[0].join()
     monkeypatch.undo()
     assert "4 of 8 cells" in report.read_text()
     assert set(pd.read_parquet(folder / "results.parquet")["cell"]) == set(read_results(tiny_run).cells["cell"])
     assert seals.faults(folder) == []
     assert "wall_seconds" in read_json(folder / "provenance.json")
-    share_pages(folder)
+    with without_figures():
+        share_pages(folder)
     assert "4 of 8 cells" not in report.read_text()
     last = report.stat().st_mtime_ns
     share_pages(folder)
     assert report.stat().st_mtime_ns == last, "another process that ends at the same time writes no second page"
 
 
-def test_a_report_before_the_last_note_of_a_run_leaves_it_to_write_its_own(tmp_path: Path) -> None:
+def test_a_report_before_the_last_note_of_a_run_leaves_the_final_one_to_the_run(tmp_path: Path) -> None:
     """All cells are there and the report is written; only the run itself knows how long it took, and on what."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     for event in events_here(plan, folder):
         if event.done == event.total == 8:
-            write_pages(folder)
+            with without_figures():
+                write_pages(folder)
     assert "wall_seconds" in read_json(folder / "provenance.json")

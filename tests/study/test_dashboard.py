@@ -31,14 +31,17 @@ def dashboard(tiny_run: Path, tmp_path: Path) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-c", START, str(tiny_run / TRIALS), "--port", str(port), "--host", "127.0.0.1"]
-    with (tmp_path / "said").open("w") as said, subprocess.Popen(command, stdout=said, stderr=said) as process:
+    with (
+        (tmp_path / "output.txt").open("w") as output,
+        subprocess.Popen(command, stdout=output, stderr=output) as process,
+    ):
         address = f"http://127.0.0.1:{port}"
         for _ in range(200):
             try:
                 get(f"{address}/dashboard/")
                 break
             except (urllib.error.URLError, ConnectionError):
-                assert process.poll() is None, (tmp_path / "said").read_text()
+                assert process.poll() is None, (tmp_path / "output.txt").read_text()
                 time.sleep(0.5)
         yield address
         process.terminate()

@@ -22,8 +22,8 @@ def test_equal_documents_and_defaults_written_out(tmp_path: Path) -> None:
 
 def test_every_change_is_named_with_both_values(tmp_path: Path) -> None:
     changes = {"grid.N_D": [4, 5], "method.0.units": 9, "truth.manoeuvre.0.n_rpm": [60.0, 100.0], "family.1.members": 3}
-    found = document_differences([tiny_plan(tmp_path), tiny_plan(tmp_path, changes)]).set_index("path")
-    assert dict(zip(found.index, found[["0", "1"]].to_numpy().tolist(), strict=True)) == {
+    changes_ = document_differences([tiny_plan(tmp_path), tiny_plan(tmp_path, changes)]).set_index("path")
+    assert dict(zip(changes_.index, changes_[["0", "1"]].to_numpy().tolist(), strict=True)) == {
         "truth.manoeuvre.0.n_rpm": ["[50.0, 200.0]", "[60.0, 100.0]"],
         "grid.N_D": ["[4, 6]", "[4, 5]"],
         "method.drawn.units": ["8", "9"],
@@ -34,18 +34,18 @@ def test_every_change_is_named_with_both_values(tmp_path: Path) -> None:
 def test_blocks_go_by_name_and_a_counterpart_by_the_name_of_the_first(tmp_path: Path) -> None:
     one, other = tiny_plan(tmp_path), tiny_plan(tmp_path, {"method.0.name": "mine", "method.0.units": 9})
     assert set(document_differences([one, other])["path"]) == {"method.drawn", "method.mine"}
-    found = document_differences([one, other], called=[{}, {"mine": "drawn"}])
-    assert set(found["path"]) == {"method.drawn.name", "method.drawn.units"}
+    changes_ = document_differences([one, other], called=[{}, {"mine": "drawn"}])
+    assert set(changes_["path"]) == {"method.drawn.name", "method.drawn.units"}
 
 
 def test_one_name_for_two_ships_and_other_sessions(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     ship = plan.vessels["gunnerus-28.9"]
     heavier = ship.with_values({"inertia.m": 1.01 * ship.parameters["inertia.m"]})
-    found = document_differences(
+    changes_ = document_differences(
         [plan, replace(plan, vessels={"gunnerus-28.9": heavier})], [{"python": "3.11"}, {"python": "3.12"}]
     )
-    paths = set(found["path"])
+    paths = set(changes_["path"])
     assert paths == {"vessel.gunnerus-28.9.digest", "vessel.gunnerus-28.9.inertia.m", "computed with.python"}
 
 

@@ -22,9 +22,9 @@ def test_the_truth_fills_the_published_envelope() -> None:
     plan = read_plan("simulation")
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    found = envelope_table(envelope(pool, test, runs_by_amount(plan, pool), dataset.commands), plan.study.published)
-    theirs = found[found["set"] == "published"].set_index("quantity")
-    ours = found[found["set"].isin(["D_100", "test"])].groupby("quantity").agg({"min": "min", "max": "max"})
+    rows = envelope_table(envelope(pool, test, runs_by_amount(plan, pool), dataset.commands), plan.study.published)
+    theirs = rows[rows["set"] == "published"].set_index("quantity")
+    ours = rows[rows["set"].isin(["D_100", "test"])].groupby("quantity").agg({"min": "min", "max": "max"})
     assert list(theirs.index) == ["u", "v", "r", "port.n", "port.alpha", "u_rw", "v_rw"]
     for quantity, row in theirs.iterrows():
         for limit in ("min", "max"):
@@ -44,7 +44,7 @@ def test_simulate_writes_a_dataset_and_shows_the_envelope(tmp_path: Path) -> Non
 
 
 def test_the_first_manoeuvres_stay_when_more_are_asked_for() -> None:
-    """Each manoeuvre, its sea included, depends on its own number alone."""
+    """Each manoeuvre, its sea included, depends on its number alone."""
     few, more = (
         obtain(read_plan("simulation-small", {"truth.manoeuvres": n, "split.test": 2, "grid.N_D": [4]}))
         for n in (8, 11)

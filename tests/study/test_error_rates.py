@@ -21,10 +21,10 @@ def allowed(tables: int) -> int:
 @pytest.mark.parametrize(("runs", "seeds"), [(20, 1), pytest.param(6, 5, marks=pytest.mark.slow)])
 def test_no_effect_is_confirmed_in_at_most_5_percent(case: str, runs: int, seeds: int) -> None:
     tables = FEW if case == "S5" else TABLES
-    found = rates(case, Size(runs=runs, seeds=seeds, **SMALL), 0.0, tables)  # type: ignore[arg-type]
-    assert round(found["confirmed"] * tables) <= allowed(tables)
+    moved = rates(case, Size(runs=runs, seeds=seeds, **SMALL), 0.0, tables)  # type: ignore[arg-type]
+    assert round(moved["confirmed"] * tables) <= allowed(tables)
     if case != "S5":  # there, H_90 that has nothing to do with H is the opposite of the claim
-        assert round(found["refuted"] * tables) <= allowed(tables)
+        assert round(moved["refuted"] * tables) <= allowed(tables)
 
 
 @pytest.mark.slow

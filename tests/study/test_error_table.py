@@ -38,5 +38,5 @@ def test_physics_alone_has_no_noise_of_training(made: Any) -> None:
     table = error_table(made(grid(H), runs=8), ["good", "bad"])
     alone = table.compare([[(1.0, "bad", ALONE), (-1.0, "good", ALONE)]])
     trained = table.compare([[(1.0, "bad", 0), (-1.0, "good", 0)]])
-    relative = [(found.high - found.low)[0] / found.mean[0] for found in (alone, trained)]
+    relative = [(interval.high - interval.low)[0] / interval.mean[0] for interval in (alone, trained)]
     assert relative[0] < relative[1]

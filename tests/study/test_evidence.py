@@ -31,26 +31,26 @@ def test_intervals_cover(runs: int, tail: str) -> None:
         "heavy": lambda: rng.standard_t(3, (400, runs)),
         "skewed": lambda: rng.lognormal(0, 0.5, (400, runs)) - np.exp(0.125),
     }[tail]
-    found = contrasts(draw(), rng.integers(30, 60, runs).astype(float))
+    contrast = contrasts(draw(), rng.integers(30, 60, runs).astype(float))
     limit = stats.binom.ppf(0.999, 400, 0.05)
-    assert (found.low > 0).sum() <= limit
-    assert (found.high < 0).sum() <= limit
+    assert (contrast.low > 0).sum() <= limit
+    assert (contrast.high < 0).sum() <= limit
 
 
 def test_an_interval_free_of_0_and_a_small_p_value_are_the_same() -> None:
     rng = np.random.default_rng(2)
-    found = contrasts(rng.normal(0.4, 1.0, (300, 12)), np.ones(12), 0.05)
-    same = (found.low > 0) == (found.above <= LEVEL)
+    contrast = contrasts(rng.normal(0.4, 1.0, (300, 12)), np.ones(12), 0.05)
+    same = (contrast.low > 0) == (contrast.above <= LEVEL)
     assert same.mean() > 0.99, "but for the rounding of a quantile"
-    assert ((found.high < 0) == (found.below <= LEVEL)).mean() > 0.99
+    assert ((contrast.high < 0) == (contrast.below <= LEVEL)).mean() > 0.99
 
 
 def test_student_for_normal_differences_by_hand() -> None:
     values = np.random.default_rng(3).normal(1.0, 1.0, (1, 30))
-    found = contrasts(values, np.ones(30))
+    contrast = contrasts(values, np.ones(30))
     wide = stats.t.ppf(0.975, 29) * values.std(ddof=1) / 30**0.5
-    assert found.low[0] <= values.mean() - wide + 1e-9
-    assert found.high[0] == pytest.approx(values.mean() + wide, rel=0.15)
+    assert contrast.low[0] <= values.mean() - wide + 1e-9
+    assert contrast.high[0] == pytest.approx(values.mean() + wide, rel=0.15)
 
 
 def test_weights_are_windows_and_training_widens() -> None:
@@ -63,11 +63,11 @@ def test_weights_are_windows_and_training_widens() -> None:
 
 
 def test_differences_that_are_all_alike() -> None:
-    found = contrasts(np.array([[0.5] * 6, [0.0] * 6]), np.ones(6))
-    assert found.low[0] == pytest.approx(0.5)
-    assert found.above[0] < 1e-6
-    assert (found.low[1], found.high[1]) == (0.0, 0.0)
-    assert found.above[1] >= 0.5
+    contrast = contrasts(np.array([[0.5] * 6, [0.0] * 6]), np.ones(6))
+    assert contrast.low[0] == pytest.approx(0.5)
+    assert contrast.above[0] < 1e-6
+    assert (contrast.low[1], contrast.high[1]) == (0.0, 0.0)
+    assert contrast.above[1] >= 0.5
 
 
 @pytest.mark.parametrize(("runs", "others"), [(6, 6), (6, 30), (20, 8)])
@@ -75,10 +75,10 @@ def test_intervals_of_manoeuvres_that_are_no_pairs_cover(runs: int, others: int)
     """As above, for two sets of manoeuvres of unequal number and spread."""
     rng = np.random.default_rng([runs, others])
     one, other = rng.normal(2.0, 1.0, (400, runs)), rng.lognormal(0, 0.5, (400, others)) + 2.0 - np.exp(0.125)
-    found = contrasts_apart(one, np.ones(runs), other, rng.integers(30, 60, others).astype(float))
+    contrast = contrasts_apart(one, np.ones(runs), other, rng.integers(30, 60, others).astype(float))
     limit = stats.binom.ppf(0.999, 400, 0.05)
-    assert (found.low > 0).sum() <= limit
-    assert (found.high < 0).sum() <= limit
+    assert (contrast.low > 0).sum() <= limit
+    assert (contrast.high < 0).sum() <= limit
 
 
 def test_pairs_are_narrower_than_manoeuvres_apart() -> None:
@@ -105,10 +105,10 @@ def test_a_set_without_spread_and_one_that_is_too_small() -> None:
 
 
 def test_too_few_manoeuvres_have_no_interval() -> None:
-    found = contrasts(np.ones((2, FEWEST_RUNS - 1)), np.ones(FEWEST_RUNS - 1))
-    assert found.mean.tolist() == [1.0, 1.0]
-    assert np.isnan([*found.low, *found.high, *found.above, *found.below]).all()
-    assert len(found) == 2
+    contrast = contrasts(np.ones((2, FEWEST_RUNS - 1)), np.ones(FEWEST_RUNS - 1))
+    assert contrast.mean.tolist() == [1.0, 1.0]
+    assert np.isnan([*contrast.low, *contrast.high, *contrast.above, *contrast.below]).all()
+    assert len(contrast) == 2
 
 
 def test_holm_by_hand() -> None:

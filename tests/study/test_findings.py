@@ -15,11 +15,11 @@ RUNS = 8  # test manoeuvres, all alike but for a tenth
 
 
 def verdicts(results: Results) -> dict[str, str]:
-    found = findings(results)
-    assert [finding["id"] for finding in found] == [*CLAIMS, *BANDS]
-    assert all(finding["claim"] == (CLAIMS | BANDS)[finding["id"]] for finding in found)
-    found = [finding for finding in found if finding["id"] in CLAIMS]
-    return {finding["id"]: finding["verdict"] for finding in found}
+    claims = findings(results)
+    assert [finding["id"] for finding in claims] == [*CLAIMS, *BANDS]
+    assert all(finding["claim"] == (CLAIMS | BANDS)[finding["id"]] for finding in claims)
+    claims = [finding for finding in claims if finding["id"] in CLAIMS]
+    return {finding["id"]: finding["verdict"] for finding in claims}
 
 
 def one(good: float, bad: float, none: float) -> dict[Any, float | None]:
@@ -40,13 +40,13 @@ def test_all_confirmed(made: Any) -> None:
     ],
 )
 def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
-    found = verdicts(made(one(*H), runs=RUNS))
-    assert {key for key, verdict in found.items() if verdict == "refuted"} == refuted
-    assert {verdict for key, verdict in found.items() if key not in refuted} == {"confirmed"}
+    by_claim = verdicts(made(one(*H), runs=RUNS))
+    assert {key for key, verdict in by_claim.items() if verdict == "refuted"} == refuted
+    assert {verdict for key, verdict in by_claim.items() if key not in refuted} == {"confirmed"}
 
 
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
-    """1 % below its own physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
+    """1 % below its physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
     assert verdicts(made(one(1.98, 1.9, 9.0), runs=RUNS))["R1"] == "undecided"
 
 
@@ -98,8 +98,8 @@ def test_no_claims_no_findings(made: Any) -> None:
 
 def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
     cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
-    found = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
-    assert [finding["id"] for finding in found] == [*CLAIMS, *(f"S{k}" for k in range(1, 8)), *BANDS]
+    claims = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
+    assert [finding["id"] for finding in claims] == [*CLAIMS, *(f"S{k}" for k in range(1, 8)), *BANDS]
 
 
 def test_numbers_are_those_of_the_evidence(made: Any) -> None:

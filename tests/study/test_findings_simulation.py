@@ -1,4 +1,4 @@
-"""Verdicts S1 to S7 on maps H(A, N_D) made by hand: what confirms, what refutes, what cannot be told."""
+"""Verdicts S1 to S7 on maps H(A, N_D) made by hand: what confirms, what refutes, what cannot be decided."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ Rows = Mapping[str, Sequence[float | None]]
 
 def cells(rows: Rows, *, seeds: int = 1, wobble: Mapping[str, float] | None = None) -> dict[Any, float | None]:
     """H by model and amount for some seeds; odd seeds are higher, even ones lower by the model's `wobble`."""
-    found: dict[Any, float | None] = {}
+    errors: dict[Any, float | None] = {}
     for model, values in rows.items():
         for amount, value in zip(AMOUNTS, values, strict=False):
             for seed in range(seeds):
                 factor = 1 + (wobble or {}).get(model, 0.0) * (1 if seed % 2 else -1) * (1 + seed / 10)
-                found[model, amount, seed] = None if value is None else value * factor
-    return found
+                errors[model, amount, seed] = None if value is None else value * factor
+    return errors
 
 
 @pytest.fixture
@@ -48,29 +48,29 @@ def judged(made: Any) -> Any:
     def judge(rows: Rows = H, *, seeds: int = 1, wobble: Mapping[str, float] | None = None, **options: Any) -> Any:
         made_up = cells(rows, seeds=seeds, wobble=wobble) if "none" in rows else rows
         options = {"family": FAMILY, "alone": ALONE, "claims": ROLES, "runs": 8, **options}
-        found = [one for one in findings(made(made_up, **options)) if one["id"].startswith("S")]
-        assert [finding["id"] for finding in found] == list(CLAIMS)
-        assert all("nan" not in finding["evidence"].split() for finding in found)
-        return {finding["id"]: finding for finding in found}
+        claims = [one for one in findings(made(made_up, **options)) if one["id"].startswith("S")]
+        assert [finding["id"] for finding in claims] == list(CLAIMS)
+        assert all("nan" not in finding["evidence"].split() for finding in claims)
+        return {finding["id"]: finding for finding in claims}
 
     return judge
 
 
-def verdicts(found: Mapping[str, Any]) -> dict[str, str]:
-    return {key: finding["verdict"] for key, finding in found.items()}
+def verdicts(by_claim: Mapping[str, Any]) -> dict[str, str]:
+    return {key: finding["verdict"] for key, finding in by_claim.items()}
 
 
 def test_the_paper_by_hand(judged: Any) -> None:
     """With five seeds, and the worst model moved most by them, all that can be tested is confirmed."""
     wobble = {"high-2": 0.08, "none": 0.01, "moderate-1": 0.01, "moderate-2": 0.01, "moderate-3": 0.01}
-    found = judged(seeds=5, wobble=wobble)
-    assert verdicts(found) == {**dict.fromkeys(CLAIMS, "confirmed"), "S7": "not testable"}
+    by_claim = judged(seeds=5, wobble=wobble)
+    assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S7": "not testable"}
 
 
 def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
-    found = judged()
-    assert verdicts(found) == {**dict.fromkeys(CLAIMS, "confirmed"), "S4": "undecided", "S7": "not testable"}
-    assert found["S4"]["evidence"] == (
+    by_claim = judged()
+    assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S4": "undecided", "S7": "not testable"}
+    assert by_claim["S4"]["evidence"] == (
         "at N_D = 100, 1 of 2 high models beat pure data-driven (1.00 m), 1 is worse (high-2 1.60 m); fluctuation "
         "needs 5 nested orders (grid seeds), the study has 1 seed"
     )
@@ -78,34 +78,35 @@ def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
 
 
 def test_too_few_test_manoeuvres_decide_nothing(judged: Any) -> None:
-    found = judged(runs=4, seeds=5)
-    assert set(verdicts(found).values()) <= {"undecided", "not testable", "confirmed"}
-    assert {key for key, verdict in verdicts(found).items() if verdict == "confirmed"} <= {"S5"}
-    assert all("4 test manoeuvres give no interval, 5 would" in finding["evidence"] for finding in found.values())
+    by_claim = judged(runs=4, seeds=5)
+    assert set(verdicts(by_claim).values()) <= {"undecided", "not testable", "confirmed"}
+    assert {key for key, verdict in verdicts(by_claim).items() if verdict == "confirmed"} <= {"S5"}
+    assert all("4 test manoeuvres give no interval, 5 would" in finding["evidence"] for finding in by_claim.values())
 
 
 def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
-    found = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
-    assert found["verdict"] == "refuted"
+    finding = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
+    assert finding["verdict"] == "refuted"
     assert (
-        "at N_D = 10 refuted: 2 of 3 moderate models beat pure data-driven (8.00 m), by -1.50 m [" in found["evidence"]
+        "at N_D = 10 refuted: 2 of 3 moderate models beat pure data-driven (8.00 m), by -1.50 m ["
+        in finding["evidence"]
     )
-    found = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
-    assert found["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
-    assert "that most keep the lead is undecided: 1 at 30, 3 at 100" in found["evidence"]
-    assert found["numbers"]["share shown to lead at N_D = 100"] == 1.0
+    finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
+    assert finding["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
+    assert "that most keep the lead is undecided: 1 at 30, 3 at 100" in finding["evidence"]
+    assert finding["numbers"]["share shown to lead at N_D = 100"] == 1.0
 
 
 def test_S1_a_lead_that_another_training_could_turn_round(judged: Any) -> None:
-    found = judged({**H, "moderate-2": (7.9, 1.2, 0.6)})["S1"]
-    assert found["verdict"] == "undecided"
+    finding = judged({**H, "moderate-2": (7.9, 1.2, 0.6)})["S1"]
+    assert finding["verdict"] == "undecided"
 
 
 def test_S2_names_what_does_not_fall(judged: Any) -> None:
-    found = judged({**H, "high-2": (8.5, 9.5, 11.0)})["S2"]
-    assert found["verdict"] == "refuted"
-    assert "H of 5 of 6 models falls" in found["evidence"]
-    assert "not shown for: high-2" in found["evidence"]
+    finding = judged({**H, "high-2": (8.5, 9.5, 11.0)})["S2"]
+    assert finding["verdict"] == "refuted"
+    assert "H of 5 of 6 models falls" in finding["evidence"]
+    assert "not shown for: high-2" in finding["evidence"]
     bump = judged({**H, "high-2": (8.5, 8.6, 5.0)})["S2"]
     assert bump["verdict"] == "confirmed", "a small rise on the way down is no refutation"
     level = judged({**H, "high-2": (8.5, 8.6, 8.5)})["S2"]
@@ -117,9 +118,9 @@ def test_S3_for_twice_the_A_by_hand(judged: Any) -> None:
     alone = {"moderate-1": 1.0, "moderate-2": 2.0, "moderate-3": 4.0, "high-1": 8.0, "high-2": 16.0}
     rises = (2.0, 1.0, 0.1)
     rows = {m: tuple(3.0 + rise * k for rise in rises) for k, m in enumerate(alone)} | {"none": H["none"]}
-    found = judged(rows, alone=alone)["S3"]
-    assert found["verdict"] == "confirmed"
-    assert found["numbers"] == {
+    finding = judged(rows, alone=alone)["S3"]
+    assert finding["verdict"] == "confirmed"
+    assert finding["numbers"] == {
         "least rank correlation of H and A": pytest.approx(1.0),
         "rise for twice the A at N_D = 10 [m]": pytest.approx(2.0),
         "rise for twice the A at N_D = 100 [m]": pytest.approx(0.1),
@@ -132,8 +133,8 @@ def test_S3_for_twice_the_A_by_hand(judged: Any) -> None:
 
 def test_S3_an_order_that_comes_by_chance_is_undecided(judged: Any) -> None:
     """H at 100 runs is in the order 4, 1, 2, 3, 5 of A."""
-    found = judged({**H, "moderate-1": (1.5, 0.9, 1.3)})["S3"]
-    assert found["verdict"] == "undecided"
+    finding = judged({**H, "moderate-1": (1.5, 0.9, 1.3)})["S3"]
+    assert finding["verdict"] == "undecided"
     few = judged({**H, "high-2": (8.5, None, 1.4)})["S3"]
     assert (few["verdict"], few["evidence"][:39]) == ("undecided", "4 physics models, a trend needs 5; left")
 
@@ -163,9 +164,9 @@ def test_S5_sees_where_percentiles_tell_another_story(judged: Any) -> None:
 
 def test_S6_names_pairs(judged: Any) -> None:
     """The pairs that save most come first: 10 runs for 30 (1.5 m, 4.0 m)."""
-    found = judged()["S6"]
-    assert found["verdict"] == "confirmed"
-    evidence = found["evidence"]
+    finding = judged()["S6"]
+    assert finding["verdict"] == "confirmed"
+    evidence = finding["evidence"]
     assert "comparisons show a moderate model better than pure data-driven with more runs: " in evidence
     assert "moderate-1 with 10 runs 1.50 m against 30 runs without physics, 4.00 m" in evidence
     assert "moderate-2 (4.00 m alone) with 30 runs 1.20 m against moderate-1 alone, 2.00 m" in evidence
@@ -174,9 +175,9 @@ def test_S6_names_pairs(judged: Any) -> None:
 
 def test_S6_refuted_and_undecided(judged: Any) -> None:
     worse = {"moderate-1": (8.5, 5.3, 0.5), "moderate-2": (8.6, 5.4, 0.6), "moderate-3": (8.6, 6.6, 0.7)}
-    found = judged({**H, **worse})["S6"]
-    assert found["verdict"] == "refuted"
-    assert found["evidence"].startswith("0 of 6 comparisons show a moderate model better than pure data-driven")
+    finding = judged({**H, **worse})["S6"]
+    assert finding["verdict"] == "refuted"
+    assert finding["evidence"].startswith("0 of 6 comparisons show a moderate model better than pure data-driven")
     same = {"moderate-1": (4.0, 1.0, 0.5), "moderate-2": (4.0, 1.0, 0.6), "moderate-3": (4.0, 1.0, 0.7)}
     assert judged({**H, **same})["S6"]["verdict"] == "undecided"
 
@@ -184,9 +185,9 @@ def test_S6_refuted_and_undecided(judged: Any) -> None:
 def test_S7_by_second_differences(judged: Any) -> None:
     """Of 0, 1, 0, 1 both second differences are 2 m long; a straight path has none."""
     curves = {(name, 10, 0): ROUGH if name == "none" else SMOOTH for name in H}
-    found = judged(curves=curves, changes=JAGGED)["S7"]
-    assert found["verdict"] == "undecided", "straight true paths: nothing is smoother"
-    assert "pure data-driven 2.00 m, cooperative 0.00 m in the mean, true paths 0.00 m" in found["evidence"]
+    finding = judged(curves=curves, changes=JAGGED)["S7"]
+    assert finding["verdict"] == "undecided", "straight true paths: nothing is smoother"
+    assert "pure data-driven 2.00 m, cooperative 0.00 m in the mean, true paths 0.00 m" in finding["evidence"]
     alike = {(name, 10, 0): ROUGH for name in H}
     assert judged(curves=alike, changes=JAGGED)["S7"]["verdict"] == "refuted"
     true, counts = np.linspace(0.9, 1.1, 8), np.ones(8)
@@ -195,16 +196,16 @@ def test_S7_by_second_differences(judged: Any) -> None:
 
 
 def test_S7_is_not_testable_where_the_recipe_is_smooth(judged: Any) -> None:
-    found = judged()["S7"]
-    assert found["verdict"] == "not testable"
-    assert "polynomial of time" in found["evidence"]
+    finding = judged()["S7"]
+    assert finding["verdict"] == "not testable"
+    assert "polynomial of time" in finding["evidence"]
 
 
 def test_a_failed_member_is_left_out_and_named(judged: Any) -> None:
     """Where it has results, `moderate-2` would refute S1."""
-    found = judged({**H, "moderate-2": (12.0, None, 9.0)})
-    assert found["S1"]["verdict"] == "confirmed"
-    assert all(f["evidence"].endswith("left out for want of results: moderate-2") for f in found.values())
+    by_claim = judged({**H, "moderate-2": (12.0, None, 9.0)})
+    assert by_claim["S1"]["verdict"] == "confirmed"
+    assert all(f["evidence"].endswith("left out for want of results: moderate-2") for f in by_claim.values())
 
 
 def test_nothing_is_decided_without_the_whole(judged: Any, made: Any) -> None:
@@ -219,13 +220,13 @@ def test_nothing_is_decided_without_the_whole(judged: Any, made: Any) -> None:
     assert {f["evidence"] for f in findings(partial)} == {"1 of 18 cells are not finished"}
 
 
-def test_a_family_without_results_is_told(judged: Any) -> None:
-    found = judged({**H, "high-1": (None,) * 3, "high-2": (None,) * 3})
-    assert found["S4"]["verdict"] == "undecided"
-    assert found["S4"]["evidence"].startswith("no high model has a result in every cell")
-    assert found["S1"]["verdict"] == "confirmed"
-    found = judged({**H, **{f"moderate-{k}": (None,) * 3 for k in (1, 2, 3)}})
-    assert [found[key]["verdict"] for key in ("S1", "S6")] == ["undecided"] * 2
+def test_a_family_without_results_is_reported(judged: Any) -> None:
+    by_claim = judged({**H, "high-1": (None,) * 3, "high-2": (None,) * 3})
+    assert by_claim["S4"]["verdict"] == "undecided"
+    assert by_claim["S4"]["evidence"].startswith("no high model has a result in every cell")
+    assert by_claim["S1"]["verdict"] == "confirmed"
+    by_claim = judged({**H, **{f"moderate-{k}": (None,) * 3 for k in (1, 2, 3)}})
+    assert [by_claim[key]["verdict"] for key in ("S1", "S6")] == ["undecided"] * 2
 
 
 def test_the_nominal_model_counts_nowhere(judged: Any) -> None:
@@ -236,6 +237,6 @@ def test_the_nominal_model_counts_nowhere(judged: Any) -> None:
         "claims": {**ROLES, "nominal": "nominal"},
     }
     with_it = judged({**H, "nominal": (0.5, 0.6, 0.7)}, **options)
-    assert {key: found["evidence"] for key, found in with_it.items()} == {
-        key: found["evidence"] for key, found in judged().items()
+    assert {key: finding["evidence"] for key, finding in with_it.items()} == {
+        key: finding["evidence"] for key, finding in judged().items()
     }

@@ -1,4 +1,4 @@
-"""A vessel against its log: a planted mistake is found, named and explained; a true vessel is left alone."""
+"""A vessel against its log: a planted mistake is detected, named and explained; a true vessel is left alone."""
 
 from __future__ import annotations
 
@@ -31,32 +31,32 @@ def look(vessel: Vessel, log: Dataset) -> Look:
 
 
 def test_the_vessel_that_made_the_log_is_left_alone(log: Dataset) -> None:
-    found = look(load_vessel(SHIP), log)
-    assert not found.changes
-    assert not found.facts
-    assert not found.wrong
-    assert found.patch(SHIP) == ""
-    assert found.alone < 0.05 * found.constant
-    assert "agree" in found.sentence
+    view = look(load_vessel(SHIP), log)
+    assert not view.changes
+    assert not view.facts
+    assert not view.wrong
+    assert view.patch(SHIP) == ""
+    assert view.alone < 0.05 * view.constant
+    assert "agree" in view.sentence
 
 
-def test_a_screw_too_large_is_said_and_explained(log: Dataset) -> None:
+def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
     """Twice the thrust: the speed tells at once, and a smaller screw explains it."""
     truth = load_vessel(SHIP)
-    found = look(truth.with_values({D_P: 1.4 * truth.parameters[D_P]}), log)
-    assert any("at 627 rpm the log runs" in fact for fact in found.facts)
-    assert found.changes[0].group.name in ("size of the screw", "resistance")
-    assert found.values.get(D_P, 0.0) == pytest.approx(truth.parameters[D_P], rel=0.1)
-    assert found.corrected < 0.3 * found.alone
-    assert "would explain most of it" in found.sentence
-    assert "\n" not in found.sentence
+    view = look(truth.with_values({D_P: 1.4 * truth.parameters[D_P]}), log)
+    assert any("at 627 rpm the log runs" in fact for fact in view.facts)
+    assert view.changes[0].group.name in ("size of the screw", "resistance")
+    assert view.values.get(D_P, 0.0) == pytest.approx(truth.parameters[D_P], rel=0.1)
+    assert view.corrected < 0.3 * view.alone
+    assert "would explain most of it" in view.sentence
+    assert "\n" not in view.sentence
 
 
-def test_a_rudder_of_the_other_sign_is_said(log: Dataset) -> None:
+def test_a_rudder_of_the_other_sign_is_reported(log: Dataset) -> None:
     mirrored = Dataset(log.frame.assign(**{"rudder.delta": -log.frame["rudder.delta"]}), log.metadata)
-    found = look(load_vessel(SHIP), mirrored)
-    assert any("turns the other way" in fact for fact in found.facts)
-    assert found.wrong
+    view = look(load_vessel(SHIP), mirrored)
+    assert any("turns the other way" in fact for fact in view.facts)
+    assert view.wrong
 
 
 def test_steady_speed_is_that_of_the_published_approach() -> None:

@@ -1,4 +1,4 @@
-"""Foundations identified from the runs of a batch: their own physics, seen nowhere but there."""
+"""Foundations identified from the runs of a batch, and from no other run."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) ->
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    found = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
-    assert list(found) == ["wrong", "fitted", "none"]
-    assert found["wrong"].accuracy(prepared.test)["mean"] > 0.01
-    assert found["fitted"].accuracy(prepared.test)["mean"] < 1e-4
-    variant = found["fitted"].foundation.variant
+    foundations = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    assert list(foundations) == ["wrong", "fitted", "none"]
+    assert foundations["wrong"].accuracy(prepared.test)["mean"] > 0.01
+    assert foundations["fitted"].accuracy(prepared.test)["mean"] < 1e-4
+    variant = foundations["fitted"].foundation.variant
     assert variant is not None
     right = plan.vessels["gunnerus-28.9"].parameters
     assert [variant.values[path] for path in PATHS] == pytest.approx([right[path] for path in PATHS], rel=1e-3)
-    assert "converged" in found["fitted"].sentence
+    assert "converged" in foundations["fitted"].sentence
 
 
 def test_other_runs_teach_nothing(recorded: Recorded) -> None:
@@ -76,7 +76,7 @@ def test_other_runs_teach_nothing(recorded: Recorded) -> None:
 def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    assert apart(dataset, prepared.test) is dataset  # every run has a clock of its own
+    assert apart(dataset, prepared.test) is dataset  # every run has a separate clock
     frame = dataset.frame.copy()
     frame["t"] += 30.0 * (frame["run"].str[0].map(ord) - ord("a"))  # the next begins before one ends
     test = replace(prepared.test, t=prepared.test.t + 150.0, shared_clock=True)
@@ -128,7 +128,7 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     assert not any("alone" in text and "+" in text for text, _ in answer(results))
 
 
-def test_what_cannot_be_identified_fails_in_its_own_cells(tmp_path: Path, recorded: Recorded) -> None:
+def test_what_cannot_be_identified_fails_in_its_cells(tmp_path: Path, recorded: Recorded) -> None:
     """Whole runs that diverge under explicit Euler: one sentence, and all other cells are there."""
     bad = {**FITTED, "name": "bad", "identify": {**IDENTIFY, "step": 20.0, "horizon": 40.0}}
     plan, _ = study(recorded, [WRONG, bad])
@@ -162,20 +162,20 @@ def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(r
     assert sum("redrawn" in note for note in prepared.notes) == variants[0].counter
 
 
-def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
+def test_values_that_the_vessel_refuses_fail_in_their_cells(
     recorded: Recorded, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    found = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
-    monkeypatch.setattr(solve, "identify", lambda *_: found)
+    solution = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
+    monkeypatch.setattr(solve, "identify", lambda *_: solution)
     both = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")["fitted"]
     assert np.isnan(both.paths).all()
     assert both.sentence.startswith("identification: ")
 
 
 @pytest.mark.parametrize(
-    ("block", "path", "said"),
+    ("block", "path", "message"),
     [
         ({"parameters": ["hull.derivatives.Q_q"]}, "family.fitted.identify.parameters", "selects nothing"),
         ({"parameters": PATHS, "fixed": PATHS}, "family.fitted.identify.fixed", "none is left"),
@@ -183,8 +183,8 @@ def test_values_that_the_vessel_refuses_fail_in_their_own_cells(
         ({}, "family.fitted.identify.parameters", "missing"),
     ],
 )
-def test_a_wrong_block_is_one_line(recorded: Recorded, block: dict[str, Any], path: str, said: str) -> None:
-    with pytest.raises(DocumentError, match=said) as caught:
+def test_a_wrong_block_is_one_line(recorded: Recorded, block: dict[str, Any], path: str, message: str) -> None:
+    with pytest.raises(DocumentError, match=message) as caught:
         study(recorded, [WRONG, {**FITTED, "identify": block}])
     assert caught.value.path == path
 

@@ -39,8 +39,8 @@ def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:
     helm = steps([10, -10, 10, -10, 10, -10, 10, -10])
     columns = {"psi": np.cumsum(-0.05 * helm), "r": -0.05 * helm, "u": 4.0, "port.n": 2.0, "port.alpha": helm}
     runs = {"ZZ 1": columns, "berthing 1": columns, "run 3": columns}
-    said = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
-    assert kinds_of(said) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
+    log = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
+    assert kinds_of(log) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
 
 
 def test_every_kind_reaches_the_test() -> None:

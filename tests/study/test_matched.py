@@ -38,42 +38,47 @@ def placed(results: Results, name: str) -> Results:
 
 def test_cells_of_runs_on_the_disk(tiny_run: Path, other_run: Path) -> None:
     """The means are those of the cells; windows that one run lacks are left out in both."""
-    found = compare([tiny_run, other_run])
-    assert len(found.names) == 2
-    assert set(found.documents["path"]) == {"method.drawn.name", "method.drawn.units", "grid.N_D", "prediction.ahead"}
-    assert list(found.errors["N_D"].unique()) == [0, 4], "6 is in one of them"
-    assert found.errors["paired"].all()
-    assert set(found.errors["method"]) == {"alone", "drawn ~ mine"}
-    assert found.errors.set_index(["family", "N_D"]).loc[("wrong", 4), "cells"] == 2
-    assert any("on the 60 windows that both have" in note for note in found.notes), found.notes
+    comparison = compare([tiny_run, other_run])
+    assert len(comparison.names) == 2
+    assert set(comparison.documents["path"]) == {
+        "method.drawn.name",
+        "method.drawn.units",
+        "grid.N_D",
+        "prediction.ahead",
+    }
+    assert list(comparison.errors["N_D"].unique()) == [0, 4], "6 is in one of them"
+    assert comparison.errors["paired"].all()
+    assert set(comparison.errors["method"]) == {"alone", "drawn ~ mine"}
+    assert comparison.errors.set_index(["family", "N_D"]).loc[("wrong", 4), "cells"] == 2
+    assert any("on the 60 windows that both have" in note for note in comparison.notes), comparison.notes
     whole = compare([other_run, tiny_run]).errors  # turned round
-    np.testing.assert_allclose(whole["difference"], -found.errors["difference"])
-    np.testing.assert_allclose(whole["first"], found.errors["other"])
+    np.testing.assert_allclose(whole["difference"], -comparison.errors["difference"])
+    np.testing.assert_allclose(whole["first"], comparison.errors["other"])
 
 
 def test_a_run_and_itself_differ_in_nothing(made: Made) -> None:
     one = made(grid(H), runs=8)
-    found = compare_results([placed(one, "a"), placed(one, "b")])
-    assert found.documents.empty
-    assert (found.errors["difference"] == 0).all()
-    assert set(found.errors["verdict"]) == {""}
-    assert found.errors["N_D"].tolist() == [0, 0, 10, 10, 10, 30, 30, 30]
+    comparison = compare_results([placed(one, "a"), placed(one, "b")])
+    assert comparison.documents.empty
+    assert (comparison.errors["difference"] == 0).all()
+    assert set(comparison.errors["verdict"]) == {""}
+    assert comparison.errors["N_D"].tolist() == [0, 0, 10, 10, 10, 30, 30, 30]
 
 
 def test_paired_differences_by_hand(made: Made) -> None:
     """Errors are hard * H with hard 0.9 to 1.1 over manoeuvres: a difference of means, and what training adds."""
     one, other = (made(grid({**H, "bad": (bad, 1.5)}), runs=8) for bad in (2.0, 1.0))
-    found = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
-    row = found.loc[("bad", "drawn", 10)]
+    comparison = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
+    row = comparison.loc[("bad", "drawn", 10)]
     assert row[["first", "other", "difference"]].tolist() == pytest.approx([2.0, 1.0, -1.0])
     assert row["verdict"] == "lower"
     assert row["low"] < -1.0 < row["high"] < 0
     noise = 0.03 * 5**0.5  # of one seed each, and no other knowledge: 3 % of 2 m and of 1 m
     assert row["high"] - row["low"] > 2 * 2.3 * noise
-    same = found.loc[("bad", "drawn", 30)]
+    same = comparison.loc[("bad", "drawn", 30)]
     assert same["difference"] == pytest.approx(0)
     assert same["low"] < 0 < same["high"]
-    assert found.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
+    assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
 
 
 def test_other_manoeuvres_are_no_pairs(made: Made) -> None:
@@ -104,9 +109,9 @@ def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
     renamed = {"clean": (1.0, 0.8), "bad": (2.0, 1.5), "none": (9.0, 5.0)}
     alone = {"clean": 2.0, "bad": 6.0}
     other = made(grid(renamed), runs=8, alone=alone, claims=None)
-    found = compare_results([placed(one, "a"), placed(other, "b")])
-    assert "good ~ clean" in set(found.errors["family"])
-    assert any("clean is set beside good" in note for note in found.notes)
+    comparison = compare_results([placed(one, "a"), placed(other, "b")])
+    assert "good ~ clean" in set(comparison.errors["family"])
+    assert any("clean is set beside good" in note for note in comparison.notes)
     turned = compare_results([placed(one, "a"), placed(other, "b")], {"good": "bad", "bad": "clean"})
     rows = turned.errors.set_index(["family", "N_D"])
     assert rows.loc[("good ~ bad", 10), "difference"] == pytest.approx(1.0)
@@ -119,9 +124,9 @@ def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
 
 def test_cells_without_a_result_do_not_match(made: Made) -> None:
     failed = {**H, "bad": (None, 1.5)}
-    found = compare_results([placed(made(grid(H), runs=8), "a"), placed(made(grid(failed), runs=8), "b")])
-    assert ("bad", 10) not in set(zip(found.errors["family"], found.errors["N_D"], strict=True))
-    assert any(note.startswith("b: 5 of 6 cells have a result") for note in found.notes)
+    comparison = compare_results([placed(made(grid(H), runs=8), "a"), placed(made(grid(failed), runs=8), "b")])
+    assert ("bad", 10) not in set(zip(comparison.errors["family"], comparison.errors["N_D"], strict=True))
+    assert any(note.startswith("b: 5 of 6 cells have a result") for note in comparison.notes)
     nothing = dict.fromkeys(H, (None, None))
     with pytest.raises(ResultError, match="has no cell with a result"):
         compare_results([placed(made(grid(H)), "a"), placed(made(grid(nothing)), "b")])
@@ -154,9 +159,9 @@ def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     assert any(line.startswith("wrong drawn ~ mine 4 2 ") for line in lines)
     table = tmp_path / "rows.csv"
     result = CliRunner().invoke(app, ["study", "compare", *folders, "--json", "--out", str(table)])
-    found: dict[str, Any] = json.loads(result.stdout)
-    assert {"folders", "documents", "errors", "notes", "file"} == set(found)
-    assert found["errors"][0]["low"] is None, "four manoeuvres have no interval"
-    assert len(table.read_text().splitlines()) == 1 + len(found["errors"])
+    document: dict[str, Any] = json.loads(result.stdout)
+    assert {"folders", "documents", "errors", "notes", "file"} == set(document)
+    assert document["errors"][0]["low"] is None, "four manoeuvres have no interval"
+    assert len(table.read_text().splitlines()) == 1 + len(document["errors"])
     wrong = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn"])
     assert isinstance(wrong.exception, DocumentError)

@@ -47,13 +47,13 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
-    found: dict[str, set[str]] = {}
+    comparisons: dict[str, set[str]] = {}
     for pair in memory.pairs(results.plan.foundations, results.plan.methods):
-        found.setdefault(pair.comparison, set()).add(pair.without[0])
+        comparisons.setdefault(pair.comparison, set()).add(pair.without[0])
         assert pair.differs == ()
         same = pair.without[0] == pair.remembering[0]
         assert same == (pair.added == "memory")
-    assert found == COMPARED
+    assert comparisons == COMPARED
 
 
 def test_what_differs_beside_memory_is_named(tmp_path: Path) -> None:

@@ -39,18 +39,18 @@ def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
 
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
-    found = compared(made, "drawn")
-    assert list(found.columns) == COLUMNS
+    table = compared(made, "drawn")
+    assert list(table.columns) == COLUMNS
     for family in ("moderate", "none"):
         mine = made[made.family.eq(family)].groupby("method").H.mean()
-        assert row(found, family=family).difference == pytest.approx(mine["other"] - mine["drawn"])
-        assert pytest.approx(mine["other"]) == row(found, family=family).H
-    assert row(found, "drawn").difference == 0
-    assert row(found).pairs == 4
-    assert row(found).runs == 24  # 12 runs of each world, whatever the number of members
-    assert row(found).worlds == 2
-    assert row(found).least <= row(found).difference <= row(found).greatest
-    assert np.isnan(row(found).world_low)
+        assert row(table, family=family).difference == pytest.approx(mine["other"] - mine["drawn"])
+        assert pytest.approx(mine["other"]) == row(table, family=family).H
+    assert row(table, "drawn").difference == 0
+    assert row(table).pairs == 4
+    assert row(table).runs == 24  # 12 runs of each world, whatever the number of members
+    assert row(table).worlds == 2
+    assert row(table).least <= row(table).difference <= row(table).greatest
+    assert np.isnan(row(table).world_low)
     assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
 
 
@@ -61,9 +61,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     for effect in (0.0, -0.4):
         inside, free = 0, 0
         for _ in range(40):
-            found = row(compared(cells(rng, effect), "drawn"))
-            inside += found.low <= effect <= found.high
-            free += found.high < 0
+            one = row(compared(cells(rng, effect), "drawn"))
+            inside += one.low <= effect <= one.high
+            free += one.high < 0
         assert inside >= 33
         assert free <= 5 if effect == 0 else free >= 34
 
@@ -74,9 +74,9 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     made.loc[worst, "status"] = "diverged"
     made.loc[worst, ["H", "H_90", "end"]] = np.nan
     made.at[worst, "sums"] = {}
-    found = row(compared(made, "drawn"))
-    assert (found.failed, found.cells, found.pairs) == (1, 4, 3)
-    assert np.isfinite([found.H, found.difference, found.low, found.high]).all()
+    one = row(compared(made, "drawn"))
+    assert (one.failed, one.cells, one.pairs) == (1, 4, 3)
+    assert np.isfinite([one.H, one.difference, one.low, one.high]).all()
     assert row(compared(made, "drawn"), "drawn").failed == 0
     every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
     lost = row(compared(every, "drawn"))

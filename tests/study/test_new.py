@@ -91,11 +91,11 @@ def test_horizon_is_a_few_ship_lengths(length: float, speed: float, expected: fl
     assert "L/U" in why
 
 
-@pytest.mark.parametrize(("horizon", "step", "said"), [(45.0, 2.0, "22 steps of 2 s"), (20.0, 1.0, "20 s")])
-def test_horizon_and_its_reason_agree(horizon: float, step: float, said: str) -> None:
+@pytest.mark.parametrize(("horizon", "step", "message"), [(45.0, 2.0, "22 steps of 2 s"), (20.0, 1.0, "20 s")])
+def test_horizon_and_its_reason_agree(horizon: float, step: float, message: str) -> None:
     choice = _ahead(horizon, round(horizon / step), step, f"{horizon:g} s, in which")
     assert choice.value == round(horizon / step) * step
-    assert choice.why.startswith(said)
+    assert choice.why.startswith(message)
 
 
 def test_horizon_leaves_most_of_a_short_run() -> None:
@@ -150,7 +150,7 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
 
 
 def test_what_the_log_corrects_is_a_family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The numbers that explain the log are set in a family of their own, said as a warning, and drafted as a patch."""
+    """The numbers that explain the log are set in a separate family, reported as a warning, and drafted as a patch."""
     path = "thruster.port.D_p"
 
     def differs(vessel: Vessel, *_: Any, ahead: float, **__: Any) -> Look:
@@ -184,7 +184,7 @@ def test_velocities_that_drift_are_not_the_true_path(tmp_path: Path) -> None:
     assert document["data"]["path"] == "position"
 
 
-def test_a_wrong_unit_is_told(tmp_path: Path) -> None:
+def test_a_wrong_unit_is_reported(tmp_path: Path) -> None:
     """Knots taken for m/s: positions say half the way."""
     draft, document = drafted(tmp_path, trial(u=3600 / 1852))
     assert document["data"]["path"] == "position"
@@ -192,21 +192,21 @@ def test_a_wrong_unit_is_told(tmp_path: Path) -> None:
     assert "# WRONG?" in draft.text
 
 
-def test_a_wrong_sign_of_the_helm_is_told(tmp_path: Path) -> None:
+def test_a_wrong_sign_of_the_helm_is_reported(tmp_path: Path) -> None:
     mirrored = trial(**{"port.alpha": -1.0, "starboard.alpha": -1.0})
     assert {np.sign(value) for value in helm_sense(mirrored).values()} == {1.0}
     warnings = drafted(tmp_path, mirrored)[0].warnings
     assert sum(".alpha > 0 turns" in warning for warning in warnings) == 2
 
 
-def test_a_patch_that_has_seen_the_test_is_told(tmp_path: Path) -> None:
+def test_a_patch_that_has_seen_the_test_is_reported(tmp_path: Path) -> None:
     """Identified from every run, the proposed test among them; and from other runs than those."""
     base = {"base": SHIP, "set": {"hull.derivatives.N_ur": -479060.0}}
-    for known, told in ((list(trial().runs), 1), (["elsewhere"], 0)):
-        patch = tmp_path / f"patch-{told}.toml"
+    for known, count in ((list(trial().runs), 1), (["elsewhere"], 0)):
+        patch = tmp_path / f"patch-{count}.toml"
         patch.write_text(tomlkit.dumps({**base, "provenance": {"runs": known}}))
         warnings = drafted(tmp_path, trial(), str(patch))[0].warnings
-        assert sum("was identified from" in warning for warning in warnings) == told
+        assert sum("was identified from" in warning for warning in warnings) == count
 
 
 def test_runs_shorter_than_the_horizon_are_named(tmp_path: Path) -> None:
@@ -255,7 +255,7 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
 
 
 @pytest.mark.parametrize(
-    ("vessels", "runs", "said"),
+    ("vessels", "runs", "message"),
     [
         (["kvlcc2-l7"], 5, "propeller.n: KVLCC2 tanker, 7 m model (MMG) needs this command; the data have"),
         ([SHIP], 2, "2 runs of 20 s or more, a study needs 3"),
@@ -266,11 +266,11 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
         ([SHIP, SHIP], 5, "is named twice"),
     ],
 )
-def test_what_cannot_be_studied_is_one_line(tmp_path: Path, vessels: list[str], runs: int, said: str) -> None:
+def test_what_cannot_be_studied_is_one_line(tmp_path: Path, vessels: list[str], runs: int, message: str) -> None:
     data = write_dataset(trial(runs), tmp_path / "log.parquet")
     with pytest.raises(ShipidError) as error:
         draft_study(vessels, data, tmp_path / "study.toml")
-    assert said in str(error.value)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 

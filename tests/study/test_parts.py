@@ -1,4 +1,4 @@
-"""A study of several parts: repetitions and conditions, each a run of its own, and a page over all."""
+"""A study of several parts: repetitions and conditions, each a separate run, and a page over all."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shipid.study import store
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import read_cells, read_results
-from tests.study.tiny import events_here, run_here, tiny_plan
+from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,8 @@ def four(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     folder = tmp_path_factory.mktemp("parts")
     plan = tiny_plan(folder, FOUR)
     run_here(plan, folder / "run")
-    write_pages(folder / "run")
+    with without_figures():
+        write_pages(folder / "run")
     return plan, folder / "run"
 
 
@@ -86,7 +87,8 @@ def test_an_interrupted_study_goes_on_in_its_parts(four: tuple[Plan, Path], tmp_
         if event.kind == "cell" and event.done == 8:  # in the second part
             break
     events.close()  # type: ignore[attr-defined]
-    write_pages(tmp_path / "run")  # of what is there
+    with without_figures():
+        write_pages(tmp_path / "run")  # of what is there
     again = run_here(store.stored_plan(tmp_path / "run"), tmp_path / "run")
     start = next(event for event in again if event.kind == "start")
     assert 6 <= start.done < start.total == again[-1].total == again[-1].done
@@ -126,8 +128,8 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
 
 @pytest.mark.parametrize("kind", BAD)
 def test_a_wrong_part_is_one_line_before_anything_runs(tmp_path: Path, kind: str) -> None:
-    changes, path, said = BAD[kind]
-    with pytest.raises(DocumentError, match=said) as caught:
+    changes, path, message = BAD[kind]
+    with pytest.raises(DocumentError, match=message) as caught:
         tiny_plan(tmp_path, changes)
     assert caught.value.path == path
     assert "\n" not in str(caught.value)

@@ -130,9 +130,9 @@ def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
             wanted[path] = 0.0
     for name in ("N_ur", "Y_ur", "N_uv"):
         wanted[f"hull.derivatives.{name}"] *= 0.6
-    found = dict(zip(base, variant.parameters, strict=True))
-    assert found == pytest.approx(wanted, rel=1e-15)
-    assert sum(value == 0.0 for path, value in found.items() if base[path] != 0.0) > 5
+    values = dict(zip(base, variant.parameters, strict=True))
+    assert values == pytest.approx(wanted, rel=1e-15)
+    assert sum(value == 0.0 for path, value in values.items() if base[path] != 0.0) > 5
     accurate = models["accurate"].variant
     assert accurate is not None
     assert accurate.parameters == list(base.values())
@@ -222,7 +222,7 @@ def test_changes_reach_the_document(tmp_path: Path) -> None:
         ({"method.0.kind.name": "alone"}, "method.0.kind.name"),
     ],
 )
-def test_changes_that_reach_nothing_are_told(tmp_path: Path, changes: dict[str, object], path: str) -> None:
+def test_changes_that_reach_nothing_are_reported(tmp_path: Path, changes: dict[str, object], path: str) -> None:
     with pytest.raises(DocumentError, match="--set") as caught:
         tiny_plan(tmp_path, changes)
     assert caught.value.path == path
@@ -239,13 +239,13 @@ def test_digest_follows_the_document(tmp_path: Path) -> None:
 @pytest.mark.parametrize("role", ["truth", "base"])
 def test_digest_follows_every_vessel(tmp_path: Path, role: str) -> None:
     """Not only models, the vessel behind the truth too changes what comes out."""
-    own = tmp_path / "own.toml"
+    document = tmp_path / "own.toml"
     original = (bundled_folder("models") / "gunnerus-28.9.toml").read_text()
-    own.write_text(original)
+    document.write_text(original)
     change = {"truth.vessel": "./own.toml"} if role == "truth" else {"family.0.base": "./own.toml"}
     before = tiny_plan(tmp_path, change).digest
-    own.write_text(re.sub(r"(?m)^m( *)= [\d.]+", r"m\1= 400000.0", original, count=1))
-    assert load_vessel(str(own)).parameters["inertia.m"] == 400000.0
+    document.write_text(re.sub(r"(?m)^m( *)= [\d.]+", r"m\1= 400000.0", original, count=1))
+    assert load_vessel(str(document)).parameters["inertia.m"] == 400000.0
     assert tiny_plan(tmp_path, change).digest != before
 
 

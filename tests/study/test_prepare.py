@@ -98,7 +98,7 @@ def test_a_method_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Data
 
 @pytest.mark.parametrize("kind", ["path-drawn", "path-trained"])
 def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
-    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out, and told."""
+    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out and reported."""
     t = np.arange(21.0)
     runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
     dataset = logged(runs, t, clock="shared")
@@ -142,7 +142,7 @@ def test_samples_are_the_first_of_each_run(tmp_path: Path) -> None:
         assert all((windows.t[windows.run == run] == [0.0, 1.0, 2.0]).all() for run in windows.spans)
 
 
-def test_right_model_of_its_own_truth_is_exact(tmp_path: Path) -> None:
+def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     """A truth of the same equations, step and rule leaves A = 0: windows, frames and held commands add no error."""
     plan = tiny_plan(tmp_path, {"truth.step": 1.0, "truth.method": "euler"})
     prepared = prepare(plan, obtain(plan))
@@ -152,7 +152,7 @@ def test_right_model_of_its_own_truth_is_exact(tmp_path: Path) -> None:
 
 
 def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
-    """The next counter draws anew, the others keep theirs, and it is told; the same again gives the same."""
+    """The next counter draws anew, the others keep theirs, and it is reported; the same again gives the same."""
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
     plan = tiny_plan(tmp_path, {"family": [family]})
@@ -173,14 +173,14 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
     assert [m.variant for m in again.foundations] == [m.variant for m in prepared.foundations]
 
 
-def test_what_cannot_be_drawn_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fixed factor draws nothing else; a hopeless range is given up."""
     monkeypatch.setattr(module, "MOST_REDRAWS", 9)
-    for factor, said in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 9 redraws")):
+    for factor, message in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 9 redraws")):
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
         family["perturb"][0]["factor"] = factor  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
-        with pytest.raises(DocumentError, match=said) as caught:
+        with pytest.raises(DocumentError, match=message) as caught:
             prepare(plan, obtain(plan))
         assert caught.value.path == "family.lost"
 
@@ -202,9 +202,9 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     for model in prepared.foundations[:-1]:
         assert model.variant is not None
         assert model.variant.counter == 0
-    found = prepared.accuracy("brittle-1")
-    assert (found["status"], found["failed_share"]) == ("diverged", 0.5)
-    assert np.isnan(found["mean"])
+    accuracy = prepared.accuracy("brittle-1")
+    assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
+    assert np.isnan(accuracy["mean"])
     rows = {row["foundation"]: row for row, *_ in run_batch(plan, prepared, plan.batches[0], "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
     assert "50.0%" in rows["brittle-1"]["sentence"]
@@ -225,11 +225,11 @@ def test_hidden_states_follow_the_earlier_orders() -> None:
     """First order, exactly: 1 before the step, 2 - exp(-(t - 10) / T) after it; limited by the rate."""
     ship, dataset = stepped(order=2.0, T=4.0, rate=100.0)
     windows = cut_windows(dataset, horizon=5)
-    found = window_memory(ship, dataset, windows)
-    assert found is not None
+    memory = window_memory(ship, dataset, windows)
+    assert memory is not None
     late = np.maximum(windows.t - 10.0, 0.0)
     for side in ("port", "starboard"):
-        np.testing.assert_allclose(found[f"{side}.n"], 2.0 - np.exp(-late / 4.0), rtol=1e-12)
+        np.testing.assert_allclose(memory[f"{side}.n"], 2.0 - np.exp(-late / 4.0), rtol=1e-12)
     slow, _ = stepped(order=2.0, T=4.0, rate=0.01)
     limited = window_memory(slow, dataset, windows)
     assert limited is not None
@@ -247,10 +247,10 @@ def test_hidden_states_are_those_of_the_truth() -> None:
     keep = ("actual.port.n",)
     path = rollout(ship, start, orders, still, step=1.0, num_steps=30, method="rk4", keep=keep, engine="casadi")
     windows = cut_windows(dataset, horizon=5)
-    found = window_memory(ship, dataset, windows)
-    assert found is not None
+    memory = window_memory(ship, dataset, windows)
+    assert memory is not None
     one = windows.run == "a"
-    np.testing.assert_allclose(found["port.n"][one], path["actual.port.n"][: one.sum(), 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(memory["port.n"][one], path["actual.port.n"][: one.sum(), 0, 0], rtol=1e-12)
 
 
 def test_a_stretch_of_one_row_has_its_order_reached() -> None:
@@ -259,15 +259,15 @@ def test_a_stretch_of_one_row_has_its_order_reached() -> None:
     flags[[1, 2]] = 1
     broken = Dataset(dataset.frame.assign(flags=flags), {**dataset.metadata, "flags": ["break"]})
     windows = cut_windows(broken, horizon=5)
-    found = window_memory(ship, broken, windows)
-    assert found is not None
-    assert found["port.n"][0] == 1.0
+    memory = window_memory(ship, broken, windows)
+    assert memory is not None
+    assert memory["port.n"][0] == 1.0
 
 
-def test_perturbed_lags_have_hidden_states_of_their_own(
+def test_perturbed_lags_have_separate_hidden_states(
     tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]
 ) -> None:
-    """What a stored predictor predicts is what the study has seen: each variant models its own actuators."""
+    """What a stored predictor predicts is what the study has seen: each variant models its actuators."""
     ship, dataset = stepped(order=2.0, T=4.0, rate=1.0)
     (tmp_path / "lagged.toml").write_text(tomlkit.dumps(ship.document))
     family = {"name": "lagged", "base": "./lagged.toml", "members": 3}
@@ -306,14 +306,14 @@ def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(
     assert not frames[0].equals(frames[1])  # type: ignore[attr-defined]
 
 
-def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     t = np.arange(21.0)
     plan, dataset = recorded(logged({name: {"u": 2.0 + 0.01 * t} for name in "abcd"}, t), split={"test": 1})
     assert any("V_w, beta_w not measured, assumed 0" in note for note in prepare(plan, dataset).notes)
 
 
 @pytest.mark.parametrize(
-    ("changes", "path", "said"),
+    ("changes", "path", "message"),
     [
         ({"split": {"test": ["z"]}}, "split.test", "'z' is no run with windows: valid: a, b, c, d"),
         ({"split": {"test": 4}}, "split.test", "only 4 runs"),
@@ -322,11 +322,11 @@ def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Datase
     ],
 )
 def test_a_study_that_asks_too_much_of_its_log(
-    recorded: Callable[..., tuple[Plan, Dataset]], changes: dict[str, Any], path: str, said: str
+    recorded: Callable[..., tuple[Plan, Dataset]], changes: dict[str, Any], path: str, message: str
 ) -> None:
     t = np.arange(21.0)
     plan, dataset = recorded(logged({name: {"u": 2.0 + 0.01 * t} for name in "abcd"}, t), **changes)
-    with pytest.raises(DocumentError, match=said) as caught:
+    with pytest.raises(DocumentError, match=message) as caught:
         prepare(plan, dataset)
     assert (caught.value.path, caught.value.file) == (path, plan.file)
 
@@ -389,10 +389,10 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
 
 def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     _, dataset, prepared = tiny
-    found = limits_of(prepared.pool, prepared.commands)
-    assert set(found) == {"u", "v", "r", "V_w", *dataset.commands}
+    limits = limits_of(prepared.pool, prepared.commands)
+    assert set(limits) == {"u", "v", "r", "V_w", *dataset.commands}
     rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
-    for name, (low, high) in found.items():
+    for name, (low, high) in limits.items():
         assert (low, high) == pytest.approx((rows[name].min(), rows[name].max()))
 
 

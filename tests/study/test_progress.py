@@ -1,4 +1,4 @@
-"""What is said of searches that go on, from journals that others write."""
+"""The state of searches that go on, from journals that others write."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
     journal.add({one: [row(0, 0.25)]}, SPACE)
     assert watch.look() == [Searching(one, 1, 5, 0.25)]
     journal.add({one: [row(1, float("nan"))], other: [row(0, float("nan"))]}, SPACE)
-    found = {search.cell: search for search in watch.look()}
-    assert found == {one: Searching(one, 2, 5, 0.25), other: Searching(other, 1, 5, inf)}
-    assert found[one].words == f"{one}: trial 2/5, best so far 0.5 m rms"
-    assert found[other].words == f"{other}: trial 1/5"
+    running = {search.cell: search for search in watch.look()}
+    assert running == {one: Searching(one, 2, 5, 0.25), other: Searching(other, 1, 5, inf)}
+    assert running[one].words == f"{one}: trial 2/5, best so far 0.5 m rms"
+    assert running[other].words == f"{other}: trial 1/5"
     journal.add({other: [row(1, 0.04)]}, SPACE)
     assert watch.look()[0] == Searching(other, 2, 5, 0.04), "the one that moved last comes first"
     journal.add({other: [row(number, 0.09) for number in (2, 3, 4)]}, SPACE)
@@ -66,11 +66,11 @@ def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
     whole = file.read_bytes()
     for cut in (len(whole) - 5, len(whole)):
         file.write_bytes(whole[:cut])
-        found = watch.look()
-    assert found == [Searching(cell, 1, 5, 0.01)]
+        running = watch.look()
+    assert running == [Searching(cell, 1, 5, 0.01)]
     with file.open("a") as stream:
         stream.write('no json\n[1]\n{"op_code": 4}\n{"op_code": 2, "study_id": 9, "user_attr": {"trials": 3}}\n')
-    assert watch.look() == found
+    assert watch.look() == running
 
 
 def test_journals_of_a_folder_that_has_several(tmp_path: Path) -> None:

@@ -81,10 +81,10 @@ def test_tracks_know_their_part(read: Results) -> None:
 
 
 def test_snapshots_start_at_the_ship_and_end_at_its_heading(read: Results, tiny_run: Path) -> None:
-    found = frames.snapshots(read)
+    snapshots = frames.snapshots(read)
     log = read_dataset(tiny_run / store.DATASET).frame
-    assert {snapshot["run"] for snapshot in found} == set(read.test.spans)
-    for snapshot in found:
+    assert {snapshot["run"] for snapshot in snapshots} == set(read.test.spans)
+    for snapshot in snapshots:
         rows = log[log["run"] == snapshot["run"]].set_index("t")
         start, end = rows.loc[snapshot["t"]], rows.loc[snapshot["t"] + 5.0]
         assert snapshot["psi_end"] == pytest.approx(end["psi"] - start["psi"])
@@ -104,7 +104,7 @@ def test_outline_is_to_scale(read: Results) -> None:
     assert np.ptp(outline[:, 1]) == pytest.approx(9.6)
 
 
-def test_provenance_says_what_it_stands_on(read: Results) -> None:
+def test_provenance_names_what_was_used(read: Results) -> None:
     words = frames.provenance_words(read)
     assert read.plan.digest in words["study"]
     assert words["cells"] == "8 of 8 finished"

@@ -1,4 +1,4 @@
-"""Turns: each is the study with that run as its test, and what is said of them follows by hand."""
+"""Turns: each is the study with that run as its test, and their findings follow by hand."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def by_hand() -> pd.DataFrame:
 
 def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-    found = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
+    rows_of_turns = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
     for test in ("a", "b"):
-        own, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-        prepared = prepare(own, dataset)
-        rows = [row for row, *_ in run_batch(own, prepared, own.batches[0], "cpu")]
-        turn = found[found["test"] == test]
+        single, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
+        prepared = prepare(single, dataset)
+        rows = [row for row, *_ in run_batch(single, prepared, single.batches[0], "cpu")]
+        turn = rows_of_turns[rows_of_turns["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         assert (turn["N_D"] == 5).all()
         for name in ("A", "H"):
@@ -108,20 +108,20 @@ def test_two_rotations_to_one_file_share_the_work(
     monkeypatch.setattr(rotate_module, "run_unit", counted)
     first = rotate(plan, dataset, ["a", "b"], kept=kept)
     one = [next(first)]
-    second = threading.Thread(target=lambda: found.extend(rotate(plan, dataset, ["a", "b"], kept=kept)))
-    found: list[pd.DataFrame] = []
+    second = threading.Thread(target=lambda: frames.extend(rotate(plan, dataset, ["a", "b"], kept=kept)))
+    frames: list[pd.DataFrame] = []
     second.start()
     one += list(first)
     rotate_module.forget(kept)
     second.join()
     assert len(begun) == 2
-    pd.testing.assert_frame_equal(pd.concat(found), pd.concat(one), check_exact=True)
+    pd.testing.assert_frame_equal(pd.concat(frames), pd.concat(one), check_exact=True)
     rotate_module.forget(kept)
     assert not kept.exists()
 
 
 def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
-    """Another setting, other data or another device has a folder of its own; a damaged file is computed again."""
+    """Another setting, other data or another device has another folder; a damaged file is computed again."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
@@ -160,23 +160,23 @@ def many() -> pd.DataFrame:
 
 def test_findings_over_turns_by_hand(claimed: Plan, tmp_path: Path) -> None:
     """A less H of `bad` is 2.5, 3.5, 4.5 in the turns by hand; in one turn of three `none` is not the worst."""
-    found = {one["id"]: one for one in turn_findings(many(), claimed)}
-    assert {key: one["verdict"] for key, one in found.items()} == {
+    by_claim = {one["id"]: one for one in turn_findings(many(), claimed)}
+    assert {key: one["verdict"] for key, one in by_claim.items()} == {
         "R1": "confirmed",
         "R2": "confirmed",
         "R3": "confirmed",
         "R4": "refuted",
     }
-    assert "bad 6.00 m -> 2.52 m, 3.4" in found["R1"]["evidence"]
-    assert found["R1"]["evidence"].endswith("6 test manoeuvres")
-    assert found["R4"]["evidence"].startswith("worst over the horizon, physics alone included: bad alone")
+    assert "bad 6.00 m -> 2.52 m, 3.4" in by_claim["R1"]["evidence"]
+    assert by_claim["R1"]["evidence"].endswith("6 test manoeuvres")
+    assert by_claim["R4"]["evidence"].startswith("worst over the horizon, physics alone included: bad alone")
     assert turn_findings(by_hand(), tiny_plan(tmp_path)) == []
 
 
 def test_few_turns_decide_nothing(claimed: Plan) -> None:
-    found = turn_findings(by_hand(), claimed)
-    assert {one["verdict"] for one in found} == {"undecided"}
-    assert "3 test manoeuvres give no interval, 5 would" in found[0]["evidence"]
+    claims = turn_findings(by_hand(), claimed)
+    assert {one["verdict"] for one in claims} == {"undecided"}
+    assert "3 test manoeuvres give no interval, 5 would" in claims[0]["evidence"]
 
 
 def test_a_failed_cell_is_left_out(claimed: Plan) -> None:

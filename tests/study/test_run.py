@@ -90,7 +90,7 @@ def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> No
     wider = {row["cell"]: row for row in numbers(tmp_path / "run")}
     for row in numbers(tiny_run):
         twin = wider[row["cell"]]
-        assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round in their own way
+        assert twin["H"] == pytest.approx(row["H"], rel=1e-4), row["cell"]  # stacked products round differently
         assert twin["A"] == pytest.approx(row["A"], nan_ok=True) if row["A"] is not None else twin["A"] is None
 
 
@@ -99,9 +99,9 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
     prepared = prepare(plan, obtain(plan))
     whole = {row["cell"]: (row, one) for row, one, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
-    found = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
-    assert len(found) == len(whole) == plan.cells
-    for row, predictor, _ in found:
+    parts = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
+    assert len(parts) == len(whole) == plan.cells
+    for row, predictor, _ in parts:
         expected, other = whole[row["cell"]]
         assert _plain(row) == _plain(expected)
         assert predictor is not None
@@ -168,18 +168,18 @@ def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over
     with Claims(folder) as other:
 
         def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
-            found = fit(self, task) if late or lost else {}
+            fits = fit(self, task) if late or lost else {}
             if not lost:
                 (claim,) = (folder / "claims").glob("N*")
                 claim.unlink()
                 assert other.take(claim.name)
                 lost.append(claim.name)
-            return found or fit(self, task)
+            return fits or fit(self, task)
 
         monkeypatch.setattr(PathDrawn, "fit", held_up)
         *events, end = events_here(plan, folder, leave=True)
-        said = [event.text for event in events if "has taken it over" in event.text]
-        assert [words.split(":")[0] for words in said] == lost
+        notices = [event.text for event in events if "has taken it over" in event.text]
+        assert [words.split(":")[0] for words in notices] == lost
         assert (end.done, end.total) == (4, 8)
         assert not (folder / "batches" / f"{lost[0]}.json").exists()
         journal = folder / "trials" / f"{lost[0]}.log"
@@ -226,8 +226,8 @@ def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:
     rows = [{**row, "cell": f"{f}+{m}", "foundation": f, "method": m} for f, m in batch.pairs]
     store.write_unit(folder, batch, [store.Cell(row) for row in rows])
     assert store.finished(folder, plan.units) == list(plan.units)
-    found = store.read_rows(folder, plan)
-    assert list(zip(found["foundation"], found["method"], strict=True)) == list(batch.pairs)
+    stored = store.read_rows(folder, plan)
+    assert list(zip(stored["foundation"], stored["method"], strict=True)) == list(batch.pairs)
     one = plan.units[1]
     store.write_unit(folder, one, [store.Cell(rows[-1])])  # finished already: nothing is stored twice
     assert len(store.read_rows(folder, plan)) == len(rows)
@@ -409,9 +409,9 @@ def test_damaged_folders_are_one_line(tmp_path: Path, tiny_run: Path, kind: str)
 
     folder = tmp_path / "run"
     shutil.copytree(tiny_run, folder)
-    damage, said = DAMAGES[kind]
+    damage, message = DAMAGES[kind]
     damage(folder)
-    with pytest.raises(ShipidError, match=said) as caught:
+    with pytest.raises(ShipidError, match=message) as caught:
         read_results(folder)
     line = str(caught.value)
     assert "\n" not in line
@@ -420,12 +420,12 @@ def test_damaged_folders_are_one_line(tmp_path: Path, tiny_run: Path, kind: str)
 
 def test_a_run_needs_no_vessel_file_any_more(tmp_path: Path) -> None:
     """A folder of results opens anywhere, with the vessels as they were when the run began."""
-    own = tmp_path / "own.toml"
-    own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
+    document = tmp_path / "own.toml"
+    document.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
     plan = tiny_plan(tmp_path, {"truth.vessel": "./own.toml"})
     next(run_study(plan, tmp_path / "run"))
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
-    own.unlink()
+    document.unlink()
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
     stored = tmp_path / "run" / store.VESSELS
     stored.write_text(stored.read_text().replace("410931.81", "410931.82"))
@@ -434,8 +434,8 @@ def test_a_run_needs_no_vessel_file_any_more(tmp_path: Path) -> None:
 
 
 def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
-    own = tmp_path / "own.toml"
-    own.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
+    document = tmp_path / "own.toml"
+    document.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
     plan = tiny_plan(tmp_path, {"family.1.base": "./own.toml"})
     assert store.write_patches(tmp_path / "far" / "away", plan.foundations) == 3
     for model in plan.foundations[:-1]:

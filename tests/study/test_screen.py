@@ -38,7 +38,7 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
     """A, A_90 and share of failures of each member by way of its paths on pool and test."""
     (family,), base = families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
     dataset = obtain(plan)
-    found = []
+    rows = []
     for variant in members(family.model_copy(update={"members": count}), base):
         vessel, errors = base.with_values(variant.values), []
         for windows in partition(plan, dataset)[:2]:
@@ -46,8 +46,8 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
             paths = Physics(vessel, windows.horizon, 1.0).paths(windows.instants(hidden=hidden))
             errors.append(position_error(paths, windows.future))
         whole = summary(np.concatenate(errors, axis=1))
-        found.append({"member": variant.name, "factors": variant.factors, **whole})
-    return found
+        rows.append({"member": variant.name, "factors": variant.factors, **whole})
+    return rows
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -60,8 +60,8 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
     assert list(frame["member"]) == [row["member"] for row in expected]
     np.testing.assert_allclose(frame["A"], [row["mean"] for row in expected], rtol=1e-12)
     np.testing.assert_allclose(frame["A_90"], [row["p90"] for row in expected], rtol=2e-3)
-    for row, (_, found) in zip(expected, frame.iterrows(), strict=True):
-        assert row["factors"] == {path: found[path] for path in row["factors"]}
+    for row, (_, screened_row) in zip(expected, frame.iterrows(), strict=True):
+        assert row["factors"] == {path: screened_row[path] for path in row["factors"]}
 
 
 @pytest.mark.skipif(native.compiler() is None, reason="no C compiler on this machine")
@@ -79,12 +79,12 @@ def test_single_precision_gives_six_digits(plan: Plan) -> None:
 def test_members_are_those_of_the_study(plan: Plan) -> None:
     """A member keeps its number and draw whatever the size of the family."""
     prepared = prepare(plan, obtain(plan))
-    own = {
+    factors_of = {
         model.name: model.variant.factors for model in prepared.foundations if model.family == "wrong" and model.variant
     }
     frame = screened(plan, 7).set_index("member")
-    assert len(own) == 2
-    for name, factors in own.items():
+    assert len(factors_of) == 2
+    for name, factors in factors_of.items():
         assert dict(frame.loc[name, list(factors)]) == factors
 
 
@@ -96,8 +96,8 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
     assert [len(block) for block in screen(plan, obtain(plan), families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
-def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Path) -> None:
-    """Each lag has its own hidden states at the start of a window: those of the orders before."""
+def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
+    """Each lag has separate hidden states at the start of a window: those of the orders before."""
     vessel = tmp_path / "lagged.toml"
     lag = "kind = 'first_order'\nT = 2.0\nrate = 0.2\n"
     vessel.write_text(
@@ -112,7 +112,7 @@ def test_members_with_lags_of_their_own_start_from_their_own_memory(tmp_path: Pa
     np.testing.assert_allclose(screened(plan, 3)["A"], [row["mean"] for row in by_paths(plan, 3)], rtol=1e-12)
 
 
-def test_a_member_that_diverges_is_said_so(tmp_path: Path) -> None:
+def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
     wild = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"], "factor": [-3e4, 1.0]}]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
     meant = {"unusual": ["family.0.perturb.0.factor*"]}
@@ -126,16 +126,16 @@ def test_a_member_that_diverges_is_said_so(tmp_path: Path) -> None:
 
 
 def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
-    """Two numbers drawn together count once; one that matters stands before one that does not."""
+    """Two numbers drawn together count once; one that matters is listed before one that does not."""
     rules = [
         {"parameters": ["thruster.*.D_p"], "factor": [0.5, 1.5], "together": True},
         {"parameters": ["hull.derivatives.X_rr"], "factor": [0.99, 1.01]},
     ]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules}]
-    found = drivers(screened(tiny_plan(tmp_path, {"family": family}), 24))
-    assert list(found["paths"]) == ["thruster.port.D_p, thruster.starboard.D_p", "hull.derivatives.X_rr"]
-    assert found["away"][0] > 0.8  # too large and too small are wrong alike
-    assert abs(found["factor"][0]) < found["away"][0]
+    ranking = drivers(screened(tiny_plan(tmp_path, {"family": family}), 24))
+    assert list(ranking["paths"]) == ["thruster.port.D_p, thruster.starboard.D_p", "hull.derivatives.X_rr"]
+    assert ranking["away"][0] > 0.8  # too large and too small are wrong alike
+    assert abs(ranking["factor"][0]) < ranking["away"][0]
 
 
 def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
         write_table(tmp_path / "rows.txt", frame)
 
 
-def test_what_is_not_measured_is_said(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     """Logs without wind, and windows that touch the test in time."""
     families_ = [
         {"name": "wide", "base": "gunnerus-28.9", "perturb": [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]}

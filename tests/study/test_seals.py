@@ -81,9 +81,9 @@ def test_what_was_edited_is_refused(folder: Path) -> None:
         list(seals.mend(folder))
     assert caught.value.file == str(file)
     assert sorted(folder.rglob("*")) == before
-    found = check_folder(folder)
-    assert [fault.kind for fault in found.faults] == ["edited"]
-    assert "put it back" in found.lines[0]
+    check = check_folder(folder)
+    assert [fault.kind for fault in check.faults] == ["edited"]
+    assert "put it back" in check.lines[0]
 
 
 def test_two_cells_swapped_are_refused(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""The folder of a run: whose it is, what it holds, and what is said where it is damaged."""
+"""The folder of a run: whose it is, what it holds, and the message where it is damaged."""
 
 from __future__ import annotations
 
@@ -113,6 +113,6 @@ def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     store.open_folder(folder, tiny_plan(tmp_path))
     one, other = ({"shipid": "1", "processor": name, "packages": {"torch": "2"}} for name in ("one", "other"))
-    said = [store.note_session(folder, session) for session in (one, one, other, one, other)]
-    assert said == [[], [], ["processor was one, now other"], ["processor was other, now one"], []]
+    notes = [store.note_session(folder, session) for session in (one, one, other, one, other)]
+    assert notes == [[], [], ["processor was one, now other"], ["processor was other, now one"], []]
     assert read_json(folder / store.PROVENANCE)["sessions"] == [one, other]

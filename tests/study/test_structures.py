@@ -59,7 +59,7 @@ def data_of(structure: str) -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def found() -> Compared:
+def comparison() -> Compared:
     return compare_structures(
         SHIP,
         data_of("abkowitz"),
@@ -73,24 +73,24 @@ def found() -> Compared:
 
 
 @pytest.mark.slow
-def test_the_structure_that_made_the_data_is_chosen(found: Compared) -> None:
-    assert found.chosen == "abkowitz"
-    assert list(found.table["structure"]) == ["abkowitz", "modulus"]
-    assert found.table["position"].is_monotonic_increasing
-    assert found.test == ("35_15_627",)
-    held = found.errors[(found.errors["set"] == "folds") & (found.errors["run"] != "all")]
-    assert sorted(held["run"].unique()) == sorted(found.runs)  # each run once, and no test run
-    assert found.sentences[0].startswith("abkowitz has the least error")
-    assert set(found.manoeuvres["measure"]) == {"overshoot 1", "overshoot 2", "advance", "tactical diameter"}
-    assert (found.spread["spread"] >= 0).all()
-    assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in found.beyond)
+def test_the_structure_that_made_the_data_is_chosen(comparison: Compared) -> None:
+    assert comparison.chosen == "abkowitz"
+    assert list(comparison.table["structure"]) == ["abkowitz", "modulus"]
+    assert comparison.table["position"].is_monotonic_increasing
+    assert comparison.test == ("35_15_627",)
+    held = comparison.errors[(comparison.errors["set"] == "folds") & (comparison.errors["run"] != "all")]
+    assert sorted(held["run"].unique()) == sorted(comparison.runs)  # each run once, and no test run
+    assert comparison.sentences[0].startswith("abkowitz has the least error")
+    assert set(comparison.manoeuvres["measure"]) == {"overshoot 1", "overshoot 2", "advance", "tactical diameter"}
+    assert (comparison.spread["spread"] >= 0).all()
+    assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in comparison.beyond)
 
 
 @pytest.mark.slow
-def test_the_vessel_chosen_and_the_page_are_written(found: Compared, tmp_path: Path) -> None:
-    again = load_vessel(str(write_chosen(found, tmp_path / "chosen.toml")))
-    assert again.parameters == pytest.approx(found.fits[found.chosen].vessel.parameters)
-    page = write_structures(structures_content(found, "log.parquet", "shipid identify"), tmp_path / "page.html")
+def test_the_vessel_chosen_and_the_page_are_written(comparison: Compared, tmp_path: Path) -> None:
+    again = load_vessel(str(write_chosen(comparison, tmp_path / "chosen.toml")))
+    assert again.parameters == pytest.approx(comparison.fits[comparison.chosen].vessel.parameters)
+    page = write_structures(structures_content(comparison, "log.parquet", "shipid identify"), tmp_path / "page.html")
     text = page.read_text()
     for word in ("modulus", "abkowitz", "tactical diameter", "Which structure"):
         assert word in text
@@ -140,5 +140,5 @@ def test_a_run_held_out_decides_nothing_in_the_fit_that_predicts_it(monkeypatch:
 @pytest.mark.parametrize("truth", ["mmg", "cubic"])
 def test_the_truth_is_never_shown_to_be_worse(truth: str) -> None:
     names = ["mmg", "modulus", "cubic"]
-    found = compare_structures(SHIP, data_of(truth), SETTINGS, names, ahead=20.0, folds=2, level=None)
-    assert bool(found.table.set_index("structure")["equal"][truth])
+    ranked = compare_structures(SHIP, data_of(truth), SETTINGS, names, ahead=20.0, folds=2, level=None)
+    assert bool(ranked.table.set_index("structure")["equal"][truth])

@@ -13,30 +13,30 @@ T = np.arange(0.0, 100.0, 0.5)
 
 
 def test_a_steady_turn_is_described_by_its_numbers() -> None:
-    found = survey(as_dataset(turning(T), turning(T[:81])))
-    assert list(found.runs.index) == ["a", "b"]
-    assert found.runs["duration"].tolist() == [99.5, 40.0]
-    assert found.step == 0.5
-    assert found.speed == pytest.approx(np.hypot(4.0, 0.5))
-    np.testing.assert_allclose(found.runs["rate"], 0.05)
-    assert found.factor == pytest.approx(1.0, abs=1e-3)
-    assert found.runs["whole"].all()
+    summary = survey(as_dataset(turning(T), turning(T[:81])))
+    assert list(summary.runs.index) == ["a", "b"]
+    assert summary.runs["duration"].tolist() == [99.5, 40.0]
+    assert summary.step == 0.5
+    assert summary.speed == pytest.approx(np.hypot(4.0, 0.5))
+    np.testing.assert_allclose(summary.runs["rate"], 0.05)
+    assert summary.factor == pytest.approx(1.0, abs=1e-3)
+    assert summary.runs["whole"].all()
 
 
 @pytest.mark.parametrize(("scale", "turn"), [(0.5, 0.0), (1.2, 0.3)])
 def test_the_factor_is_how_positions_differ_from_velocities(scale: float, turn: float) -> None:
     frame = turning(T)
     place = scale * np.exp(1j * turn) * (frame["north"].to_numpy() + 1j * frame["east"].to_numpy())
-    found = survey(as_dataset(frame.assign(north=place.real, east=place.imag)))
-    assert found.factor == pytest.approx(scale * np.exp(1j * turn), abs=2e-3)
+    summary = survey(as_dataset(frame.assign(north=place.real, east=place.imag)))
+    assert summary.factor == pytest.approx(scale * np.exp(1j * turn), abs=2e-3)
 
 
 def test_a_broken_run_is_judged_by_its_longest_piece() -> None:
     frame = turning(T)
     frame["flags"] = np.where(T == 30.0, 1, 0)
-    found = survey(as_dataset(frame)).runs.loc["a"]
-    assert not found["whole"]
-    assert found["duration"] == 99.5 - 30.0
+    summary = survey(as_dataset(frame)).runs.loc["a"]
+    assert not summary["whole"]
+    assert summary["duration"] == 99.5 - 30.0
 
 
 def test_jitter_does_not_grow_with_the_lag_and_a_wrong_speed_does() -> None:

@@ -82,9 +82,9 @@ def alone(study: Path, tmp_path: Path) -> Path:
 
 def same(folder: Path, other: Path) -> None:
     """Every predictor and row equal, bit by bit; the tables; nothing is left over."""
-    found, expected = stored(folder), stored(other)
-    assert found.keys() == expected.keys()
-    assert [name for name in found if found[name] != expected[name]] == []
+    files, expected = stored(folder), stored(other)
+    assert files.keys() == expected.keys()
+    assert [name for name in files if files[name] != expected[name]] == []
     tables = [pd.read_parquet(place / "results.parquet") for place in (folder, other)]
     pd.testing.assert_frame_equal(*(table[table["metric"] != "seconds"] for table in tables), check_exact=True)
     assert seals.faults(folder) == []
@@ -110,8 +110,8 @@ def test_three_processes_one_killed_one_joining(study: Path, alone: Path, tmp_pa
         first.send_signal(signal.SIGKILL)
         with process(study, folder) as third:
             text, _ = third.communicate(timeout=600)
-            said, _ = second.communicate(timeout=600)
-    assert (second.returncode, third.returncode) == (0, 0), said + text
+            output, _ = second.communicate(timeout=600)
+    assert (second.returncode, third.returncode) == (0, 0), output + text
     assert f"report: {folder / 'report.html'}" in text
     same(folder, alone)
 

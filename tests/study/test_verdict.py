@@ -51,8 +51,8 @@ def test_numbers_in_words() -> None:
 
 
 def test_undecided_claims_keep_their_words_and_say_why() -> None:
-    found = undecided({"S1": "one", "S2": "two"}, "not finished")
-    assert [(f["id"], f["claim"], f["verdict"], f["evidence"], f["numbers"]) for f in found] == [
+    claims = undecided({"S1": "one", "S2": "two"}, "not finished")
+    assert [(f["id"], f["claim"], f["verdict"], f["evidence"], f["numbers"]) for f in claims] == [
         ("S1", "one", "undecided", "not finished", {}),
         ("S2", "two", "undecided", "not finished", {}),
     ]

@@ -1,4 +1,4 @@
-"""Workers: every task once, whoever does it; errors and deaths are told; no process outlives its iterator or parent."""
+"""Workers: every task once, whoever does it; errors and deaths are reported; no process outlives its iterator."""
 
 from __future__ import annotations
 
@@ -41,8 +41,10 @@ process.start()
 process.join()
 """
     environment = os.environ | dict.fromkeys(ONE_THREAD, "2")
-    found = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
-    assert found.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), found.stderr
+    process = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    assert process.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), process.stderr
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

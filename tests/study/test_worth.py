@@ -29,27 +29,27 @@ A = {f"m{k}": 2.0**k for k in range(5)}
 
 def test_break_even_by_hand() -> None:
     """H = A / 2 meets 3 m at A = 6 m."""
-    found = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [3.0]}, (10,)), list(A), 0)
-    assert found is not None
-    assert found.value == pytest.approx(6.0)
-    assert found.low < 6.0 < found.high
-    assert not any((found.above, found.below, found.unknown))
+    worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [3.0]}, (10,)), list(A), 0)
+    assert worth is not None
+    assert worth.value == pytest.approx(6.0)
+    assert worth.low < 6.0 < worth.high
+    assert not any((worth.above, worth.below, worth.unknown))
     assert break_even(table(A, {m: [1.0] for m in [*A, "none"]}, (10,)), list(A)[:3], 0) is None
 
 
 @pytest.mark.parametrize(("none", "where"), [(100.0, "above"), (0.01, "below")])
 def test_break_even_beyond_the_models_tried_is_a_bound(none: float, where: str) -> None:
-    found = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [none]}, (10,)), list(A), 0)
-    assert found is not None
-    assert getattr(found, where)
-    assert found.value == {"above": 16.0, "below": 1.0}[where]
+    worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [none]}, (10,)), list(A), 0)
+    assert worth is not None
+    assert getattr(worth, where)
+    assert worth.value == {"above": 16.0, "below": 1.0}[where]
 
 
 def test_runs_are_interpolated_between_amounts() -> None:
     """4 m at 10 runs, 1 m at 40: 2 m takes 20."""
-    found = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40)), "m0", 0)
-    assert found.value == pytest.approx(20.0)
-    assert 10 < found.low < 20 < found.high < 40
+    worth = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40)), "m0", 0)
+    assert worth.value == pytest.approx(20.0)
+    assert 10 < worth.low < 20 < worth.high < 40
     never = runs_without_physics(table(A, {"m0": [0.5, 0.5], "none": [4.0, 1.0]}, (10, 40)), "m0", 0)
     assert never.above
     assert never.value == 40
@@ -59,13 +59,13 @@ def test_runs_are_interpolated_between_amounts() -> None:
 
 
 def test_more_data_that_harm_take_nothing_back() -> None:
-    found = runs_without_physics(table(A, {"m0": [2.0] * 3, "none": [4.0, 1.0, 3.0]}, (10, 40, 80)), "m0", 0)
-    assert found.value == pytest.approx(20.0)
+    worth = runs_without_physics(table(A, {"m0": [2.0] * 3, "none": [4.0, 1.0, 3.0]}, (10, 40, 80)), "m0", 0)
+    assert worth.value == pytest.approx(20.0)
 
 
 def test_one_manoeuvre_has_no_interval() -> None:
-    found = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40), runs=1), "m0", 0)
-    assert np.isnan([found.low, found.high]).all()
+    worth = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40), runs=1), "m0", 0)
+    assert np.isnan([worth.low, worth.high]).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -76,7 +76,7 @@ def test_a_better_model_is_worth_more_runs(seed: int) -> None:
     curve = np.exp(rng.normal(0, 0.5, len(amounts)))
     levels = np.sort(np.exp(rng.normal(0, 0.5, 4)))
     H = {f"m{k}": [level] * len(amounts) for k, level in enumerate(levels)} | {"none": list(curve)}
-    found = [runs_without_physics(table({}, H, amounts), f"m{k}", 0) for k in range(4)]
-    values = [one.value for one in found]
+    worth = [runs_without_physics(table({}, H, amounts), f"m{k}", 0) for k in range(4)]
+    values = [one.value for one in worth]
     assert values == sorted(values, reverse=True)
-    assert all(one.low <= one.value <= one.high for one in found)
+    assert all(one.low <= one.value <= one.high for one in worth)

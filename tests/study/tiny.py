@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
+from shipid.report import page
+from shipid.report.sections import SECTIONS
 from shipid.study import run, store
 from shipid.study.plan import Plan, Unit, build_plan, read_plan
 from shipid.study.prepare import Prepared
@@ -64,6 +66,14 @@ def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.E
     """The same, event by event."""
     with without_workers():
         yield from run.run_study(plan, folder, leave=leave)
+
+
+@contextmanager
+def without_figures() -> Iterator[None]:
+    """Pages of studies are texts alone, where figures are not the point: these take most of the time of a page."""
+    drawn = page.drawn
+    with patch.object(page, "drawn", lambda sections, *rest: [] if sections is SECTIONS else drawn(sections, *rest)):
+        yield
 
 
 @contextmanager

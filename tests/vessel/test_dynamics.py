@@ -33,8 +33,8 @@ def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
             continue
         mapped = [np.tile(np.array(group, ndmin=2).T, (1, len(term.arrays))) for group in [*groups, values(vessel)]]
         force = force + np.array(term.function.map(len(term.arrays))(*mapped, term.arrays.T)).sum(axis=1)
-    found = np.array(model.rates(*groups, values(vessel), force)).ravel()
-    return dict(zip(states, found, strict=True))
+    derivatives = np.array(model.rates(*groups, values(vessel), force)).ravel()
+    return dict(zip(states, derivatives, strict=True))
 
 
 def mass_matrix(vessel: Vessel) -> np.ndarray:
@@ -51,9 +51,9 @@ def test_mass_is_positive_definite(vessel: Vessel) -> None:
 
 def test_extra_force_at_rest_is_force_over_mass(vessel: Vessel) -> None:
     tau = np.array([1e4, -2e4, 3e5] if len(vessel.axes) == 3 else [1e4, -2e4, *[1e4] * (len(vessel.axes) - 3), 3e5])
-    without, found = rates(vessel), rates(vessel, tau)
+    without, moved = rates(vessel), rates(vessel, tau)
     names = dynamics(vessel).state[len(vessel.axes) :]
-    difference = np.array([found[name] - without[name] for name in names])
+    difference = np.array([moved[name] - without[name] for name in names])
     np.testing.assert_allclose(difference, np.linalg.solve(mass_matrix(vessel), tau), rtol=1e-9, atol=1e-12)
 
 
@@ -74,7 +74,7 @@ def test_planar_equations_by_hand() -> None:
         total = 0.0
         for name, value in d.items():
             if name.startswith(f"{axis}_"):
-                pieces = name[2:].split("|")  # every second piece stands between bars
+                pieces = name[2:].split("|")  # every second piece is between bars
                 bare, modulus = "".join(pieces[::2]), "".join(pieces[1::2])
                 total += value * np.prod([motion[s] for s in bare]) * np.prod([abs(motion[s]) for s in modulus])
         return total
@@ -90,10 +90,10 @@ def test_planar_equations_by_hand() -> None:
 
     hull = np.array([force(axis) for axis in "XYN"])
     expected = np.linalg.solve(M_RB + M_A, hull - coriolis(M_RB) - coriolis(M_A))
-    found = rates(vessel, u=u, v=v, r=r, psi=psi)
-    np.testing.assert_allclose([found["u"], found["v"], found["r"]], expected, rtol=1e-11)
+    moved = rates(vessel, u=u, v=v, r=r, psi=psi)
+    np.testing.assert_allclose([moved["u"], moved["v"], moved["r"]], expected, rtol=1e-11)
     np.testing.assert_allclose(
-        [found["north"], found["east"], found["psi"]],
+        [moved["north"], moved["east"], moved["psi"]],
         [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r],
     )
 
@@ -105,8 +105,8 @@ def test_a_current_carries_the_ship_along() -> None:
     )
     V_c, beta_c, psi = 0.9, 2.0, 0.5
     u, v = V_c * np.cos(beta_c - psi), V_c * np.sin(beta_c - psi)
-    found = rates(vessel, u=u, v=v, psi=psi, V_c=V_c, beta_c=beta_c)
-    np.testing.assert_allclose([found["u"], found["v"], found["r"]], 0, atol=1e-15)
+    moved = rates(vessel, u=u, v=v, psi=psi, V_c=V_c, beta_c=beta_c)
+    np.testing.assert_allclose([moved["u"], moved["v"], moved["r"]], 0, atol=1e-15)
     turning = rates(vessel, u=u + 3.0, v=v, r=0.05, psi=psi, V_c=V_c, beta_c=beta_c)
     still = rates(vessel, u=3.0, v=0.0, r=0.05, psi=psi)
     carried = np.array([0.05 * v, -0.05 * u])  # velocities in turning axes: nu_dot = nu_r_dot + d(nu_c)/dt
@@ -128,7 +128,7 @@ def test_switching_the_wind_off_takes_its_force_away() -> None:
     vessel = load_vessel("gunnerus-28.9")
     calm = rates(vessel, u=3.0, psi=0.2, V_w=0.0)
     off = rates(vessel.with_values({"wind.off": True}), u=3.0, psi=0.2)
-    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of her own speed
+    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of the ship's speed
     assert calm["u"] - off["u"] == pytest.approx(-headwind, rel=1e-9)
 
 
@@ -161,7 +161,7 @@ def test_written_out_sum_equals_mapped_sum(monkeypatch: pytest.MonkeyPatch) -> N
         assert value == pytest.approx(written_out[name], rel=1e-12)
 
 
-def test_actuator_memory_stands_for_the_command(draw_inputs: Callable[..., Mapping[str, Any]]) -> None:
+def test_actuator_memory_replaces_the_command(draw_inputs: Callable[..., Mapping[str, Any]]) -> None:
     base = load_vessel("gunnerus-28.9")
     lag = {"kind": "first_order", "T": 1.0, "rate": 0.17}
     lagged = base.with_values({"thruster.port.actuator.n": lag})

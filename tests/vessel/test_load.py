@@ -52,14 +52,14 @@ def test_units_follow_from_names() -> None:
 
 
 def test_a_number_of_the_block_goes_before_the_shared_one() -> None:
-    """33.9 m: T of the cross-flow stands in its block; rho comes from [constants]; both are parameters once."""
+    """33.9 m: T of the cross-flow is in its block; rho comes from [constants]; both are parameters once."""
     vessel = load_vessel("gunnerus-33.9")
     assert "hull.crossflow.T" in vessel.parameters
     assert "particulars.T" not in vessel.parameters
     shared = vessel.with_values({"hull": {"crossflow": _without(vessel.document["hull"]["crossflow"], "T")}})
     assert shared.parameters["particulars.T"] == 2.6
-    own = vessel.with_values({"thruster.port.rho": 1000.0})
-    assert (own.parameters["thruster.port.rho"], own.parameters["constants.rho"]) == (1000.0, 1025.0)
+    changed = vessel.with_values({"thruster.port.rho": 1000.0})
+    assert (changed.parameters["thruster.port.rho"], changed.parameters["constants.rho"]) == (1000.0, 1025.0)
 
 
 def _without(block: dict[str, object], key: str) -> dict[str, object]:
@@ -160,8 +160,8 @@ def test_a_source_is_that_of_the_document_that_wrote_the_block(tmp_path: Path) -
     assert sources(load_vessel(str(named))) == expected
     assert sources(load_vessel(str(patch))) == expected
     assert sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
-    own = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
-    named.write_text(own)
+    text = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
+    named.write_text(text)
     assert sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
 
 

@@ -55,7 +55,7 @@ def test_more_paths_change_no_other_draw(base: Vessel) -> None:
     assert longer.factors["thruster.port.k_T"] == draw(HIGH, 4, base).factors["thruster.port.D_p"]
 
 
-def test_another_family_changes_no_draw_and_has_its_own(base: Vessel) -> None:
+def test_another_family_changes_no_draw_and_draws_separately(base: Vessel) -> None:
     other = draw(family(HULL, MASS, PROPELLERS, name="higher"), 0, base)
     alone = draw(resolve([HIGH])[0], 0, base)
     beside = draw(resolve([family(HULL, name="moderate"), HIGH])[1], 0, base)
@@ -74,7 +74,7 @@ def test_a_redrawn_member_is_another_one_and_says_so(base: Vessel) -> None:
     assert (second.counter, second.name) == (1, first.name)
 
 
-def test_members_differ_and_each_parameter_has_its_own_draw(base: Vessel) -> None:
+def test_members_differ_and_each_parameter_has_a_separate_draw(base: Vessel) -> None:
     drawn = members(family(HULL), base)
     assert len({variant.values["hull.derivatives.Y_uv"] for variant in drawn}) == 8
     assert len(set(drawn[0].factors.values())) == 32
@@ -172,8 +172,8 @@ def test_the_patch_document_rebuilds_the_variant_exactly(base: Vessel, tmp_path:
 @pytest.mark.parametrize("value", [1e-7, 1e22, 123456789.123456789, 1 / 3, -0.0, 5e-324])
 def test_the_patch_document_keeps_every_bit(base: Vessel, tmp_path: Path, value: float) -> None:
     variant = draw(family({"set": {"hull.derivatives.X_u|v|": value}}), 0, base)
-    found = rebuilt(variant, tmp_path).parameters["hull.derivatives.X_u|v|"]
-    assert found.hex() == value.hex()
+    number = rebuilt(variant, tmp_path).parameters["hull.derivatives.X_u|v|"]
+    assert number.hex() == value.hex()
 
 
 def test_a_changed_base_is_refused(base: Vessel, tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def test_accelerations_are_those_of_the_published_equations(name: str) -> None:
     published, vessel = VESSELS[name], load_vessel(name)
     model, values = dynamics(vessel), list(vessel.parameters.values())
     axes = model.state[model.num_dof :]
-    found, expected = [], []
+    computed, expected = [], []
     for given in drawn(published.source, STATES):
         orders: dict[str, Any] = dict.fromkeys(model.commands, 0.0)
         orders |= {order: given[source] * factor for order, (source, factor) in published.orders.items()}
@@ -75,7 +75,7 @@ def test_accelerations_are_those_of_the_published_equations(name: str) -> None:
         tau = [given.get(force, 0.0) for force in (("X", "Y", "K", "N") if "p" in axes else ("X", "Y", "N"))]
         memory = [orders[entry] for entry in model.memory]
         rates = model.rates(state, memory, list(orders.values()), [0.0] * len(model.environment), values, tau)
-        found.append(np.array(rates).ravel()[model.num_dof :])
+        computed.append(np.array(rates).ravel()[model.num_dof :])
         expected.append(published.source.accelerations(**given))
-    for axis, here, there in zip(axes, np.array(found).T, np.array(expected).T, strict=True):
+    for axis, here, there in zip(axes, np.array(computed).T, np.array(expected).T, strict=True):
         np.testing.assert_allclose(here, there, rtol=1e-9, atol=1e-12 * np.abs(there).max(), err_msg=axis)

@@ -32,10 +32,10 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
 
 
 def test_parameters_are_read_off_the_signature() -> None:
-    found = {p.name: p for p in parameters(rigid_body)}
-    assert list(found) == ["m", "I_z", "x_G", "z_G", "I_x", "I_y"]
-    assert (found["m"].unit, found["m"].positive, found["m"].default) == ("kg", True, None)
-    assert (found["z_G"].unit, found["z_G"].positive, found["z_G"].default) == ("m", False, 0.0)
+    by_name = {p.name: p for p in parameters(rigid_body)}
+    assert list(by_name) == ["m", "I_z", "x_G", "z_G", "I_x", "I_y"]
+    assert (by_name["m"].unit, by_name["m"].positive, by_name["m"].default) == ("kg", True, None)
+    assert (by_name["z_G"].unit, by_name["z_G"].positive, by_name["z_G"].default) == ("m", False, 0.0)
 
 
 def test_kinds_of_a_group() -> None:
@@ -51,7 +51,7 @@ def _properties(schema: dict[str, Any], node: dict[str, Any]) -> list[dict[str, 
     if "$ref" in node:
         return _properties(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]])
     options = [*node.get("anyOf", []), *node.get("oneOf", [])]
-    return [found for option in options for found in _properties(schema, option)] if options else [node]
+    return [node_ for option in options for node_ in _properties(schema, option)] if options else [node]
 
 
 def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str) -> list[str]:
@@ -63,15 +63,15 @@ def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str
         declared, extra = option.get("properties", {}), option.get("additionalProperties", True)
         if "kind" in declared and declared["kind"].get("const") != value.get("kind"):
             continue
-        found: list[str] = []
+        unknown: list[str] = []
         for key, entry in value.items():
             by_name = [inner for name, inner in option.get("patternProperties", {}).items() if re.search(name, key)]
             inner = declared.get(key, by_name[0] if by_name else extra)
             if inner is False:
-                found.append(f"{path}.{key}")
+                unknown.append(f"{path}.{key}")
             elif isinstance(inner, dict):
-                found += _unknown(schema, inner, entry, f"{path}.{key}")
-        complaints.append(found)
+                unknown += _unknown(schema, inner, entry, f"{path}.{key}")
+        complaints.append(unknown)
     return min(complaints, key=len, default=[f"{path} fits nothing"])
 
 

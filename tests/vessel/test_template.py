@@ -27,13 +27,13 @@ BEAMY, SLENDER = Particulars(20.0, 6.0, 2.0, 0.55), Particulars(200.0, 25.0, 9.0
 @pytest.mark.parametrize("given", [MARINER, KVLCC2, GUNNERUS, BEAMY, SLENDER])
 def test_a_first_guess_turns_and_zigzags(given: Particulars, propulsor: str) -> None:
     """It holds its speed, turns in a few lengths, and does not spin or run away."""
-    found = first_guess(replace(given, propulsor=propulsor), "ship", "ship.toml")
-    pace = given.length / found.vessel.document["particulars"]["U_0"]
+    proposal = first_guess(replace(given, propulsor=propulsor), "ship", "ship.toml")
+    pace = given.length / proposal.vessel.document["particulars"]["U_0"]
     kinds = [
-        TurningCircle(name="turn", n_rpm=60 * found.n, duration=25 * pace),
-        Zigzag(name="zigzag", n_rpm=60 * found.n, duration=25 * pace, approach="steady"),
+        TurningCircle(name="turn", n_rpm=60 * proposal.n, duration=25 * pace),
+        Zigzag(name="zigzag", n_rpm=60 * proposal.n, duration=25 * pace, approach="steady"),
     ]
-    log = perform(found.vessel, kinds, step=pace / 60)
+    log = perform(proposal.vessel, kinds, step=pace / 60)
     turn, zigzag = (log[log["run"] == name] for name in ("turn", "zigzag"))
     assert turn["u"].iloc[0] == pytest.approx(given.service, rel=0.02)
     assert 1.0 < (turn["east"].max() - turn["east"].min()) / given.length < 9.0
@@ -56,31 +56,31 @@ def test_clarke_near_the_mariner_as_measured() -> None:
 
 def test_formulae_near_kvlcc2_as_measured() -> None:
     """Table 3 of Yasukawa and Yoshimura (2015)."""
-    found = {name: value.number for name, value in hull(KVLCC2).items()}
+    estimates = {name: value.number for name, value in hull(KVLCC2).items()}
     for name, measured in {"Y_v": -0.315, "Y_r": 0.083, "N_v": -0.137, "N_r": -0.049, "Y_vrr": -0.391}.items():
-        assert found[name] == pytest.approx(measured, rel=0.25), name
+        assert estimates[name] == pytest.approx(measured, rel=0.25), name
     assert -added_mass(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
 
 
-def test_yaw_of_a_stern_pushed_aside_is_told_stable_or_not() -> None:
+def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
     """The same hull: azimuth units, which are fins too, hold the course; the rudder's does not."""
     assert first_guess(GUNNERUS, "g", "g.toml").growth < 0
-    found = first_guess(replace(GUNNERUS, propulsor="propeller-rudder"), "g", "g.toml")
-    assert found.growth > 0
-    assert "UNSTABLE" in found.text
+    proposal = first_guess(replace(GUNNERUS, propulsor="propeller-rudder"), "g", "g.toml")
+    assert proposal.growth > 0
+    assert "UNSTABLE" in proposal.text
 
 
 def test_growth_is_that_of_a_small_yaw() -> None:
     """A pull of 0.01 deg/s left to itself shrinks as the number says."""
-    found = first_guess(MARINER, "m", "m.toml")
+    proposal = first_guess(MARINER, "m", "m.toml")
     log = perform(
-        found.vessel,
-        [Zigzag(n_rpm=60 * found.n, angle_deg=0.01, execute_heading_deg=90, duration=400)],
+        proposal.vessel,
+        [Zigzag(n_rpm=60 * proposal.n, angle_deg=0.01, execute_heading_deg=90, duration=400)],
         step=1.0,
     )
     r = log["r"].to_numpy()  # towards the steady rate of so little helm, at the rate of the slowest root
     left = np.abs(r - r[-1])[[100, 160]]
-    assert np.log(left[1] / left[0]) / 60 == pytest.approx(found.growth, rel=0.1)
+    assert np.log(left[1] / left[0]) / 60 == pytest.approx(proposal.growth, rel=0.1)
 
 
 @pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
@@ -95,9 +95,9 @@ def test_every_number_says_where_it_comes_from(propulsor: str) -> None:
 
 def test_a_written_first_guess_loads(tmp_path: Path) -> None:
     file = tmp_path / "ship.toml"
-    found = first_guess(KVLCC2, 'a "quoted" ship', str(file))
-    file.write_text(found.text)
-    assert load_vessel(str(file)).digest == found.vessel.digest
+    proposal = first_guess(KVLCC2, 'a "quoted" ship', str(file))
+    file.write_text(proposal.text)
+    assert load_vessel(str(file)).digest == proposal.vessel.digest
     assert load_vessel(str(file)).name == 'a "quoted" ship'
 
 
@@ -112,8 +112,8 @@ def test_a_written_first_guess_loads(tmp_path: Path) -> None:
     ],
 )
 def test_thrust_at_the_service_rpm_balances_the_resistance(given: Particulars) -> None:
-    found = first_guess(given, "ship", "ship.toml")
-    assert 60 * found.n == pytest.approx(given.rpm, rel=0.04)  # the air's drag is not in the balance
+    proposal = first_guess(given, "ship", "ship.toml")
+    assert 60 * proposal.n == pytest.approx(given.rpm, rel=0.04)  # the air's drag is not in the balance
 
 
 def test_the_screw_of_kvlcc2_follows_from_speed_rpm_and_diameter() -> None:

@@ -79,7 +79,7 @@ class Question:
     sentence: str
 
 
-def unit_said(name: str, si: str) -> str | None:
+def unit_in_name(name: str, si: str) -> str | None:
     """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
 
     A unit is in brackets, or it is the last part or the last two parts of a name.
@@ -93,9 +93,11 @@ def unit_said(name: str, si: str) -> str | None:
         ends.append("rpm" if "rpm" in bare.lower() else "rps")
     if si in ("N", "N m") and (force := re.search(r"[kK]?N[mM]?$", bare)):  # `thrust_kN` is cut before the N
         ends = [force[0]]
-    for said in [*reversed(inside), *ends]:
+    for candidate in [*reversed(inside), *ends]:
         for unit, expected in UNIT_WORDS.items():
-            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(expected, said.strip().lower()):
+            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(
+                expected, candidate.strip().lower()
+            ):
                 return unit
     return None
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_said
+from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
 from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
@@ -117,8 +117,8 @@ def _others(state: State) -> None:
         speed, angle = min(pairs, key=_wind_order)
         kinds = {wind_kind(speed), wind_kind(angle)} - {""}
         kind = kinds.pop() if len(kinds) == 1 else ""
-        said = f"the names say {kind}" if kind else "the log does not show whether it is true or apparent"
-        state.suggest("V_w", speed, unit_said(speed, "m/s") or "m/s", 0.5, f"by its name; {said}")
+        reason = f"the names say {kind}" if kind else "the log does not show whether it is true or apparent"
+        state.suggest("V_w", speed, unit_in_name(speed, "m/s") or "m/s", 0.5, f"by its name; {reason}")
         way = "from" if "towards" not in angle.lower() else "towards"
         custom = "" if "from" in parts_of(angle) or way == "towards" else ", as is usual at sea"
         relative: dict[str, Any] = {"relative": True} if kind == "apparent" else {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.words import fits, is_order, parts_of, side_of
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, named, steers
@@ -75,17 +75,17 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
 
 def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
     """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
-    found: dict[str, tuple[float, str]] = {}
+    orders: dict[str, tuple[float, str]] = {}
     for signal in signals:
         for name in state.called(signal):
             score = fits(name)[signal]
             others = max((value for meaning, value in fits(name).items() if meaning not in signals), default=0.0)
-            if score >= others and score > found.get(name, (0.0, ""))[0] and np.ptp(state.columns[name]) >= 0:
-                found[name] = (score, signal)
+            if score >= others and score > orders.get(name, (0.0, ""))[0] and np.ptp(state.columns[name]) >= 0:
+                orders[name] = (score, signal)
     groups: dict[tuple[str | None, str], list[str]] = {}
-    for name in sorted(found, key=lambda one: (is_order(one), -found[one][0])):
+    for name in sorted(orders, key=lambda one: (is_order(one), -orders[one][0])):
         number = next((part for part in reversed(parts_of(name)) if part.isdigit()), None)
-        groups.setdefault((side_of(name) or number, found[name][1]), []).append(name)
+        groups.setdefault((side_of(name) or number, orders[name][1]), []).append(name)
     chosen = []
     sided = any(side is not None for side, _ in groups)
     for (side, signal), names in groups.items():
@@ -126,8 +126,8 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
             if SIGNALS[signal].shaft:
                 unit, confidence, why, extra = _shaft_unit(state, name)
             else:
-                said = unit_said(name, SIGNALS[signal].unit)
-                unit, confidence, extra = likely_unit(state, name, signal), 0.9 if said else 0.7, {}
+                written = unit_in_name(name, SIGNALS[signal].unit)
+                unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
             state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
@@ -140,20 +140,22 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
     """
     values = state.columns[name]
     top = float(np.abs(values).max())
-    said = unit_said(name, "rev/s")
+    written = unit_in_name(name, "rev/s")
     why = f"by its name; up to {top:.4g}"
-    if said == "%":
+    if written == "%":
         state.ask(("n",), f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100")
         return "rpm", 0.3, f"{why} per cent of a shaft speed that the log does not say", {"factor": 1.0}
     off = {unit: _off_advance(state, values, unit) for unit in ("rpm", "rev/s")}
     by_motion = min(off, key=lambda unit: off[unit])
-    if said is not None:
-        far = off.get(said, 1.0)
-        if said in off and far > NEAR and off[by_motion] < NEAR / 3 and by_motion != said:
-            sentence = f"{name!r} says {said}, but the ship would run {far:.0f} times too far or too little in a turn"
+    if written is not None:
+        far = off.get(written, 1.0)
+        if written in off and far > NEAR and off[by_motion] < NEAR / 3 and by_motion != written:
+            sentence = (
+                f"{name!r} says {written}, but the ship would run {far:.0f} times too far or too little in a turn"
+            )
             state.find("unit of the shaft", (name,), 0.6, f"{sentence} of the shaft: it is read in {by_motion}")
             return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
-        return said, 0.9, why, {}
+        return written, 0.9, why, {}
     if top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
         state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")
     if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
@@ -190,9 +192,9 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     """Return the unit of a column taken as this signal: the unit in its name, else the likely one by its magnitude."""
     row = SIGNALS[signal]
     large = row.read_as_SI is not None and float(np.abs(state.columns[name]).max()) > row.read_as_SI
-    said = unit_said(name, row.unit)
-    if said is not None and said != "%":
-        return said
+    written = unit_in_name(name, row.unit)
+    if written is not None and written != "%":
+        return written
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 

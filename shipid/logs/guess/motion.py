@@ -10,7 +10,7 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, to_si
@@ -203,16 +203,20 @@ def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = 
     """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
     units = UNITS["m/s"]
     unit = min(units, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
-    said = unit_said(sources[0], "m/s")
-    if said is not None and abs(fit.scale / units[said] - 1) < OFF_UNIT and abs(fit.scale / units[unit] - 1) > 0.05:
-        unit = said
-    if unit != (said or ("m/s" if not quiet else unit)) and abs(fit.scale / units[unit] - 1) < 0.08:
-        word = "knots" if "kn" in (unit, said) else "speed unit"
-        wanted = f"the name says {said}" if said else "nothing says so"
+    written = unit_in_name(sources[0], "m/s")
+    if (
+        written is not None
+        and abs(fit.scale / units[written] - 1) < OFF_UNIT
+        and abs(fit.scale / units[unit] - 1) > 0.05
+    ):
+        unit = written
+    if unit != (written or ("m/s" if not quiet else unit)) and abs(fit.scale / units[unit] - 1) < 0.08:
+        word = "knots" if "kn" in (unit, written) else "speed unit"
+        wanted = f"the name says {written}" if written else "nothing says so"
         sentence = f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})"
         state.find(word, sources, 0.95, sentence)
-    elif said is not None and abs(fit.scale / units[unit] - 1) >= 0.08:
-        unit = said
+    elif written is not None and abs(fit.scale / units[unit] - 1) >= 0.08:
+        unit = written
     return unit, abs(fit.scale / units[unit] - 1) > 0.004
 
 
@@ -265,7 +269,9 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
                 fit = evidence.fit(seen[keep], change[keep])
                 score = 0.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
                 cost = (
-                    (fit.left + 0.003) / (0.3 + score) * (0.7 if turn == (unit_said(course, "rad") or "deg") else 1.0)
+                    (fit.left + 0.003)
+                    / (0.3 + score)
+                    * (0.7 if turn == (unit_in_name(course, "rad") or "deg") else 1.0)
                 )
                 known = min(abs(fit.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
                 if (
@@ -320,9 +326,9 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     if name not in called and not name.isdecimal():
         other = f", which {called[0]!r} is not" if called else ""
         state.find("yaw rate under another name", (name,), confidence, f"{name!r} is the rate of the heading{other}")
-    said = unit_said(name, "rad/s")
-    if said is not None and said != unit:
-        state.find("unit of r", (name,), confidence, f"{name!r} says {said}, but is in {unit}")
+    written = unit_in_name(name, "rad/s")
+    if written is not None and written != unit:
+        state.find("unit of r", (name,), confidence, f"{name!r} says {written}, but is in {unit}")
     state.suggest("r", name, unit, confidence, why, **extra)
     state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
 
@@ -345,5 +351,5 @@ def _rates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, s
 
 def _rate_by_name(state: State) -> None:
     for name in state.called("r")[:1]:
-        unit = unit_said(name, "rad/s") or "deg/s"
+        unit = unit_in_name(name, "rad/s") or "deg/s"
         state.suggest("r", name, unit, 0.4, "by its name; the ship turns too little to see unit and sign")

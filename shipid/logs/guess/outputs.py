@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.logs.guess.clues import STRONG, State, unit_said
+from shipid.logs.guess.clues import STRONG, State, unit_in_name
 from shipid.logs.guess.commands import unique
 from shipid.logs.guess.unused import wrong_unit
 from shipid.logs.guess.words import fits, is_order, side_of
@@ -16,9 +16,9 @@ def reserve_outputs(state: State) -> dict[str, str]:
     chosen: dict[str, str] = {}
     for signal, row in named("output").items():
         for name in state.called(signal):
-            scores, said = fits(name), unit_said(name, row.unit)
+            scores, unit = fits(name), unit_in_name(name, row.unit)
             rivals = [score for meaning, score in scores.items() if meaning != signal]
-            clear = said not in (None, "%") or max(rivals, default=0.0) < scores[signal]
+            clear = unit not in (None, "%") or max(rivals, default=0.0) < scores[signal]
             clear = clear and scores[signal] >= STRONG and wrong_unit(name, row.unit) is None
             if clear and not is_order(name) and np.ptp(state.columns[name]) > 0 and name not in chosen:
                 chosen[name] = signal
@@ -32,12 +32,12 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
     for name, signal in chosen.items():
         row = SIGNALS[signal]
         component = side_of(name) or _component(state, signal)
-        said = unit_said(name, row.unit)
-        if said is None:
+        unit = unit_in_name(name, row.unit)
+        if unit is None:
             largest = float(np.abs(state.columns[name]).max())
             state.ask((signal,), f"in which unit is {name!r}, up to {largest:.4g}? {row.unit} is a guess")
         why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-        state.suggest(unique(f"{component}.{signal}", used), name, said or row.unit, 0.8 if said else 0.4, why)
+        state.suggest(unique(f"{component}.{signal}", used), name, unit or row.unit, 0.8 if unit else 0.4, why)
 
 
 def _component(state: State, signal: str) -> str:

@@ -13,7 +13,7 @@ from pymap3d import geodetic2ned
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.words import fits, is_order, parts_of
 from shipid.logs.mapping import to_si
@@ -129,12 +129,12 @@ def _best(
                 continue
             same = complex(np.sum(track * turned)) / size
             mirrored = complex(np.sum(track * np.conj(turned))) / size
-            said = unit_said(heading, "rad")
+            written = unit_in_name(heading, "rad")
             named = fits(heading).get("psi", 0.0)
             misfit = 1 - max(abs(same), abs(mirrored))
             quarter = abs(same) >= abs(mirrored) and abs(np.angle(same)) > np.pi / 4  # an acceleration looks like that
             cost = (misfit + 0.003 + 0.1 * quarter) / (spread + 0.01) / (0.3 + score) / (0.3 + named)
-            cost *= 0.6 if unit == (said or "deg") else 1.0
+            cost *= 0.6 if unit == (written or "deg") else 1.0
             cost *= 1.0 if rated is None else 0.02 + rated.get(heading, 1.0)
             if best is None or cost < best.cost:
                 best = Pose(north, east, heading, unit, on_globe, same, mirrored, cost)

@@ -409,13 +409,13 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
     """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
     inside = re.search(r"[\[(]\s*(ms|msec|s|sec|min|h)\s*[\])]", name.lower())
-    said = inside.group(1) if inside else ""
-    if said in ("min", "h"):
-        return {"min": 60.0, "h": 3600.0}[said], said
+    written = inside.group(1) if inside else ""
+    if written in ("min", "h"):
+        return {"min": 60.0, "h": 3600.0}[written], written
     steps = np.diff(values)
-    counting = not said and np.median(steps) >= 20 and not np.any(values % 1)
+    counting = not written and np.median(steps) >= 20 and not np.any(values % 1)
     last = parts_of(name)[-1:] or ("",)
-    if said.startswith("ms") or (not said and (last[0] in ("ms", "millis", "msec") or counting)):
+    if written.startswith("ms") or (not written and (last[0] in ("ms", "millis", "msec") or counting)):
         return 1e-3, "ms"
     return 1.0, "s"
 

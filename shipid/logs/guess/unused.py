@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from shipid.logs.guess.clues import UNIT_WORDS, State, unit_said
+from shipid.logs.guess.clues import UNIT_WORDS, State, unit_in_name
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import INPUTS, UNITS
 from shipid.physics.signals import SIGNALS
@@ -60,8 +60,8 @@ def _unit(meaning: str) -> str:
 
 
 def wrong_unit(name: str, si: str) -> str | None:
-    """The unit that stands in brackets in a name, where it is a known one that does not convert to the SI unit."""
-    if si not in UNITS or unit_said(name, si) is not None:
+    """The unit in brackets in a name, where it is known and does not convert to the SI unit."""
+    if si not in UNITS or unit_in_name(name, si) is not None:
         return None
     inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
     known = (

@@ -264,7 +264,7 @@ def _covered(phrase: tuple[str, ...], parts: list[str], content: list[str], asid
     if not set(phrase) <= set(parts):
         return 0.0
     left = [part for part in content if part not in phrase]
-    said = sum(len(word) for word in phrase)
+    letters = sum(len(word) for word in phrase)
     extra = sum(len(part) for part in left)
     known_aside = 0.02 * sum(part in aside and part not in phrase for part in parts)
-    return said / (said + extra) - known_aside
+    return letters / (letters + extra) - known_aside

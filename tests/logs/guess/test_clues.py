@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_said
+from shipid.logs.guess.clues import State, unit_in_name
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ from shipid.logs.guess.clues import State, unit_said
     ],
 )
 def test_a_unit_is_read_only_where_the_column_can_have_it(name: str, si: str, unit: str | None) -> None:
-    assert unit_said(name, si) == unit
+    assert unit_in_name(name, si) == unit
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What was put into a log is named, and nothing else; every documented trap of the recorded sets is found."""
+"""What was put into a log is named, and nothing else; every documented trap of the recorded sets is detected."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.guess.clues import unit_said
+from shipid.logs.guess.clues import unit_in_name
 from shipid.logs.guess.columns import Guess, guess
 from tests.logs.simulated import KNOT, Change, as_bridge, si_log
 
@@ -18,9 +18,9 @@ def guessed(log: pd.DataFrame, folder: Path) -> Guess:
     return guess(folder / "log.csv")
 
 
-def told(found: Guess) -> dict[str, tuple[str, str, int, str]]:
+def described(proposal: Guess) -> dict[str, tuple[str, str, int, str]]:
     """Column of the dataset -> source, unit, sign, frame."""
-    return {c.name: (c.source, c.unit, c.extra.get("sign", 1), c.extra.get("frame", "body")) for c in found.columns}
+    return {c.name: (c.source, c.unit, c.extra.get("sign", 1), c.extra.get("frame", "body")) for c in proposal.columns}
 
 
 CLEAN = {
@@ -37,10 +37,10 @@ CLEAN = {
 
 @pytest.mark.parametrize(("seed", "every"), [(0, 1), (0, 5), (1, 5), (2, 10), (3, 20)])
 def test_a_clean_log_has_no_defect(seed: int, every: int, tmp_path: Path) -> None:
-    found = guessed(as_bridge(si_log(seed, every)).round(4), tmp_path)
-    assert found.findings == ()
-    assert told(found) == CLEAN
-    assert all(column.confidence > 0.8 and column.evidence for column in found.columns)
+    proposal = guessed(as_bridge(si_log(seed, every)).round(4), tmp_path)
+    assert proposal.findings == ()
+    assert described(proposal) == CLEAN
+    assert all(column.confidence > 0.8 and column.evidence for column in proposal.columns)
 
 
 def spread(log: pd.DataFrame) -> pd.DataFrame:
@@ -96,7 +96,7 @@ def offset(log: pd.DataFrame) -> pd.DataFrame:
 
 
 DEFECTS: dict[str, tuple[Change, str, str | None, tuple[object, ...] | None]] = {
-    # defect -> how it is put in, the kind that must be named, the column it changes, what is said of that
+    # defect -> how it is put in, the kind that must be named, the column it changes, what it then is
     "earth": (earth, "earth-fixed velocities", "u", ("u", "m/s", 1, "earth")),
     "rate": (
         lambda f: f.rename(columns={"r": "p"}).assign(r=np.sin(f["time"] / 3)),
@@ -174,26 +174,26 @@ BESIDE = {  # what cannot but come with a defect
 
 @pytest.mark.parametrize("name", DEFECTS)
 def test_a_defect_is_named(name: str, tmp_path: Path) -> None:
-    change, kind, column, said = DEFECTS[name]
-    found = guessed(change(as_bridge(si_log())), tmp_path)
-    assert kind in found.kinds
-    assert found.kinds - BESIDE.get(name, set()) == {kind}
+    change, kind, column, expected = DEFECTS[name]
+    proposal = guessed(change(as_bridge(si_log())), tmp_path)
+    assert kind in proposal.kinds
+    assert proposal.kinds - BESIDE.get(name, set()) == {kind}
     if column is not None:
-        assert told(found)[column] == said
-    finding = next(entry for entry in found.findings if entry.kind == kind)
+        assert described(proposal)[column] == expected
+    finding = next(entry for entry in proposal.findings if entry.kind == kind)
     assert 0.2 <= finding.confidence <= 1.0
     assert "\n" not in finding.sentence
 
 
 def test_gunnerus(gunnerus_log: Path) -> None:
-    """Every trap of the description that a log can betray: places as it gives them, sizes within its own scatter."""
-    found = guess(gunnerus_log)
-    columns = told(found)
+    """Every trap of the description that a log can betray: places as it gives them, sizes within the scatter."""
+    proposal = guess(gunnerus_log)
+    columns = described(proposal)
     assert columns["psi"] == ("psi", "deg", 1, "body")
     assert columns["u"] == ("u", "m/s", 1, "body")
     assert columns["r"] == ("r", "deg/s", 1, "body")
     assert columns["thruster.alpha"] == ("Azi", "deg", 1, "body")  # positive turns to port
-    findings = {finding.kind: finding for finding in found.findings}
+    findings = {finding.kind: finding for finding in proposal.findings}
     assert set(findings) == {
         "interpolation across 360",
         "factor",
@@ -234,23 +234,23 @@ RUNS = [
     "run", [*RUNS[::3], *(pytest.param(run, marks=pytest.mark.slow) for run in RUNS if run not in RUNS[::3])]
 )
 def test_hsva(run: str, data_folder: Path) -> None:
-    """The names of the publication are seen through, and the same columns found where there are no names at all."""
+    """The names of the publication are seen through, and the same columns result where there are no names at all."""
     log = data_folder / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat"
     if not log.is_file():
         pytest.skip(f"no {log.name} in the data folder")
-    found = guess(log, tuple(HSVA.split(",")))
-    assert found.sniffed.form["encoding"] == "cp1252"
-    assert (found.sniffed.form["separator"], found.sniffed.form["skip_rows"]) == ("whitespace", 4)
-    columns = told(found)
+    proposal = guess(log, tuple(HSVA.split(",")))
+    assert proposal.sniffed.form["encoding"] == "cp1252"
+    assert (proposal.sniffed.form["separator"], proposal.sniffed.form["skip_rows"]) == ("whitespace", 4)
+    columns = described(proposal)
     assert columns["u"] == ("u", "m/s", 1, "earth")
     assert columns["v"] == ("v", "m/s", 1, "earth")
     assert columns["r"] == ("p", "deg/s", 1, "body")
     assert columns["rudder.delta"] == ("delta", "deg", -1, "body")  # positive to port there
     assert columns["propeller.n"] == ("rev", "rev/s", 1, "body")
-    assert found.kinds == {"earth-fixed velocities", "yaw rate under another name", "wrong sign of rudder"}
+    assert proposal.kinds == {"earth-fixed velocities", "yaw rate under another name", "wrong sign of rudder"}
     if run not in RUNS[::3]:
         return
-    numbered = {name: entry[0] for name, entry in told(guess(log)).items()}
+    numbered = {name: entry[0] for name, entry in described(guess(log)).items()}
     assert numbered == {"north": "2", "east": "3", "psi": "4", "u": "5", "v": "6", "r": "7", "rudder.delta": "9"}
 
 
@@ -290,11 +290,11 @@ WRITTEN: dict[str, tuple[Callable[[pd.DataFrame, Path], object], dict[str, objec
 def test_how_it_is_written(name: str, tmp_path: Path) -> None:
     write, form = WRITTEN[name]
     write(as_bridge(si_log()).iloc[:1200], tmp_path / "log.csv")
-    found = guess(tmp_path / "log.csv")
-    assert {key: found.sniffed.form[key] for key in form} == form
-    told_now = {column: (source.partition(" [")[0], *rest) for column, (source, *rest) in told(found).items()}
-    assert told_now == CLEAN
-    assert found.findings == ()
+    proposal = guess(tmp_path / "log.csv")
+    assert {key: proposal.sniffed.form[key] for key in form} == form
+    columns = {column: (source.partition(" [")[0], *rest) for column, (source, *rest) in described(proposal).items()}
+    assert columns == CLEAN
+    assert proposal.findings == ()
 
 
 def test_position_on_the_earth_with_speed_and_course(tmp_path: Path) -> None:
@@ -311,7 +311,7 @@ def test_position_on_the_earth_with_speed_and_course(tmp_path: Path) -> None:
             "rot": log["r"] * 60.0,
         }
     )
-    columns = {name: entry[:2] for name, entry in told(guessed(globe, tmp_path)).items()}
+    columns = {name: entry[:2] for name, entry in described(guessed(globe, tmp_path)).items()}
     assert columns == {
         "latitude": ("lat", "deg"),
         "longitude": ("lon", "deg"),
@@ -332,15 +332,15 @@ def test_a_turn_while_the_logger_was_off_is_no_interpolation_across_360(tmp_path
     log = as_bridge(si_log()).round(4)
     rows, pauses = np.arange(len(log)), len(log) // 10
     turned = (log["psi"] + 200.0 * (rows // pauses)) % 360.0
-    found = guessed(log.assign(psi=turned, time=log["time"] + 300.0 * (rows // pauses)), tmp_path)
-    assert "interpolation across 360" not in found.kinds
+    proposal = guessed(log.assign(psi=turned, time=log["time"] + 300.0 * (rows // pauses)), tmp_path)
+    assert "interpolation across 360" not in proposal.kinds
 
 
 @pytest.mark.parametrize(
     ("name", "unit"), [("Wind kn", "kn"), ("wind_kn", "kn"), ("Wind [kn]", "kn"), ("Wind", None), ("Wind speed", None)]
 )
 def test_a_name_says_its_unit(name: str, unit: str | None) -> None:
-    assert unit_said(name, "m/s") == unit
+    assert unit_in_name(name, "m/s") == unit
 
 
 @pytest.mark.parametrize(
@@ -361,8 +361,8 @@ def test_names_say_which_wind(
 ) -> None:
     log = as_bridge(si_log())
     wind = {name: np.random.default_rng(i).uniform(3.0, 8.0, len(log)) for i, name in enumerate(names)}
-    found = {column.name: column for column in guessed(log.assign(**wind), tmp_path).columns}
-    assert (found["V_w"].source, found["beta_w"].source) == taken
-    assert found["beta_w"].extra.get("relative") is relative
+    proposed = {column.name: column for column in guessed(log.assign(**wind), tmp_path).columns}
+    assert (proposed["V_w"].source, proposed["beta_w"].source) == taken
+    assert proposed["beta_w"].extra.get("relative") is relative
     silent = not any(word in " ".join(taken) for word in ("AW", "Apparent", "rel", "true", "TWS"))
-    assert ("does not show" in found["V_w"].evidence) is silent
+    assert ("does not show" in proposed["V_w"].evidence) is silent

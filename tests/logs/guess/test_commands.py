@@ -25,12 +25,12 @@ def chosen(columns: dict[str, np.ndarray], quiet: bool = False) -> State:
     return state
 
 
-def told(state: State) -> dict[str, tuple[str, str, int]]:
+def described(state: State) -> dict[str, tuple[str, str, int]]:
     return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions}
 
 
 @pytest.mark.parametrize(
-    ("columns", "expected", "found"),
+    ("columns", "expected", "kinds"),
     [
         ({"rudder": RUDDER}, {"rudder.delta": ("rudder", "deg", 1)}, set()),
         ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"wrong sign of rudder"}),
@@ -42,11 +42,11 @@ def told(state: State) -> dict[str, tuple[str, str, int]]:
     ids=["starboard", "port", "rad", "azimuth", "azimuth to starboard", "no name"],
 )
 def test_what_steers(
-    columns: dict[str, np.ndarray], expected: dict[str, tuple[str, str, int]], found: set[str]
+    columns: dict[str, np.ndarray], expected: dict[str, tuple[str, str, int]], kinds: set[str]
 ) -> None:
     state = chosen(columns)
-    assert told(state) == expected
-    assert {finding.kind for finding in state.findings} == found
+    assert described(state) == expected
+    assert {finding.kind for finding in state.findings} == kinds
 
 
 def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
@@ -55,9 +55,11 @@ def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
     assert "its sign is not known" in column.evidence
 
 
-def test_both_sides_are_commands_of_their_own() -> None:
+def test_both_sides_are_separate_commands() -> None:
     state = chosen({"rudder_port": RUDDER, "rudder_stbd": RUDDER, "rpm_port": RPM, "rpm_stbd": RPM})
-    assert list(told(state)) == ["port.delta", "starboard.delta", "port.n", "starboard.n"] or list(told(state)) == [
+    assert list(described(state)) == ["port.delta", "starboard.delta", "port.n", "starboard.n"] or list(
+        described(state)
+    ) == [
         "rudder_port.delta",
         "rudder_starboard.delta",
         "port.n",
@@ -67,13 +69,13 @@ def test_both_sides_are_commands_of_their_own() -> None:
 
 def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
     state = chosen({"rudder order": RUDDER, "rudder angle": RUDDER})
-    assert told(state)["rudder.delta"][0] == "rudder angle"
+    assert described(state)["rudder.delta"][0] == "rudder angle"
     (finding,) = state.findings
     assert finding.kind == "several columns for one command"
 
 
 @pytest.mark.parametrize(
-    ("name", "values", "unit", "asked", "found"),
+    ("name", "values", "unit", "asked", "kinds"),
     [
         ("shaft speed", RPM, "rpm", False, set()),
         ("shaft speed", N, "rev/s", False, set()),
@@ -82,13 +84,13 @@ def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
         ("shaft speed [%]", RPM / 2.5, "rpm", True, set()),
         ("shaft speed", RPM / 2.5, "rpm", True, set()),
     ],
-    ids=["rpm", "rev/s", "said", "wrongly said", "%", "% not said"],
+    ids=["rpm", "rev/s", "rpm in the name", "wrong unit in the name", "%", "% not in the name"],
 )
-def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bool, found: set[str]) -> None:
+def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bool, kinds: set[str]) -> None:
     state = chosen({"rudder": RUDDER, name: values})
-    assert told(state)["propeller.n"][:2] == (name, unit)
+    assert described(state)["propeller.n"][:2] == (name, unit)
     assert [question.about for question in state.questions] == [("n",)] * asked
-    assert {finding.kind for finding in state.findings} == found
+    assert {finding.kind for finding in state.findings} == kinds
 
 
 def test_small_rudder_angles_do_not_make_a_slow_shaft() -> None:
@@ -98,7 +100,7 @@ def test_small_rudder_angles_do_not_make_a_slow_shaft() -> None:
         assert state.psi is not None
         state.psi, state.r = share * state.psi, share * R
         choose_commands(state)
-        assert told(state)["propeller.n"][:2] == ("n", "rev/s")
+        assert described(state)["propeller.n"][:2] == ("n", "rev/s")
 
 
 def test_a_unit_is_the_one_in_the_name_or_else_the_likely_one() -> None:

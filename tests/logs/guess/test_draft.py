@@ -1,4 +1,4 @@
-"""A draft is a mapping that imports, says why, and finds the manoeuvres that were sailed."""
+"""A draft is a mapping that imports, says why, and lists the manoeuvres of the log."""
 
 from pathlib import Path
 
@@ -39,9 +39,9 @@ def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
         u=log["u"] / KNOT, v=log["v"] / KNOT, rudder=-log["rudder"], N=log["N"] + 150.0 * (log["time"] > 700)
     )
     log.rename(columns={"r": "p"}).to_csv(tmp_path / "log.csv", index=False)
-    found = guess(tmp_path / "log.csv")
-    assert found.kinds == {"knots", "wrong sign of rudder", "position jumps", "yaw rate under another name"}
-    mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
+    proposal = guess(tmp_path / "log.csv")
+    assert proposal.kinds == {"knots", "wrong sign of rudder", "position jumps", "yaw rate under another name"}
+    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
     dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
     assert check_dataset(dataset)["ok"].all()
     assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.8
@@ -66,11 +66,11 @@ def test_segments_are_the_schedule(tmp_path: Path) -> None:
 
 
 def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) -> None:
-    """Each zigzag and turning circle of the trial's log is found within its span, and no other but the rescue's."""
+    """Each zigzag and turning circle of the trial's log is detected within its span, and no other but the rescue's."""
     mapping = read_mapping("gunnerus-2022")
-    found = segment_log(mapping, gunnerus_log)
+    segments = segment_log(mapping, gunnerus_log)
     for word, kind in (("ZZ", "zigzag"), ("TC", "turning")):
-        mine = [segment for segment in found if segment.manoeuvre == kind]
+        mine = [segment for segment in segments if segment.manoeuvre == kind]
         spans = [(s.start, s.end) for s in mapping.segment if s.run.startswith(word)]
         for start, end in spans:
             inside = [max(0.0, min(end, s.end) - max(start, s.start)) for s in mine]
@@ -120,9 +120,9 @@ def test_sentences_of_nmea(tmp_path: Path) -> None:
     """A bridge log is known by itself: its draft imports, with steps of its fixes and true wind."""
     text, motion = bridge_log("fix", 0.0, si_log(0, 10))
     (tmp_path / "bridge.nmea").write_text(text)
-    found = guess(tmp_path / "bridge.nmea")
-    assert found.findings == ()
-    mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
+    proposal = guess(tmp_path / "bridge.nmea")
+    assert proposal.findings == ()
+    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
     frame = import_log(read_mapping(mapping).model_copy(update={"segment": ()}), tmp_path / "bridge.nmea").frame
     assert len(frame) == len(motion)
     np.testing.assert_allclose(frame["u"], motion["u"], atol=1e-4)

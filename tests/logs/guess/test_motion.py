@@ -15,7 +15,7 @@ BODY = U + 1j * V
 GROUND = BODY * np.exp(1j * PSI)
 
 
-def told(state: State) -> dict[str, tuple[str, str, int]]:
+def described(state: State) -> dict[str, tuple[str, str, int]]:
     """Column of the dataset -> source, unit, sign."""
     return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions}
 
@@ -50,11 +50,11 @@ VELOCITIES: dict[str, tuple[dict[str, np.ndarray], dict[str, tuple[str, str, int
 
 @pytest.mark.parametrize("name", VELOCITIES)
 def test_velocities(name: str) -> None:
-    columns, expected, found = VELOCITIES[name]
+    columns, expected, findings = VELOCITIES[name]
     state = state_with_pose(columns)
     choose_velocities(state)
-    assert told(state) == expected
-    assert kinds(state) == found
+    assert described(state) == expected
+    assert kinds(state) == findings
     if expected:
         assert state.velocity is not None
         assert state.body is not None
@@ -72,7 +72,7 @@ def test_a_factor_is_seen_with_its_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "expected", "found"),
+    ("columns", "expected", "findings"),
     [
         ({"rot": np.degrees(R)}, ("rot", "deg/s", 1), set()),
         ({"rot": -R}, ("rot", "rad/s", -1), {"wrong sign of r"}),
@@ -83,11 +83,11 @@ def test_a_factor_is_seen_with_its_error() -> None:
     ],
     ids=["deg/s", "sign", "unit", "misleading", "none", "roll"],
 )
-def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int] | None, found: set[str]) -> None:
+def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int] | None, findings: set[str]) -> None:
     state = state_with_pose(columns)
     choose_yaw_rate(state)
-    assert told(state).get("r") == expected
-    assert kinds(state) == found
+    assert described(state).get("r") == expected
+    assert kinds(state) == findings
     if expected is not None:
         assert state.r is not None
         np.testing.assert_allclose(state.r, R, atol=1e-12)

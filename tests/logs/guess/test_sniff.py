@@ -120,7 +120,7 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"", "the file is empty"),
         (b"\x00\x01\x02 binary", "a binary file of unknown format"),
@@ -134,9 +134,9 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         (text(table=TABLE.assign(time=1.0, N=1.0, psi=1.0).rename(columns={"time": "x"})).encode(), "none rises"),
     ],
 )
-def test_what_is_no_log_is_one_sentence(content: bytes, said: str, tmp_path: Path) -> None:
+def test_what_is_no_log_is_one_sentence(content: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_bytes(content)
-    with pytest.raises(DataError, match=rf"log\.csv.*{said}"):
+    with pytest.raises(DataError, match=rf"log\.csv.*{message}"):
         sniff(tmp_path / "log.csv")
 
 
@@ -157,7 +157,7 @@ def log_of(tmp_path: Path, lines: list[str], name: str = "log.csv") -> Path:
     return file
 
 
-def test_rows_that_repeat_the_row_before_are_dropped_and_said(tmp_path: Path) -> None:
+def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
     rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
     twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
     sniffed = sniff(log_of(tmp_path, ["time,x,y", *twice]))
@@ -184,7 +184,7 @@ def test_a_rounded_clock_keeps_its_rate_where_rows_are_lost(tmp_path: Path, seed
 
 
 @pytest.mark.parametrize("word", ["-999", "9999", "-99.0"])
-def test_a_number_for_missing_values_is_said_and_not_taken(tmp_path: Path, word: str) -> None:
+def test_a_number_for_missing_values_is_reported_and_not_taken(tmp_path: Path, word: str) -> None:
     rows = [f"{k},{np.sin(k):.3f},{360 * ((0.01 * k) % 1):.1f}" for k in range(80)]
     rows[40] = f"40,{word},{word if word != '-99.0' else '144.0'}"
     sniffed = sniff(log_of(tmp_path, ["time,x,heading", *rows]))

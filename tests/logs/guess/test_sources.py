@@ -28,10 +28,10 @@ def folder_of(path: Path, *names: str) -> Path:
 def test_a_folder_is_one_source_that_imports(tmp_path: Path) -> None:
     logs = folder_of(tmp_path / "logs", "day1/ZZ20-20_1.csv", "day2/TC25_1.csv", "day2/run3.csv")
     (logs / "day2" / "notes.csv").write_text("nothing to see\nhere\n")
-    found = guess(logs)
-    assert found.source.pattern == "**/*.csv"
-    assert list(found.source.skipped) == ["day2/notes.csv"]
-    mapping = write_new(draft_mapping(found), tmp_path / "draft.toml")
+    proposal = guess(logs)
+    assert proposal.source.pattern == "**/*.csv"
+    assert list(proposal.source.skipped) == ["day2/notes.csv"]
+    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
     dataset = import_log(read_mapping(mapping), logs)
     assert dataset.runs == ["day1/ZZ20-20_1", "day2/TC25_1", "day2/run3"]
     assert dataset.metadata["manoeuvres"] == {"day1/ZZ20-20_1": "zigzag", "day2/TC25_1": "turning"}

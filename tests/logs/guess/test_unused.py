@@ -11,7 +11,7 @@ from tests.logs.simulated import as_bridge, si_log
 
 
 @pytest.mark.parametrize(
-    ("name", "values", "said"),
+    ("name", "values", "message"),
     [
         ("Fuel rate", "noise", "a quantity that a dataset does not take"),
         ("qqxz", "noise", "its name says no known quantity"),
@@ -22,13 +22,13 @@ from tests.logs.simulated import as_bridge, si_log
         ("row", "number", "it holds the numbers of the rows"),
     ],
 )
-def test_a_column_that_is_not_used_says_why(name: str, values: str, said: str, tmp_path: Path) -> None:
+def test_a_column_that_is_not_used_says_why(name: str, values: str, message: str, tmp_path: Path) -> None:
     log = as_bridge(si_log())
     drawn = {"noise": np.random.default_rng(1).normal(size=len(log)), "number": np.arange(len(log))}
     added = drawn.get(values, log.get(values))
     file = tmp_path / "log.csv"
     log.assign(**{name: added}).to_csv(file, index=False)
-    found = guess(file)
-    assert list(found.unused) == [name]
-    assert said in found.unused[name]
-    assert f"# column {name!r} is not used: {found.unused[name]}" in draft_mapping(found, manoeuvres=False)
+    proposal = guess(file)
+    assert list(proposal.unused) == [name]
+    assert message in proposal.unused[name]
+    assert f"# column {name!r} is not used: {proposal.unused[name]}" in draft_mapping(proposal, manoeuvres=False)

@@ -19,7 +19,7 @@ RATE, DRIFT = 0.05, 0.2  # rad/s, rad: of the perfect circle
 DECELERATION, VEER = 0.04, 0.002  # m/s^2, rad/s: of the stop
 
 
-def sailed(t: Array, psi: Array, r: Array, helm: Array, u: Array, v: Array, shaft: Array | None = None) -> Record:
+def made_record(t: Array, psi: Array, r: Array, helm: Array, u: Array, v: Array, shaft: Array | None = None) -> Record:
     """Record with the place integrated from the velocities, to 1e-5 m at the fine step."""
     rates = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
     north, east = (np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t))) for rate in rates)
@@ -77,13 +77,13 @@ def clock(end: float) -> Array:
 def zigzag_10() -> Record:
     t = clock(200.0)
     psi, r, helm = nomoto(t, zigzag_legs(10 * DEGREE, 10 * DEGREE, 8)[0])
-    return sailed(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
+    return made_record(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
 
 
 def circle() -> Record:
     t = clock(250.0)
     psi, r, helm = nomoto(t, [(START, 35 * DEGREE)])
-    return sailed(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
+    return made_record(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
 
 
 def perfect_circle() -> Record:
@@ -102,7 +102,7 @@ def perfect_circle() -> Record:
 def released() -> Record:
     t = clock(250.0)
     psi, r, helm = nomoto(t, [(START, 20 * DEGREE), (110.0, 0.0)])
-    return sailed(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
+    return made_record(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
 
 
 LEVELS = [20, 10, 5, 2, 0, -2, -5, -10, -20, -10, -5, -2, 0, 2, 5, 10, 20]
@@ -112,7 +112,7 @@ HOLD = 100.0
 def stable_spiral() -> Record:
     t = clock(START + HOLD * len(LEVELS))
     psi, r, helm = nomoto(t, [(START + i * HOLD, level * DEGREE) for i, level in enumerate(LEVELS)])
-    return sailed(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
+    return made_record(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
 
 
 RATES = [3, 2, 1, 0.5, 0, -0.5, -1, -2, -3]
@@ -135,7 +135,7 @@ def reverse() -> Record:
         before = level
     r = r * DEGREE
     psi = np.append(0.0, np.cumsum((r[1:] + r[:-1]) / 2 * FINE))
-    return sailed(t, psi, r, unstable_helm(r), SPEED - DRAG * r**2, SWAY * r)
+    return made_record(t, psi, r, unstable_helm(r), SPEED - DRAG * r**2, SWAY * r)
 
 
 def stopped() -> Record:
@@ -144,10 +144,10 @@ def stopped() -> Record:
     since = np.maximum(t - START, 0)
     u = SPEED - DECELERATION * since
     shaft = np.where(t >= START, -1.5, 2.0)
-    return sailed(t, VEER * since, np.where(t >= START, VEER, 0.0), np.zeros_like(t), u, np.zeros_like(t), shaft)
+    return made_record(t, VEER * since, np.where(t >= START, VEER, 0.0), np.zeros_like(t), u, np.zeros_like(t), shaft)
 
 
-SAILED: dict[str, Callable[[], Record]] = {
+RECORDS: dict[str, Callable[[], Record]] = {
     "zigzag": zigzag_10,
     "turning": circle,
     "pull-out": released,
