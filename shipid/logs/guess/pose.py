@@ -283,11 +283,11 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
     """Ask for what neither names nor motion decide: the frame, its mirror image, whether a heading is a course."""
     if course:
         state.ask(("psi",), f"is {best.heading!r} the heading, or the course over ground? By its name it may be either")
-    if not best.on_globe and not clear and (state.numbered or not compass):
+    if not best.on_globe and not clear:
         state.ask(
             ("psi", "north", "east"),
-            f"is {best.north!r} north and does {best.heading!r} count to starboard, or is {best.north!r} east and does "
-            "it count to port? Motion is the same in both; port and starboard change places",
+            f"is {best.north!r} north and does {best.heading!r} count to starboard, or does it count to port, with z "
+            f"upwards, or with {best.north!r} east? Motion is the same in both; port and starboard change places",
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
     unnamed = not compass and not set(parts_of(best.heading)) & YAW

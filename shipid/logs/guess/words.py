@@ -185,12 +185,11 @@ OTHERS = (
 )
 """Phrases of columns that no dataset takes."""
 ORDERS = frozenset(
-    (
         "befehl c cmd command commanded d demand des desired goal oensket onsket ord order ordered ordre ref "
-        "reference req request set setpoint setpunkt setting soll sp target want wanted "
-        "vorgabe sollwert consigne commande ordonne ordonnee demande demandee orden ordenado ordenada consigna mando "
-        "comandado comando comandato comandata ordine ordinato ordinata setpunt gewenst gewenste bevel satt bestilt "
-        "kommando kommandert kommanderet beordret oenskad boervaerde stellbefehl"
+        "reference req request set setpoint setpunkt setting soll sp target want wanted vorgabe sollwert consigne "
+        "commande ordonne ordonnee demande demandee orden ordenado ordenada consigna mando comandado comando "
+        "comandato comandata ordine ordinato ordinata setpunt gewenst gewenste bevel satt bestilt kommando kommandert "
+        "kommanderet beordret oenskad boervaerde stellbefehl"
     ).split()
 )
 """Parts that say what is ordered, not what is."""
@@ -201,14 +200,13 @@ WIND_WORDS = {
 }
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
-    (
-        "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga "
-        "gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
-        "posicion posisjon position raw rel rtk sensor ship signal sim standort t the true val value vessel "
-        "vtg wert gemessen istwert rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie "
-        "medido medida real efectivo misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware maalt "
-        "virkelig faktisk tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer apparente "
-        "aparente scheinbar scheinbarer schijnbare relativ de du des le la les el del della di van der den het al sul sur"
+        "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga gprmc "
+        "gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos posicion posisjon "
+        "position raw rel rtk sensor ship signal sim standort t the true val value vessel vtg wert gemessen istwert "
+        "rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie medido medida real efectivo "
+        "misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware maalt virkelig faktisk "
+        "tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer apparente aparente scheinbar "
+        "scheinbarer schijnbare relativ de du des le la les el del della di van der den het al sul sur"
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
@@ -224,6 +222,16 @@ SIDE_WORDS = {
     "aft": "aft",
     "main": "main",
 }
+RUN_WORDS = frozenset(
+        "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
+        "corsa proef proefvaart vaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre "
+        "maniobra manovra manoeuver experiment exp case rec recording sequence leg"
+    ).split()
+)
+"""Parts that say that a column holds the run."""
+RUN_NUMBERS = frozenset(
+    "no nr num number nummer numero numer id name navn naam nom nombre nome code index label".split()
+)
 _LETTERS = {"ψ": "psi", "δ": "delta", "φ": "phi", "ϕ": "phi", "θ": "theta", "χ": "chi", "α": "alpha", "ω": "omega"}
 _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "Ψ": "psi"}
 _LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
@@ -280,7 +288,7 @@ def wind_kind(name: str) -> str:
 def _vocabulary() -> frozenset[str]:
     phrases = [*PHRASES.values(), OTHERS]
     words = {word for phrase in phrases for word in phrase.replace(",", " ").split()}
-    return frozenset(word for word in words | ORDERS | SOURCES | set(SYNONYMS) if len(word) > 2)
+    return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS | set(SYNONYMS) if len(word) > 2)
 
 
 @cache
@@ -311,6 +319,12 @@ def is_order(name: str) -> bool:
     """Whether a name says that its column is an order or a set point, not what was measured."""
     parts = parts_of(name)
     return len(parts) > 1 and bool(ORDERS & set(parts[1:] if len(parts[0]) == 1 else parts))
+
+
+def is_run(name: str) -> bool:
+    """Whether a name says that its column holds the run: `Run`, `test no`, `Versuch`."""
+    parts = set(parts_of(name)) - RUN_NUMBERS
+    return bool(parts) and parts <= RUN_WORDS
 
 
 def side_of(name: str) -> str | None:
