@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,12 +57,14 @@ def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[bool, str]]:
         if fault:
             wrong.append((unsure, f"{name}: {fault}"))
     present = {column.signal.removeprefix("actual.") for column in stranger.columns}
-    for signal in sorted(present):
-        if signal.endswith((".delta", ".n", ".alpha")) and not any(
-            true is not None and signal in {one.removeprefix("actual.") for one in (true.signal, *true.also)}
-            for _, true in drafted.values()
-        ):
-            wrong.append((True, f"{signal} is not read"))
+    read = {
+        one.removeprefix("actual.")
+        for _, true in drafted.values()
+        if true is not None
+        for one in (true.signal, *true.also)
+    }
+    commands = sorted(signal for signal in present if signal.endswith((".delta", ".n", ".alpha")))
+    wrong += [(True, f"{signal} is not read") for signal in commands if signal not in read]
     if "r" in present and "r" not in drafted:
         wrong.append((True, "r is not read"))
     if {"sog", "cog"} <= present and not {"speed", "u"} & set(drafted):
@@ -179,8 +180,3 @@ def shares(words: Counter[str]) -> dict[str, float]:
     total = max(1, words.total())
     names = {"right": "right", "said": "wrong and said", "silent": "wrong and silent"}
     return {name: round(words[word] / total, 4) for word, name in names.items()}
-
-
-def folder_of(path: Path) -> Path:
-    """Where the files of a stranger are written below `path`."""
-    return path / "raw"

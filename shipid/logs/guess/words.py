@@ -185,6 +185,7 @@ OTHERS = (
 )
 """Phrases of columns that no dataset takes."""
 ORDERS = frozenset(
+    (
         "befehl c cmd command commanded d demand des desired goal oensket onsket ord order ordered ordre ref "
         "reference req request set setpoint setpunkt setting soll sp target want wanted vorgabe sollwert consigne "
         "commande ordonne ordonnee demande demandee orden ordenado ordenada consigna mando comandado comando "
@@ -200,6 +201,7 @@ WIND_WORDS = {
 }
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
+    (
         "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga gprmc "
         "gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos posicion posisjon "
         "position raw rel rtk sensor ship signal sim standort t the true val value vessel vtg wert gemessen istwert "
@@ -223,8 +225,9 @@ SIDE_WORDS = {
     "main": "main",
 }
 RUN_WORDS = frozenset(
+    (
         "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
-        "corsa proef proefvaart vaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre "
+        "corsa proef proefvaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre "
         "maniobra manovra manoeuver experiment exp case rec recording sequence leg"
     ).split()
 )
