@@ -19,6 +19,7 @@ SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
 NEAR = 15.0  # times from that: a unit further off is doubted
 
@@ -119,17 +120,34 @@ def _held(values: Array) -> float:
 
 def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
     for signal in (signal for signal in named("command") if not steers(signal)):
-        for name, _ in _named(state, [signal]):
+        for name, _ in sorted(_named(state, [signal]), key=lambda one: side_of(one[0]) in TUNNELS):
             usual = SIGNALS[signal].component
             fallback = AZIMUTH if azimuth and usual == SCREW else usual
             component = side_of(name) or fallback
             if SIGNALS[signal].shaft:
-                unit, confidence, why, extra = _shaft_unit(state, name)
+                unit, confidence, why, extra = (_tunnel_unit if component in TUNNELS else _shaft_unit)(state, name)
             else:
                 said = unit_said(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if said else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
             state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+
+
+def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
+    """Return the same as `_shaft_unit` of a screw that does not drive the ship: her way says nothing of its unit."""
+    top = float(np.abs(state.columns[name]).max())
+    why = f"by its name; up to {top:.4g}"
+    said = unit_said(name, "rev/s")
+    if said is not None and said != "%":
+        return said, 0.9, why, {}
+    if said == "%":
+        return _shaft_unit(state, name)
+    others = [one.unit for one in state.suggestions if one.name.endswith(".n")]
+    unit = others[0] if others else likely_unit(state, name, "n")
+    state.ask(
+        ("n",), f"in which unit is {name!r}, up to {top:.4g}? The way of the ship does not say: {unit} is a guess"
+    )
+    return unit, 0.4, f"{why}; in {unit} as the other shafts" if others else why, {}
 
 
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:

@@ -15,7 +15,7 @@ from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_said
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import fits, is_order, parts_of
+from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
 from shipid.logs.mapping import to_si
 
 GOOD, POOR = 0.05, 0.2  # misfit of a course and a heading: 1 - agreement
@@ -58,6 +58,7 @@ def choose_pose(state: State, file: Path) -> None:
     """
     pairs = list(_named_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name)]
+    headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
     sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
     best = _best(state, pairs, sure or headings)
     if best is None or best.misfit > POOR:

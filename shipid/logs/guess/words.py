@@ -27,20 +27,21 @@ PHRASES: dict[str, str] = {
         "hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta north, dist north"
     ),
     "east": (
-        "e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
+        "est, e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
         "rechtswert, utm e, utm east, utm x, oest, oestlig, este, ye, ned y, ned e, ned east, delta east, dist "
         "east"
     ),
-    "x": ("x, pos x, x pos, odom x, x coordinate, enu x, local x"),
-    "y": ("y, pos y, y pos, odom y, y coordinate, enu y, local y"),
+    "x": ("xpos, posx, x, pos x, x pos, odom x, x coordinate, enu x, local x"),
+    "y": ("ypos, posy, y, pos y, y pos, odom y, y coordinate, enu y, local y"),
     "psi": (
-        "psi, heading, hdg, hdt, head, gyro, compass, kompass, kreisel kurs, kreisel, steuer kurs, vorauskurs, "
-        "yaw, yaw angle, yaw pos, yaw 0, gier winkel, gir vinkel, kurs vinkel, baug retning, ship heading, gyro "
-        "heading, compass heading, gyro hdg, kurs, course, eta 3, eta 6, theta z, rumbo, cap, styrt kurs, hehdt, "
-        "bow angle, kurs winkel, rw kurs, rwk, kompass kurs, gyro kurs, cap vrai, cap compas, cap gyro, cap "
-        "navire, cap magnetique, rumbo verdadero, rumbo aguja, proa, prua, prora, prua vera, prua bussola, koers, "
-        "voorliggende koers, kompas koers, gyro koers, styret kurs, styrd kurs, kompas kurs, lacet, angle lacet, "
-        "angulo guinada, guinada, imbardata, gier hoek, stevn"
+        "magnet kompass, magnetic heading, magnetic compass, psi, heading, hdg, hdt, head, gyro, compass, "
+        "kompass, kreisel kurs, kreisel, steuer kurs, vorauskurs, yaw, yaw angle, yaw pos, yaw 0, gier winkel, "
+        "gir vinkel, kurs vinkel, baug retning, ship heading, gyro heading, compass heading, gyro hdg, kurs, "
+        "course, eta 3, eta 6, theta z, rumbo, cap, styrt kurs, hehdt, bow angle, kurs winkel, rw kurs, rwk, "
+        "kompass kurs, gyro kurs, cap vrai, cap compas, cap gyro, cap navire, cap magnetique, rumbo verdadero, "
+        "rumbo aguja, proa, prua, prora, prua vera, prua bussola, koers, voorliggende koers, kompas koers, gyro "
+        "koers, styret kurs, styrd kurs, kompas kurs, lacet, angle lacet, angulo guinada, guinada, imbardata, "
+        "gier hoek, stevn"
     ),
     "speed": (
         "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fueg, fug, "
@@ -86,14 +87,14 @@ PHRASES: dict[str, str] = {
         "velocidad este, velocita est, snelheid oost"
     ),
     "r": (
-        "r, rot, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro rate, w z, omega z, psi dot, nu 6, nu "
-        "3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier geschwindigkeit, gier rate, giring "
-        "hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity z, heading rate, hdg rate, wende "
-        "geschwindigkeit, d psi, gir hastighet, taux giration, vitesse giration, vitesse lacet, taux lacet, "
-        "giration, velocidad giro, velocidad guinada, razon giro, regimen giro, velocita accostata, velocita "
-        "imbardata, velocita virata, rateo accostata, rateo virata, draai snelheid, gier snelheid, sving "
-        "hastighet, dreie hastighet, dreie rate, svinge rate, drei hastighet, girings hastighet, dreje hastighed, "
-        "dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot"
+        "rotasjons hastighet, rotasjons fart, r, rot, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro "
+        "rate, w z, omega z, psi dot, nu 6, nu 3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier "
+        "geschwindigkeit, gier rate, giring hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity "
+        "z, heading rate, hdg rate, wende geschwindigkeit, d psi, gir hastighet, taux giration, vitesse giration, "
+        "vitesse lacet, taux lacet, giration, velocidad giro, velocidad guinada, razon giro, regimen giro, "
+        "velocita accostata, velocita imbardata, velocita virata, rateo accostata, rateo virata, draai snelheid, "
+        "gier snelheid, sving hastighet, dreie hastighet, dreie rate, svinge rate, drei hastighet, girings "
+        "hastighet, dreje hastighed, dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot"
     ),
     "phi": (
         "phi, roll, roll angle, heel, heel angle, roll winkel, kraengung, rull, krengning, eta 4, gite, angle "
@@ -159,12 +160,13 @@ PHRASES: dict[str, str] = {
 }
 """Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
 OTHERS = (
-    "vitesse surface, vitesse eau, vitesse loch, loch, velocidad corredera, corredera, velocidad superficie, "
-    "velocita acqua, solcometro, log snelheid, snelheid door water, vaart door water, fart gennem vand, fart "
-    "genom vatten, fart gjennom vannet, logg fart, logg, fahrt durch wasser, log geschwindigkeit, water speed, "
-    "schub, schub kraft, poussee, empuje, spinta, stuw kracht, skyve kraft, thrust force, couple, couple arbre, "
-    "couple helice, momento, par motor, par eje, coppia, koppel, dreie moment, vrid moment, wellen moment, "
-    "puissance, potencia, potenza, vermogen, wellen leistung, motor leistung, engine load, kw, verbrauch, "
+    "t prop, q prop, t propeller, q propeller, battery voltage, sat, ukc, under keel clearance, wave probe, wave "
+    "gauge, vitesse surface, vitesse eau, vitesse loch, loch, velocidad corredera, corredera, velocidad "
+    "superficie, velocita acqua, solcometro, log snelheid, snelheid door water, vaart door water, fart gennem "
+    "vand, fart genom vatten, fart gjennom vannet, logg fart, logg, fahrt durch wasser, log geschwindigkeit, "
+    "water speed, schub, schub kraft, poussee, empuje, spinta, stuw kracht, skyve kraft, thrust force, couple, "
+    "couple arbre, couple helice, momento, par motor, par eje, coppia, koppel, dreie moment, vrid moment, wellen "
+    "moment, puissance, potencia, potenza, vermogen, wellen leistung, motor leistung, engine load, kw, verbrauch, "
     "kraftstoff, consommation, carburant, consumo, combustible, carburante, brandstof, drivstoff, forbruk, fuel "
     "rack, rack, profondeur, profundidad, sonda, profondita, diepte, vann dybde, djup, tiefe, echolot, ekkolodd, "
     "sounder, tirant eau, tirant, calado, pescaggio, immersione, diep gang, temperatura, temperatuur, temperature "
@@ -202,8 +204,8 @@ WIND_WORDS = {
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
-        "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga gprmc "
-        "gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos posicion posisjon "
+        "act actual apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga "
+        "gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos posicion posisjon "
         "position raw rel rtk sensor ship signal sim standort t the true val value vessel vtg wert gemessen istwert "
         "rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie medido medida real efectivo "
         "misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware maalt virkelig faktisk "
@@ -215,15 +217,19 @@ SOURCES = frozenset(
 UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knots kt kts min mps ms pct rad rads rps sec").split())
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
-    "port": "port|ps|bb|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",
-    "starboard": "starboard|stbd|sb|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|estribor|dritta|dx|"
-    "stuurboord|rechts|droite",
+    "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",
+    "starboard": "starboard|stbd|sb|tri|er|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|"
+    "estribor|dritta|dx|stuurboord|rechts|droite",
     "stern": "stern",
     "bow": "bow",
     "fore": "fore|fwd",
     "aft": "aft",
     "main": "main",
 }
+MAGNETIC = frozenset(
+    "mag magnet magnetic magnetisch magnetique magnetico magnetisk compass compas kompass aguja bussola".split()
+)
+"""Parts that say that a heading is that of a magnetic compass."""
 RUN_WORDS = frozenset(
     (
         "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
@@ -240,7 +246,15 @@ _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å":
 _LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
 SYNONYMS = {"velocity": "vel", "position": "pos", "pos": "pos", "longitudinal": "long", "transversal": "trans"}
 SYNONYMS |= {"longitudinale": "long", "transversale": "trans", "propulseur": "thruster"}
-SYNONYMS |= {"etrave": "bow", "thrusters": "thruster", "strahler": "thruster", "propulsor": "thruster"}
+SYNONYMS |= {
+    "etrave": "bow",
+    "transv": "trans",
+    "longit": "long",
+    "thr": "thruster",
+    "thrusters": "thruster",
+    "strahler": "thruster",
+    "propulsor": "thruster",
+}
 SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
 WHOLE = dict.fromkeys(
     (
@@ -251,6 +265,8 @@ WHOLE = dict.fromkeys(
 )
 WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
 """Words that are cut into parts of another language."""
+SHAFT_UNITS = frozenset(("rpm", "1/min", "min-1", "u/min", "rps", "1/s", "rev/s", "tr/min"))
+_EDGE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])")
 _AFTER = re.compile(r"(?:\s+/\s*|,\s*)([^\s,]{1,9})\s*$")
 LONGEST_WORD = 80  # letters: a longer one is not cut
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
@@ -261,8 +277,10 @@ def parts_of(name: str) -> tuple[str, ...]:
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
     text = unicodedata.normalize("NFKD", "".join(_spelt(bare, place) for place in range(len(bare))))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", text)
-    words = [word for word in re.split(r"[^A-Za-z0-9]+", text.lower()) if word]
+    whole = [word for word in re.split(r"[^A-Za-z0-9]+", text) if word]
+    words = [
+        part.lower() for word in whole for part in ([word] if word.lower() in _vocabulary() else _EDGE.split(word))
+    ]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
 
 
@@ -330,6 +348,11 @@ def is_run(name: str) -> bool:
     return bool(parts) and parts <= RUN_WORDS
 
 
+def is_magnetic(name: str) -> bool:
+    """Whether a name says that a heading is that of a magnetic compass."""
+    return bool(set(parts_of(name)) & MAGNETIC)
+
+
 def side_of(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
     parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", name.lower()))
@@ -365,6 +388,8 @@ def fits(name: str) -> dict[str, float]:
         if row.names and meaning not in meanings and not order and re.fullmatch(row.names, "_".join(parts)):
             meanings[meaning] = 0.9
     if "thruster" in parts and {"bow", "stern"} & set(parts):  # of a tunnel: nothing that moves with the ship
+        if SHAFT_UNITS & {unit.strip().lower() for unit in units_in(name)}:
+            meanings = {"n": 1.0}
         return {meaning: fit for meaning, fit in meanings.items() if meaning in ("", "n", "pitch")}
     return meanings
 
