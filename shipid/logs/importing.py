@@ -433,6 +433,8 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
                 _unwrap(values)
             else:
                 values[known] = np.unwrap(values[known])
+            if is_command(name) and known.any():  # an azimuth about 360 deg is one about 0
+                values -= 2 * np.pi * np.round(np.median(values[known]) / (2 * np.pi))
         turned[name] = values
     return rows.assign(**turned)
 

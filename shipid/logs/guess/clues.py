@@ -10,7 +10,7 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows
-from shipid.logs.guess.words import fits, is_order, units_in
+from shipid.logs.guess.words import fits, is_order, parts_of, units_in
 from shipid.logs.mapping import INPUTS, UNITS
 from shipid.physics.signals import SIGNALS
 
@@ -102,7 +102,7 @@ def unit_of_another(name: str, meaning: str) -> str | None:
 
     Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end.
     """
-    si = SIGNALS[meaning].unit if meaning in SIGNALS else INPUTS.get(meaning, "m" if meaning in ("x", "y") else "m/s")
+    si = si_of(meaning)
     if si not in UNITS or unit_said(name, si) is not None:
         return None
     last = re.split(r"[_ ]", name.strip())[-1]
@@ -113,6 +113,22 @@ def unit_of_another(name: str, meaning: str) -> str | None:
         if known or (si != "rev/s" and FOREIGN.fullmatch(text)) or word in ("kN", "Nm", "kNm", "N"):
             return word
     return None
+
+
+def names_another(name: str, meaning: str) -> bool:
+    """Whether a word of a name, not a mere letter, says a quantity of another unit: a roll is no yaw rate."""
+    scores = fits(name)
+    best = max(scores, key=lambda one: scores[one], default=meaning)
+    word = max((len(part) for part in parts_of(name)), default=0) > 2
+    clear = scores.get(best, 0.0) >= 0.9 and scores.get(meaning, 0.0) < STRONG
+    return (word and clear and si_of(best) != si_of(meaning)) or unit_of_another(name, meaning) is not None
+
+
+def si_of(meaning: str) -> str:
+    """Return the SI unit of a meaning; empty for a quantity of no use."""
+    if meaning in SIGNALS:
+        return SIGNALS[meaning].unit
+    return INPUTS.get(meaning, {"x": "m", "y": "m", "": ""}.get(meaning, "m/s"))
 
 
 def _may_be(scores: dict[str, float], meanings: tuple[str, ...]) -> bool:

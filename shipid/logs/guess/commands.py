@@ -35,6 +35,7 @@ def choose_commands(state: State) -> None:
 def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _named(state, [signal for signal in named("command") if steers(signal)])
+    turned = {name for name, signal in angles if _centred(state, name, signal)}
     power = {name: 0.0 if r is None else _power(state, r, name) for name in state.eligible()}
     by_name = bool(angles)
     if not angles and r is not None:
@@ -46,7 +47,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     for name, signal in angles:
         unit = likely_unit(state, name, signal)
         effect = power.get(name, 0.0)
-        extra: dict[str, Any] = {}
+        extra: dict[str, Any] = {"wrap": True} if name in turned else {}
         followed = 0.0
         why = "by its name; it is not seen to turn the ship, so that its sign is not known"
         confidence = 0.5 if by_name else 0.4
@@ -72,6 +73,17 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
             component = f"rudder_{side_of(name)}" if state.called("n") == [] else str(side_of(name))
         state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
+
+
+def _centred(state: State, name: str, signal: str) -> bool:
+    """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
+    values = state.columns[name]
+    turn = 2 * np.pi / to_si(likely_unit(state, name, signal), f"x.{signal}")
+    jumps = np.abs(np.diff(values)) > 0.8 * turn
+    if not jumps.any() or np.ptp(values) > 1.02 * turn:
+        return False
+    state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
+    return True
 
 
 def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
@@ -211,6 +223,9 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     said = unit_said(name, row.unit)
     if said is not None and said != "%":
         return said
+    heading = next((one.unit for one in state.suggestions if one.name == "psi"), None)
+    if row.angle and row.role == "motion" and heading is not None:  # a roll of a degree is no roll of a radian
+        return heading
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 
