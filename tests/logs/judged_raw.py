@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -173,10 +172,3 @@ def _runs(guessed: Guess, stranger: RawStranger, count: int) -> list[tuple[bool,
     if count != wanted:
         wrong.append((False, f"{count} runs in place of {wanted}"))
     return wrong
-
-
-def shares(words: Counter[str]) -> dict[str, float]:
-    """Share of every verdict."""
-    total = max(1, words.total())
-    names = {"right": "right", "said": "wrong and said", "silent": "wrong and silent"}
-    return {name: round(words[word] / total, 4) for word, name in names.items()}

@@ -106,7 +106,7 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     if si not in UNITS or unit_said(name, si) is not None:
         return None
     last = re.split(r"[_ ]", name.strip())[-1]
-    said = units_in(name) or ([last] if last.lower() in ("rpm", "rps", "knm", "kn m") and last != name else [])
+    said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or last.lower() in ("rpm", "rps") else [])
     for word in said:
         text = word.strip().lower()
         known = any(re.fullmatch(expected, text) for expected in UNIT_WORDS.values())

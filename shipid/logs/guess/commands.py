@@ -100,7 +100,7 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
         number = next((part for part in reversed(parts_of(name)) if part.isdigit()), None)
         groups.setdefault((side_of(name) or number, found[name][1]), []).append(name)
     chosen = []
-    sided = any(side is not None for side, _ in groups)
+    sided = any(side is not None and side not in TUNNELS for side, _ in groups)
     for (side, signal), names in groups.items():
         if side is None and sided and is_order(names[0]):
             continue

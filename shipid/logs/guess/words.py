@@ -215,7 +215,7 @@ SOURCES = frozenset(
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
-UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knots kt kts min mps ms pct rad rads rps sec").split())
+UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knm kw nm knots kt kts min mps ms pct rad rads rps sec").split())
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
     "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",
@@ -280,7 +280,9 @@ def parts_of(name: str) -> tuple[str, ...]:
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
     whole = [word for word in re.split(r"[^A-Za-z0-9]+", text) if word]
     words = [
-        part.lower() for word in whole for part in ([word] if word.lower() in _vocabulary() else _EDGE.split(word))
+        part.lower()
+        for word in whole
+        for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word))
     ]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
 
