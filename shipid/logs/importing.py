@@ -200,9 +200,12 @@ def _columns(
     here |= {mapping.clock.date} if mapping.clock.date is not None else set()
     here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
     log = read_table(file, mapping.format, mapping.clock.source, here, progress)
+    records = _passed_over(log)
+    if mapping.clock.repeated == "drop":
+        log, more = _once(log, mapping.clock, mapping.format, file)
+        records += more
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
     begins = _begins(log, t, mapping.parts, file) if mapping.parts is not None else []
-    records = _passed_over(log)
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
@@ -269,13 +272,38 @@ def _passed_over(table: pd.DataFrame) -> Records:
     return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 
-def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
-    """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
+def _once(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -> tuple[pd.DataFrame, Records]:
+    """The log without rows that repeat the time of the row before (with `every`: the whole row), and their number."""
+    if clock.every is None:
+        again = np.diff(_times(log, clock, form, file, "clock"), prepend=-np.inf) == 0
+    else:
+        again = repeated_rows(log)
+    note = "rows that repeat the row before" if clock.every is not None else "rows with the time of the row before"
+    records: Records = [{"kind": "repeated", "column": "", "count": int(again.sum()), "note": note}]
+    return (log.loc[~again].reset_index(drop=True), records) if again.any() else (log, [])
+
+
+def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Whether each row (N,) has the values of the row before in all columns."""
+    same = np.ones(len(table), dtype=bool)
+    same[:1] = False
+    for index in range(table.shape[1]):
+        column = table.iloc[:, index]
+        same &= (column.eq(column.shift()) | (column.isna() & column.shift().isna())).to_numpy(dtype=bool)
+    return same
+
+
+def _times(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+    """The column of time [s] as it is written, not a number where it is missing."""
     if clock.unit == "date":
         times = _column(log, clock.source, file, f"{path}.from")
-        t = seconds(times if clock.date is None else dated(_column(log, clock.date, file, f"{path}.date"), times))
-    else:
-        t = _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+        return seconds(times if clock.date is None else dated(_column(log, clock.date, file, f"{path}.date"), times))
+    return _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+
+
+def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+    """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
+    t = _times(log, clock, form, file, path)
     if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
         return evenly(t, clock.every, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
@@ -284,7 +312,7 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
         if not np.isfinite(t[row]):
             what = "no time here: remove the row"
         elif t[row] == t[row - 1]:
-            what = f"time {t[row]:g} s appears twice: remove one of the rows"
+            what = f"time {t[row]:g} s appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
         else:
             what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
@@ -294,30 +322,56 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
 def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float64]:
     """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s].
 
-    The rows run on from the first; where the column pauses for more than its rounding, they start anew. Raises
+    The rows run on from the first. Where the column pauses, or where rows were lost, whole steps are left out. Raises
     DataError where the column leaves the instants by more than it is rounded.
     """
     even, _ = even_clock(t, every)
     rounding = rounding_of(t)
     off = np.abs(even - t)
-    if np.any(off > rounding + every):
-        row = int(np.argmax(off > rounding + every))
-        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate or pauses"
+    wrong = (off > rounding + every) | (np.diff(even, prepend=-np.inf) <= 0)
+    if np.any(wrong):
+        row = int(np.argmax(wrong))
+        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate"
         raise DataError(message, file=file, path=f"row {row + 1}, clock.every")
     return even
 
 
 def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
     """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
-    steps = np.diff(t)
-    pauses = np.flatnonzero(steps > 2.0 * rounding_of(t)[1:] + 3.0 * every) + 1
+    rounding = rounding_of(t)
+    pauses = np.flatnonzero(np.diff(t) > 2.0 * rounding[1:] + 3.0 * every) + 1
     even = np.empty(len(t))
     for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
-        count = np.arange(last - first)
-        even[first:last] = t[first:last][0] + every * count
-        shift = np.median(t[first:last] - even[first:last]) if len(pauses) else np.median(t[:last] - even[:last])
-        even[first:last] += shift
+        part = slice(first, last)
+        count = every * np.arange(last - first)
+        even[part] = count + np.median(t[part] - count)
+        if np.any(np.abs(even[part] - t[part]) > 0.6 * rounding[part] + 0.5 * every):  # rows were lost
+            even[part] = _with_losses(t[part], every, rounding[part])
     return even, len(pauses)
+
+
+def _with_losses(t: NDArray[np.float64], every: float, rounding: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Instants a whole number of steps apart, as few as the rounded times t (N,) allow.
+
+    A row at offset + every n fits while one offset in [low, high] lies within half a rounding of all rows so far; where
+    none does, n leaves out as many steps as it must, or the offset starts anew, for a rate that is slightly off.
+    """
+    half = 0.5 * rounding + 1e-9 * np.abs(t)
+    steps, low, high = np.zeros(len(t)), t[0] - half[0], t[0] + half[0]
+    offset, number, begin = np.empty(len(t)), 0.0, 0
+    for row in range(1, len(t)):
+        number += 1.0
+        least, most = t[row] - half[row] - every * number, t[row] + half[row] - every * number
+        if least > high:
+            lost = np.ceil((least - high) / every - 1e-9)
+            number, least, most = number + lost, least - every * lost, most - every * lost
+        if most < low:
+            offset[begin:row] = (low + high) / 2
+            begin, low, high = row, least, most
+        low, high = max(low, least), min(high, most)
+        steps[row] = number
+    offset[begin:] = (low + high) / 2
+    return np.asarray(offset + every * steps)
 
 
 def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:

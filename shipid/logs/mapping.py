@@ -90,6 +90,7 @@ class Clock(Strict):
     max_gap: float | None = Field(default=None, gt=0)
     step: float | None = Field(default=None, gt=0)
     every: float | None = Field(default=None, gt=0)
+    repeated: Literal["refuse", "drop"] = "refuse"
 
 
 class FileClock(Strict):

@@ -133,7 +133,7 @@ class BandsBlock(Strict):
 
 
 class Claims(Strict):
-    """`[claims]`: the families, and the method, that findings speak of: R1-R4 at full scale, S1-S7 in simulation, B1-B2."""
+    """`[claims]`: the families, and the method, that findings speak of: R1-R4, S1-S7, and B1-B2 in both."""
 
     method: str | None = Field(default=None, description="default: the first method that learns from data")
 

@@ -105,7 +105,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
     for level in SHARES:
         if not one.bands.promises(level):
             continue
-        region = one.bands.region(one.paths, fresh.columns, 1.0, level)
+        region = one.bands.region(one.paths, fresh.columns, fresh.step, level)
         reach = region.reach(errors).max(axis=0)
         row = {**keys, "runs": runs, "level": level, "width": float(region.radius.mean())}
         held = (reach <= 1).astype(float)
@@ -114,7 +114,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
             mine = kinds == kind
             row |= {f"{kind}": by_run(fresh.run[mine], held[mine]), f"{kind} runs": calibrated_kinds.count(kind)}
             if one.bands.promises(level, str(kind)):
-                known = one.bands.region(one.paths, fresh.columns, 1.0, level, kind=str(kind))
+                known = one.bands.region(one.paths, fresh.columns, fresh.step, level, kind=str(kind))
                 row[f"{kind} said"] = by_run(fresh.run[mine], known.holds(errors)[mine].astype(float))
         yield row
 
@@ -138,8 +138,8 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
         return circle(scale * scores[place])
 
     found = {
-        "band": one.bands.region(one.paths, columns, 1.0, level),
-        "each step alone": one.bands.region(one.paths, columns, 1.0, level, pointwise=True),
+        "band": one.bands.region(one.paths, columns, fresh.step, level),
+        "each step alone": one.bands.region(one.paths, columns, fresh.step, level, pointwise=True),
         "Bonferroni over steps": circle(np.quantile(off, 1 - (1 - level) / horizon, axis=1)[:, None]),
         "windows pooled": pooled(off),
         "windows pooled, training errors": pooled(inside),
@@ -157,12 +157,12 @@ def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterat
 def _proven(one: Cell, windows: Windows, level: float, columns: Any) -> Region:
     """The band with the quantile of Lee, Barber and Willett, which has a proof for any distribution."""
     paths = windows.future - one.left_out
-    reach = one.bands.region(paths, windows.columns, 1.0, 0.5).reach(one.left_out).max(axis=0)
+    reach = one.bands.region(paths, windows.columns, windows.step, 0.5).reach(one.left_out).max(axis=0)
     _, place, count = np.unique(windows.run, return_inverse=True, return_counts=True)
     order = np.argsort(reach)
     weights = np.cumsum((1 / (count[place] * (len(count) + 1)))[order])
     index = min(int(np.searchsorted(weights, level - 1e-12)), len(reach) - 1)
-    return one.bands.region(one.paths, columns, 1.0, 0.5).scaled(float(reach[order][index]))
+    return one.bands.region(one.paths, columns, windows.step, 0.5).scaled(float(reach[order][index]))
 
 
 def worlds(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -11,11 +12,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.guess.words import is_run, parts_of
-from shipid.logs.importing import even_clock, rounding_of
+from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.readers import (
     LONGEST_LINE,
     LOOKED_AT,
@@ -30,8 +32,12 @@ from shipid.logs.readers import (
     widest,
 )
 
+Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
+SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
+LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
+REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 CLOCK_WORDS = frozenset(
     (
@@ -40,6 +46,7 @@ CLOCK_WORDS = frozenset(
         "gmt"
     ).split()
 )
+DATE = r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}"
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|min|h|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|"
@@ -103,13 +110,21 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     else:
         table = read_table(file, model, "time")
     columns, words = _numbers(table, form.get("decimal", "."))
-    clock, t = _clock(table, columns, file)
+    if isinstance(model, TextFormat):
+        missing = _sentinels(table, columns)
+        if missing:
+            form["missing"] = [*model.missing, *missing]
+            notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
+    clock, t, once = _clock_once(table, columns, file)
+    columns = {name: values[once] for name, values in columns.items()}
     named = {clock["from"], clock.get("date")}
     notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name and name not in named)
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
     kept = {name: values for name, values in columns.items() if name not in named and name not in constant}
     empty = tuple(f"column {name!r} is empty" for name in constant if name)
     form.pop("ragged", None) if form.get("ragged") == "refuse" else None
+    if not once.all():
+        notes += ("rows that repeat the row before are left out",)
     return Sniffed(form, clock, t, kept, notes + empty)
 
 
@@ -188,16 +203,34 @@ def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, 
         if len(joined) == width:  # blanks before units
             return form | {"skip_rows": data, "names": _distinct(joined)}
     heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
+    dated_at = _date_and_time(rows[data]) if separator == "whitespace" else None
+    if dated_at is not None and heads and len(rows[heads[0]]) == width - 1:  # one name for date and time
+        wide = [[*rows[i][:dated_at], "date", *rows[i][dated_at:]] for i in heads if len(rows[i]) == width - 1]
+        if len(wide) == 2 and _is_units(rows[heads[0]]):
+            pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
+            return form | {"skip_rows": data, "names": _distinct([_with_unit(*pair) for pair in pairs])}
+        return form | {"skip_rows": data, "names": _distinct(wide[0])}
     if len(heads) == 2 and _is_units(rows[heads[0]]):
         called = [*rows[heads[1]], ""][:width]
         units = [*rows[heads[0]], ""][:width]
-        joined = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(called, units, strict=True)]
+        joined = [_with_unit(*pair) for pair in zip(called, units, strict=True)]
         while joined and not joined[-1]:
             joined.pop()
         return form | {"skip_rows": data, "names": _distinct(joined)}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}
     return form | {"skip_rows": data, "header": False}
+
+
+def _with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets."""
+    return f"{name} [{unit.strip('[]()')}]" if unit else name
+
+
+def _date_and_time(row: list[str]) -> int | None:
+    """Return the index of a cell that is a date before a time of day; None where there is none."""
+    pairs = enumerate(itertools.pairwise(row))
+    return next((k for k, (one, other) in pairs if re.fullmatch(DATE, one) and re.fullmatch(TIME_OF_DAY, other)), None)
 
 
 def _distinct(names: list[str]) -> list[str]:
@@ -259,6 +292,55 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
     return columns, words
 
 
+def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
+    """Return the texts that stand for a missing value, and set them to NaN: far beyond all other values of a column."""
+    texts: dict[str, None] = {}
+    for name, values in columns.items():
+        for value in SENTINELS:
+            hit = values == value
+            others = values[~hit & ~np.isin(values, SENTINELS) & np.isfinite(values)]
+            if not hit.any() or len(others) < 2:
+                continue
+            low, high = float(others.min()), float(others.max())
+            if low - (high - low) <= value <= high + (high - low):
+                continue
+            texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
+            values[hit] = np.nan
+    return list(texts)
+
+
+def _clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array, Rows]:
+    """Return the clock, its times, and which rows it takes: all but a few that repeat the row before."""
+    again = repeated_rows(table)
+    if 0 < again.sum() <= REPEATED * len(table):
+        kept = {name: values[~again] for name, values in columns.items()}
+        clock, t = _clock(table.loc[~again].reset_index(drop=True), kept, file)
+        return {**clock, "repeated": "drop"}, t, ~again
+    try:
+        return *_clock(table, columns, file), np.ones(len(table), dtype=bool)
+    except DataError:
+        once = _once(table, columns)
+        if once is None:
+            raise
+        kept = {name: values[once] for name, values in columns.items()}
+        clock, t = _clock(table.loc[once].reset_index(drop=True), kept, file)
+        if "every" in clock:  # a rounded clock has rows of one time that are not repeated
+            raise
+        return {**clock, "repeated": "drop"}, t, once
+
+
+def _once(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
+    """Return the rows that do not say the time of the row before once more; None where no clock has a few of these."""
+    for name in map(str, table.columns):
+        if not _is_clock(name):
+            continue
+        times = columns[name] if name in columns else seconds(_called(table, name))
+        steps = np.diff(times, prepend=-np.inf)
+        if np.isfinite(times).all() and np.all(steps >= 0) and 0 < np.sum(steps == 0) <= REPEATED * len(table):
+            return np.asarray(steps > 0)
+    return None
+
+
 def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
     """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
@@ -310,7 +392,7 @@ def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
     """Return the first of these columns that holds a date in every row, without a time."""
     for name in names:
         cells = _called(table, name).astype(str).str.strip()
-        if cells.str.fullmatch(r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}").all():
+        if cells.str.fullmatch(DATE).all():
             return name
     return None
 
@@ -357,12 +439,21 @@ def _rate(t: Array) -> tuple[float, Array] | None:
     _values, first = np.unique(t, return_index=True)
     early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
     mean = float(t[-1] - t[0]) / (len(t) - 1)
-    slack = float(rounding_of(t)[-1]) / (len(t) - 1)
-    for step in (_roundest(mean, slack), early, mean):
+    rounding = rounding_of(t)
+    slack = float(rounding[-1]) / (len(t) - 1)
+    stretches = [  # whatever rows were lost, most short stretches are whole
+        _roundest(float(np.median(t[far:] - t[:-far])) / far, float(rounding[-1]) / far)
+        for far in (min(len(t) - 1, most) for most in (200, 60))
+    ]
+    for step in (_roundest(mean, slack), *stretches, early, mean):
         if not step > 0:
             continue
         even, _ = even_clock(t, step)
-        if np.all(np.abs(even - t) <= 0.6 * rounding_of(t) + 0.5 * step):
+        ahead = np.diff(even) / step
+        lost = float((ahead[ahead < 4 + 2 * rounding[1:] / step] - 1).sum())
+        if lost > LOST * len(t) and step is not mean:
+            continue
+        if np.all(np.abs(even - t) <= 0.6 * rounding + 0.5 * step) and np.all(np.diff(even) > 0):
             return float(f"{step:.9g}"), even
     return None
 

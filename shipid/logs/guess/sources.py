@@ -135,7 +135,7 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
     """Return the files of the commonest columns and format; the others are skipped with a reason."""
 
     def written(log: Sniffed) -> tuple[object, ...]:
-        form = {key: value for key, value in log.form.items() if key != "ragged"}
+        form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing")}
         unit = (log.clock["from"], log.clock["unit"])
         return (*sorted((key, str(value)) for key, value in form.items()), unit)
 
@@ -173,7 +173,11 @@ def _joined(logs: list[Sniffed]) -> Sniffed:
         form["ragged"] = "drop"
     rates = {log.clock.get("every") for log in logs}
     if rates != {None}:
-        usual = [float(np.median(np.diff(log.t))) for log in logs if "every" in log.clock]
-        clock["every"] = float(np.median(usual))
+        clock["every"] = float(np.median([log.clock["every"] for log in logs if "every" in log.clock]))
+    if any("repeated" in log.clock for log in logs):
+        clock["repeated"] = "drop"
+    missing = dict.fromkeys(text for log in logs for text in log.form.get("missing", ()))
+    if missing:
+        form["missing"] = list(missing)
     notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
     return replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes)

@@ -149,3 +149,59 @@ def test_cells_and_names() -> None:
     assert cells('1, "a b" ,', ",") == ["1", "a b", ""]
     assert cells(" 1   2\t3", "whitespace") == ["1", "2", "3"]
     assert plain(" Yaw-Rate (deg/s)") == "yaw_rate"
+
+
+def log_of(tmp_path: Path, lines: list[str], name: str = "log.csv") -> Path:
+    file = tmp_path / name
+    file.write_text("\n".join(lines) + "\n")
+    return file
+
+
+def test_rows_that_repeat_the_row_before_are_dropped_and_said(tmp_path: Path) -> None:
+    rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
+    twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
+    sniffed = sniff(log_of(tmp_path, ["time,x,y", *twice]))
+    assert sniffed.clock == {"from": "time", "unit": "s", "repeated": "drop"}
+    np.testing.assert_allclose(sniffed.t, 0.2 * np.arange(60))
+    assert all(len(values) == 60 for values in sniffed.columns.values())
+    assert any("repeat" in note for note in sniffed.notes)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_rounded_clock_keeps_its_rate_where_rows_are_lost(tmp_path: Path, seed: int) -> None:
+    """Stamps of whole seconds at 2 or 4 Hz, some rows lost and a long pause: no instant is off by more than a step."""
+    rng = np.random.default_rng(seed)
+    every, count = (0.5, 0.25)[seed % 2], 900
+    true = every * np.arange(count) + np.where(np.arange(count) < 500, 0.0, 300.0)
+    true = true[rng.random(count) > 0.006]
+    stamp = [f"{int(t // 3600) + 8:02d}:{int(t // 60) % 60:02d}:{int(t % 60):02d}" for t in true]
+    x = rng.normal(size=len(true))
+    sniffed = sniff(log_of(tmp_path, ["time,x", *(f"{s},{value:.4f}" for s, value in zip(stamp, x, strict=True))]))
+    assert sniffed.clock["every"] == pytest.approx(every)
+    off = sniffed.t - sniffed.t[0] - (true - true[0])
+    assert np.ptp(off) < 1.0 + every, "within the rounding"
+    assert (np.diff(sniffed.t) > 0).all()
+
+
+@pytest.mark.parametrize("word", ["-999", "9999", "-99.0"])
+def test_a_number_for_missing_values_is_said_and_not_taken(tmp_path: Path, word: str) -> None:
+    rows = [f"{k},{np.sin(k):.3f},{360 * ((0.01 * k) % 1):.1f}" for k in range(80)]
+    rows[40] = f"40,{word},{word if word != '-99.0' else '144.0'}"
+    sniffed = sniff(log_of(tmp_path, ["time,x,heading", *rows]))
+    assert sniffed.form["missing"][-1] == word
+    assert np.isnan(sniffed.columns["x"][40])
+    assert np.nanmax(np.abs(sniffed.columns["heading"])) <= 360
+
+
+def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
+    rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
+    assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form
+
+
+def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
+    lines = ["  time            east  north", "  -                 m      m"]
+    lines += [f"2023-11-12 08:17:{k:02d}.5  {k}  {2 * k}" for k in range(30)]
+    sniffed = sniff(log_of(tmp_path, lines, "log.dat"))
+    assert sniffed.clock["date"] == "date"
+    np.testing.assert_allclose(np.diff(sniffed.t), 1.0)
+    assert list(sniffed.columns) == ["east [m]", "north [m]"]
