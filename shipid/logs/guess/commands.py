@@ -224,8 +224,8 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     if said is not None and said != "%":
         return said
     heading = next((one.unit for one in state.suggestions if one.name == "psi"), None)
-    if row.angle and row.role == "motion" and heading is not None:  # a roll of a degree is no roll of a radian
-        return heading
+    if row.angle and row.role == "motion" and heading == row.read_in:  # a roll of a degree is no roll of a radian
+        return row.read_in
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 
