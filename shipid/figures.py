@@ -25,7 +25,7 @@ from shipid.report.content import ReportContent
 from shipid.report.figure import Panel
 from shipid.report.identification import IdentificationContent
 from shipid.report.manoeuvre import ManoeuvreContent
-from shipid.report.paths import browser, window_figure
+from shipid.report.paths import browser, window_plot
 from shipid.report.standalone import dressed, standalone
 
 if TYPE_CHECKING:
@@ -92,12 +92,12 @@ def width_map(source: Source, *, dark: bool = False) -> go.Figure:
 
 def error_over_horizon(
     source: Source,
-    statistic: Literal["mean", "90th percentile"] = "mean",
+    statistic: Literal["mean", "90th percentile", "along (surge)", "across (sway)", "course"] = "mean",
     N_D: int | None = None,
     *,
     dark: bool = False,
 ) -> go.Figure:
-    """Position error over the time ahead, of models trained on `N_D` manoeuvres; default: the most."""
+    """Error over the time ahead, of position [m] or course [deg]; `N_D` default: the most."""
     return standalone("error_over_horizon", content_of(source), [statistic, N_D], dark=dark)
 
 
@@ -118,8 +118,8 @@ def prediction(
     N_D : manoeuvres the models were trained on; default: the most.
     """
     content = content_of(source)
-    panel, record = Panel(window_figure(content, run, t, N_D)), browser(content)
-    assert record is not None  # window_figure has raised where there are no windows
+    panel, record = Panel(window_plot(content, run, t, N_D)), browser(content)
+    assert record is not None  # window_plot has raised where there are no windows
     return dressed(record, [panel], dark)
 
 

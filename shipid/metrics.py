@@ -88,6 +88,24 @@ def over_horizon_by_axis(predicted: Array, true: Array) -> dict[str, Array]:
     return {"along": along, "across": across}
 
 
+SLOW = 0.2  # m/s over ground: a slower ship has no course
+
+
+def course_over_horizon(predicted: Array, true: Array, step: float) -> Array:
+    """Return the mean absolute error (T,) [rad] of the course, the direction of the track, of paths (T, S, 2) [m].
+
+    Paths begin at the origin and have a point each `step` [s]. Windows in which the ship truly makes less than `SLOW`
+    in that step are left out; NaN where all are.
+    """
+    going, truly = (np.diff(path, axis=0, prepend=np.zeros_like(path[:1])) for path in (predicted, true))
+    cross = truly[..., 0] * going[..., 1] - truly[..., 1] * going[..., 0]
+    moves = np.hypot(truly[..., 0], truly[..., 1]) >= SLOW * step
+    angle = np.abs(np.arctan2(cross, (truly * going).sum(axis=-1)))
+    count = moves.sum(axis=1)
+    mean: Array = np.where(count > 0, (angle * moves).sum(axis=1) / np.maximum(count, 1), np.nan)
+    return mean
+
+
 def over_time(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     mean: Array = error.mean(axis=0)

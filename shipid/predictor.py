@@ -71,6 +71,11 @@ class Predictor:
         return self.physics.vessel
 
     @property
+    def no_band(self) -> str:
+        """Why it has no band, if it has none."""
+        return _no_band(self.provenance)
+
+    @property
     def past(self) -> int:
         """Steps of the past that `Instants.past` must hold."""
         return math.ceil(self.corrector.past / self.physics.step - 1e-9)
@@ -138,11 +143,7 @@ class Predictor:
 
     def check_level(self, level: float, kind: str | None = None) -> Bands:
         """Return the bands; DataError, one sentence, where there are none of this level."""
-        if self.bands is None:
-            reason = self.provenance.get("no_band", "it was made without")
-            raise DataError(f"{NO_BAND}{reason}")
-        self.bands.check(level, kind)
-        return self.bands
+        return checked_bands(self.bands, self.no_band, level, kind)
 
     def alone(self, instants: Instants) -> Array:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
@@ -342,6 +343,27 @@ def fit(
     if bands is None:
         provenance["no_band"] = reason
     return Predictor(physics, kind_of(method), corrector, limits, provenance, commands, bands=bands)
+
+
+def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
+    """Read the bands of a saved predictor alone, and why it has none if it has none; a damaged file as it comes."""
+    arrays = read_arrays(file)
+    header = json.loads(str(arrays["header"]))
+    band = {name.removeprefix(BANDS): values for name, values in arrays.items() if name.startswith(BANDS)}
+    known = header["bands"]
+    return None if known is None else Bands.from_arrays(known, band), _no_band(header["provenance"])
+
+
+def checked_bands(bands: Bands | None, reason: str, level: float, kind: str | None = None) -> Bands:
+    """Return the bands; DataError, one sentence, where there are none, for a reason, or none of this level."""
+    if bands is None:
+        raise DataError(f"{NO_BAND}{reason}")
+    bands.check(level, kind)
+    return bands
+
+
+def _no_band(provenance: Mapping[str, Any]) -> str:
+    return str(provenance.get("no_band", "it was made without"))
 
 
 NO_BAND = "this predictor has no band: "

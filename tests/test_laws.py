@@ -22,6 +22,7 @@ from shipid.physics.grammar import Grammar
 from shipid.physics.signals import SIGNALS, named
 from shipid.simulation.sea import wave_loads
 from shipid.vessel.bindings import bindings
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import uniform
 from shipid.vessel.schema import SHARED, parameters, signals, structural, term_blocks
@@ -232,8 +233,72 @@ def test_the_signals_of_every_term_are_declared() -> None:
 def test_what_a_term_gives_takes_signals_of_the_term(key: str) -> None:
     term = TERMS[key]
     for name, function in term.gives.items():
-        assert name in GIVEN
+        assert name in {*GIVEN, *named("output")}
         assert set(signals(function)) <= set(signals(term.function))
+
+
+OUTPUTS = [(key, name) for key, term in TERMS.items() for name in term.gives if name in named("output")]
+
+
+def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False) -> float | None:
+    """What an instrument shows, in drawn signals; mirrored: with numbers of the two sides exchanged."""
+    vessel, path = _with_term(key)
+    numbers = {p: ca.SX(vessel.parameters[p]) for p in vessel.parameters}
+    function, taken = TERMS[key].gives[name], {p.name for p in parameters(TERMS[key].gives[name])}
+    keywords = {k: _symbols(v, numbers) for k, v in bindings(vessel.document)[path].items() if k in taken}
+    if mirrored:
+        plus = {k: v for k, v in keywords.items() if k.endswith(("_plus", "_minus"))}
+        keywords |= {
+            k: plus[k[: -len(end)] + other]
+            for k in plus
+            for end, other in (("_plus", "_minus"), ("_minus", "_plus"))
+            if k.endswith(end)
+        }
+        keywords |= {k: -keywords[k] for k in ("y",) if k in keywords}
+    value = function(*(ca.SX(drawn[signal]) for signal in signals(function)), **keywords)
+    return None if value is None else float(ca.evalf(value))
+
+
+@pytest.mark.parametrize(("key", "name"), OUTPUTS)
+@pytest.mark.parametrize("seed", range(3))
+def test_an_output_is_mirrored_as_its_row_says(key: str, name: str, seed: int) -> None:
+    drawn = random_signals(example(key), seed)
+    mirrored = {signal: value * MIRROR.get(signal, 1) for signal, value in drawn.items()}
+    value = output(key, name, drawn)
+    if value is None:
+        assert name == "torque"  # no bundled vessel has K_Q
+        return
+    assert value != 0
+    assert output(key, name, mirrored, mirrored=True) == pytest.approx(SIGNALS[name].mirror * value, rel=1e-9)
+
+
+@pytest.mark.parametrize(("key", "name"), OUTPUTS)
+def test_the_force_on_the_ship_is_that_of_the_output_less_what_the_hull_takes(key: str, name: str) -> None:
+    """X = (1 - t_P) T of a screw ahead; Y = -(1 + a_H) F_N cos(delta) of a rudder (MMG eqs. 12, 18)."""
+    found = example(key)
+    drawn = random_signals(found, 7) | {"n": 2.0} if "n" in found.signals else random_signals(found, 7)
+    value, wrench, (vessel, path) = output(key, name, drawn), found.wrench(drawn), _with_term(key)
+    if value is None:
+        return
+    if name == "thrust":
+        t_P = vessel.parameters.get(f"{path}.t_P", 0.0)
+        turn = drawn.get("alpha", 0.0)
+        assert wrench[0] * np.cos(turn) + wrench[1] * np.sin(turn) == pytest.approx((1 - t_P) * value, rel=1e-9)
+    else:
+        a_H = vessel.parameters[f"{path}.a_H"]
+        assert wrench[1] == pytest.approx(-(1 + a_H) * value * np.cos(drawn["delta"]), rel=1e-9)
+
+
+def test_torque_is_the_coefficient_times_its_unit() -> None:
+    """Q = rho n^2 D^5 K_Q(J), and against the shaft for n < 0."""
+    ship = load_vessel("kvlcc2-l7").with_values({"thruster.propeller.K_Q": {"1": 0.04, "J": -0.03}})
+    drawn = np.zeros(6)
+    for n in (10.0, -10.0):
+        measured = np.array(dynamics(ship).measured(drawn, [0.0], [n, 0.0], [], list(ship.parameters.values())))
+        shown = dict(zip(dynamics(ship).outputs, measured[:, 0], strict=True))
+        D_p, rho = ship.parameters["thruster.propeller.D_p"], ship.parameters["constants.rho"]
+        assert shown["propeller.torque"] == pytest.approx(rho * n * abs(n) * D_p**5 * 0.04)
+        assert shown["propeller.thrust"] != 0
 
 
 CALM = pytest.mark.parametrize("key", [key for key in TERMS if key not in DRAWN_COMPONENTS])

@@ -125,3 +125,19 @@ def test_quantiles_of_a_tally(share: float, count: int) -> None:
     assert (found <= high * (1 + 1 / 512)).all()
     if count == 5000:
         np.testing.assert_allclose(found, np.quantile(errors, share, axis=1), rtol=2e-3)
+
+
+@pytest.mark.parametrize(("angle", "speed"), [(0.0, 1.0), (-0.4, 0.3), (1.7, 8.0), (3.0, 2.0)])
+def test_the_error_of_the_course_is_the_angle_between_tracks(angle: float, speed: float) -> None:
+    ahead = speed * 2.0 * np.arange(1, 6)[:, None]
+    true = np.stack([ahead, np.zeros_like(ahead)], axis=-1)
+    turned = np.stack([ahead * np.cos(angle), ahead * np.sin(angle)], axis=-1)
+    np.testing.assert_allclose(metrics.course_over_horizon(turned, true, 2.0), abs(angle), atol=1e-9)
+
+
+def test_a_ship_that_hardly_moves_has_no_course() -> None:
+    true = np.zeros((3, 2, 2))
+    assert np.isnan(metrics.course_over_horizon(true + 1.0, true, 1.0)).all()
+    true[:, 1, 0] = [1.0, 2.0, 3.0]
+    sideways = np.flip(true, axis=-1)
+    np.testing.assert_allclose(metrics.course_over_horizon(sideways, true, 1.0), np.pi / 2)

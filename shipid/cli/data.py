@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.completion import beginning, files
+from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
@@ -143,10 +143,17 @@ def data_check(
     dataset: Annotated[
         Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=files(".parquet"))
     ],
+    vessel: Annotated[
+        str | None,
+        typer.Option(
+            help="vessel whose thrust, torque and rudder force are compared with the measured ones",
+            autocompletion=bundled_or_file("models"),
+        ),
+    ] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, velocity against position."""
+    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position, thrust of a vessel."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 
@@ -154,6 +161,13 @@ def data_check(
         raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
     log = read_dataset(dataset)
     checks = check_dataset(log)
+    if vessel is not None:
+        import pandas as pd
+
+        from shipid.data.outputs import check_outputs
+        from shipid.vessel.load import load_vessel
+
+        checks = pd.concat([checks, check_outputs(load_vessel(vessel), log)], ignore_index=True)
     ok = checks["ok"].astype(bool)
     with answering(as_json) as answer:
         if html is not None:

@@ -303,6 +303,13 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
     answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
+    if len(outcome.outputs):
+        levels = [
+            [row["output"], row["unit"], *(digits(row[name]) for name in ("measured", "before", "after"))]
+            for row in outcome.outputs.to_dict("records")
+        ]
+        heads = ["measured output", "unit", "rms", "error before", "after"]
+        answer.rows("outputs", outcome.outputs, table(heads, levels))
     banded = "low" in outcome.manoeuvres
     compared = [
         [

@@ -12,7 +12,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
 from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
-from shipid.cli.terminal import counted, digits, draw, short, show_reasons, table
+from shipid.cli.terminal import counted, digits, draw, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
 
 if TYPE_CHECKING:
@@ -271,7 +271,9 @@ def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
     from shipid.study.contents import write_pages
 
-    typer.echo(str(write_pages(folder)))
+    with steps() as say:
+        report = write_pages(folder, say)
+    typer.echo(str(report))
 
 
 @app.command("check")
@@ -439,7 +441,8 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
         left = f"{end.total - end.done} of {end.total} cells"
         typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
         return
-    report = share_pages(folder)
+    with steps() as say:
+        report = share_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
 from shipid.files import whole
-from shipid.physics.signals import SIGNALS, is_command, named, signal_of
+from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,8 @@ class Dataset:
     Parameters
     ----------
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
-        (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w` and the
-        rest of `optional()`. SI units, radians; time increases within a run; no NaN.
+        (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w`, outputs
+        (`propeller.thrust` [N]) and the rest of `optional()`. SI units, radians; time increases within a run; no NaN.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
         has a separate clock (simulation) and `"shared"` where all runs are parts of one recording (the default).
     """
@@ -54,6 +54,11 @@ class Dataset:
     def commands(self) -> list[str]:
         """Names of the command columns, in the order of the table."""
         return [str(name) for name in self.frame.columns if is_command(str(name))]
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the columns of measured outputs (`propeller.thrust`), in the order of the table."""
+        return [str(name) for name in self.frame.columns if is_output(str(name))]
 
     @property
     def runs(self) -> list[str]:
@@ -84,7 +89,7 @@ def optional() -> dict[str, str]:
 
 def unit_of(name: str) -> str | None:
     """SI unit of a column by its name; None if no column may have this name."""
-    if is_command(name):
+    if is_command(name) or is_output(name):
         return SIGNALS[signal_of(name)].unit
     return (required() | optional()).get(name)
 
@@ -214,7 +219,7 @@ def _check_column(name: str, column: pd.Series[Any]) -> None:
     elif unit is None:
         raise DataError(
             f"unknown column: {choices(name, [*required(), *optional(), 'run', 'flags'])} "
-            f"(or a command, <component>.<signal>, signals {', '.join(named('command'))})",
+            f"(or <component>.<signal>, signals {', '.join((*named('command'), *named('output')))})",
             path=name,
         )
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -14,7 +14,7 @@ from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
-BLOCK = 256  # steps of one call in `memory_along`, samples of one in `orders_of`: made once, whatever is asked for
+BLOCK = 256  # steps of one call in `memory_along`, samples of one in `_of_samples`: made once, whatever is asked for
 
 
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
@@ -139,20 +139,29 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     return dict(zip(model.memory, states, strict=True))
 
 
-@lru_cache(maxsize=32)
-def _orders_map(model: Dynamics) -> ca.Function:
-    """The orders of `BLOCK` samples with the same parameters."""
-    return model.orders.map("orders", "serial", BLOCK, [model.orders.n_in() - 1], [])
+@lru_cache(maxsize=64)
+def _mapped(model: Dynamics, name: Literal["orders", "measured"]) -> ca.Function:
+    """A function of a model over `BLOCK` samples with the same parameters."""
+    function: ca.Function = getattr(model, name)
+    return function.map(name, "serial", BLOCK, [function.n_in() - 1], [])
 
 
 def orders_of(
     model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
 ) -> Array:
     """Orders (n_ordered, n) of the helmsman in n samples, each input (channels, n); parameters (P,)."""
-    count, mapped, parts = states.shape[1], _orders_map(model), []
-    for samples in np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(
-        -1, BLOCK
-    ):  # the last is padded
-        given = (part[:, samples] for part in (states, memory, commands, environment))
-        parts.append(np.array(mapped(*given, parameters)))
+    return _of_samples(_mapped(model, "orders"), [states, memory, commands, environment], parameters)
+
+
+def outputs_of(
+    model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
+) -> Array:
+    """Outputs (n_outputs, n) of the components in n samples, each input (channels, n); parameters (P,)."""
+    return _of_samples(_mapped(model, "measured"), [states, memory, commands, environment], parameters)
+
+
+def _of_samples(mapped: ca.Function, inputs: Sequence[Array], parameters: Array) -> Array:
+    count = inputs[0].shape[1]
+    blocks = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(-1, BLOCK)  # the last is padded
+    parts = [np.array(mapped(*(part[:, samples] for part in inputs), parameters)) for samples in blocks]
     return np.concatenate(parts, axis=1)[:, :count]

@@ -49,6 +49,8 @@ class Exportable(Protocol):
     def past(self) -> int: ...  # noqa: D102
     @property
     def bands(self) -> Bands | None: ...  # noqa: D102
+    @property
+    def no_band(self) -> str: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +99,7 @@ class Model:
     @property
     def no_band(self) -> str:
         """Why there is no band."""
-        return str(self.predictor.provenance.get("no_band", "it was made without"))
+        return self.predictor.no_band
 
     @property
     def parameters(self) -> Array:

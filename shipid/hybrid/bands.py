@@ -11,7 +11,7 @@ Everything here is arrays and formulas, so that a band can be exported with its 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
@@ -129,8 +129,18 @@ class Bands:
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
         radius = at_level(self.steps if pointwise else self.table(kind), level)
-        size = self.growth(paths, columns, step)
-        ahead = track(paths)
+        return self._region(radius, self.growth(paths, columns, step), track(paths))
+
+    def regions(
+        self, paths: Array, columns: Mapping[str, Array], step: float, levels: Sequence[float]
+    ) -> dict[float, Region]:
+        """Return the regions for whole paths at several levels, those that it promises; arguments as of `region`."""
+        size, ahead = self.growth(paths, columns, step), track(paths)
+        return {
+            level: self._region(at_level(self.whole, level), size, ahead) for level in levels if self.promises(level)
+        }
+
+    def _region(self, radius: Array, size: Array, ahead: Array) -> Region:
         return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
 
     def table(self, kind: str | None = None) -> Array:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
+from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
@@ -41,6 +42,7 @@ Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 SIGNALS = ("u", "v", "r", "position")
+ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
 """Standard manoeuvres [deg] that both vessels perform in calm water."""
 COMPARED = {
@@ -68,6 +70,8 @@ class Identified:
     colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
     groups : errors by side, helm and speed over one horizon, by `shipid.identification.sides.by_group`, on runs held
         out, else on fitted ones. beyond : sentences on standard manoeuvres that go farther than the fitted runs.
+    outputs : measured outputs of components that the vessel predicts, on fitted runs: `output`, `unit`, root mean
+        square `measured`, and of the difference `before` and `after`; empty without any.
     programme : manoeuvres to run next, ranked by `shipid.identification.design.rank`; None: not requested.
     """
 
@@ -87,6 +91,7 @@ class Identified:
     warnings: tuple[str, ...]
     groups: pd.DataFrame
     beyond: tuple[str, ...]
+    outputs: pd.DataFrame
 
     @property
     def errors(self) -> pd.DataFrame:
@@ -241,6 +246,8 @@ def run_identification(
         _go_on(held)
         warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
         warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
+        outputs = _outputs(pair, dataset, fitted)
+        warnings += tuple(_unused(outputs, settings))
         groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
         warnings += uneven(groups)
         if refused:
@@ -262,6 +269,7 @@ def run_identification(
             warnings=warnings,
             groups=groups,
             beyond=_beyond(pair[AFTER], dataset, fitted, logs),
+            outputs=outputs,
         )
 
 
@@ -269,6 +277,34 @@ def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ide
     """Errors by side, helm and speed of free runs as long as the predictions that were fitted."""
     series = free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
+
+
+def _outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
+    """Measured outputs against those of the vessels, in the recorded motion."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)].reset_index(drop=True)
+    part = replace(dataset, frame=rows)
+    if not common_outputs(pair[AFTER], part):
+        return pd.DataFrame(columns=["output", "unit", "measured", *pair])
+    tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}
+
+    def level(name: str, output: str, column: str) -> float:
+        here = tables[name][tables[name]["output"] == output]
+        return float(np.sqrt((here[column] ** 2).mean()))
+
+    first = tables[AFTER].drop_duplicates("output")
+    return pd.DataFrame(
+        {"output": output, "unit": unit, "measured": level(AFTER, output, "measured")}
+        | {name: level(name, output, "error") for name in pair}
+        for output, unit in zip(first["output"], first["unit"], strict=True)
+    )
+
+
+def _unused(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
+    """Warnings on measured outputs that are not fitted."""
+    for row in outputs.to_dict("records"):
+        if row["output"] not in settings.weights:
+            name, width = row["output"], f"{ACCURATE * row['measured']:.2g}"
+            yield f"{name} was measured and is not fitted: --set weights.{name}={width} [{row['unit']}]"
 
 
 def _beyond(vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
@@ -446,7 +482,8 @@ def _programme(
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
-    spread = {name: width * residual_level(judged, name) for name, width in settings.weights.items()}
+    motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
+    spread = {name: width * residual_level(judged, name) for name, width in motions.items()}
     contributions = design.informed(
         vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
         interval=settings.step,

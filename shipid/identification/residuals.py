@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import compiler, refuse
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
 from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
@@ -110,6 +110,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
     model, unknown = dynamics(vessel), unknowns(vessel, settings)
+    _check_outputs(vessel, dataset, settings)
     overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
@@ -144,6 +145,19 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         start_width=widths.get("initial_state"),
         deviations=np.array(list(settings.signals.values())),
     )
+
+
+def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None:
+    """Raise DocumentError for an output that is fitted and that the vessel or the data lack."""
+    for name in settings.outputs:
+        predicted, path = dynamics(vessel).outputs, f"{BLOCK}.weights.{name}"
+        if name not in predicted:
+            lacks = "; a torque needs K_Q of the propeller" if name.endswith(".torque") else ""
+            message = f"{vessel.name} predicts no {name}: {choices(name, predicted)}{lacks}"
+            raise DocumentError(message, file=vessel.file, path=path)
+        if name not in dataset.outputs:
+            message = f"was not measured; the data have {', '.join(dataset.outputs) or 'no output of a component'}"
+            raise DataError(message, path=path)
 
 
 def _weather(
@@ -217,16 +231,21 @@ class Predictions:
         """Inputs (N, .) of every step: commands, weather, memories; the last are repeated up to the common length."""
         layout = self.problem.layout
         steps = np.minimum(np.arange(self.length), segment.num_steps - 1)
+        columns = self._given(segment, steps)
+        if not layout.carried:
+            columns += [segment.memory[name][steps] for name in layout.model.memory]
+        return np.array(columns).reshape(-1, self.length).T
+
+    def _given(self, segment: ShootingSegment, at: NDArray[np.intp]) -> list[Array]:
+        """Commands, with those before them, and weather, each (N,), at N rows of a segment."""
+        layout = self.problem.layout
         commands = {
             name: np.concatenate([segment.earlier[name][::-1], segment.columns[name]]) for name in layout.model.commands
         }
         columns = [
-            commands[name][steps + layout.lags - j] for j in range(layout.lags + 1) for name in layout.model.commands
+            commands[name][at + layout.lags - j] for j in range(layout.lags + 1) for name in layout.model.commands
         ]
-        columns += [segment.columns[name][steps] for name in layout.weather]
-        if not layout.carried:
-            columns += [segment.memory[name][steps] for name in layout.model.memory]
-        return np.array(columns).reshape(-1, self.length).T
+        return columns + [segment.columns[name][at] for name in layout.weather]
 
     def _seen(self, segment: ShootingSegment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
@@ -234,7 +253,9 @@ class Predictions:
         at = np.minimum(steps, segment.num_steps)
         weight = ((steps <= segment.num_steps) & segment.measured[at])[:, None] / self.problem.deviations
         y = np.array([segment.columns[name][at] for name in layout.signals]).T
-        return np.hstack([y, weight]), weight, segment.t[0] + layout.step * steps
+        now = self._given(segment, at) if layout.outputs else []
+        seen = np.hstack([y, weight, np.array(now).reshape(-1, self.length).T])
+        return seen, weight, segment.t[0] + layout.step * steps
 
     def _run(self, x: Array, fixed: Array) -> Array:
         """Outputs of all predictions by the compiled library, or by CasADi where they are few or it cannot be made."""

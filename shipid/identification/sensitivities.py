@@ -21,6 +21,7 @@ from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate
 from shipid.identification.settings import MOVING
 from shipid.interrupts import uninterrupted
+from shipid.physics.signals import is_output
 from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 
@@ -50,6 +51,17 @@ class Layout:
     def num_moving(self) -> int:
         """Number of nuisances that change the motion."""
         return sum(name in MOVING for name in self.nuisances)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Fitted outputs of components, such as `propeller.thrust`."""
+        return tuple(name for name in self.signals if is_output(name))
+
+    @cached_property
+    def num_seen(self) -> int:
+        """Inputs of the residuals at each instant: signals, their weights; with outputs also commands and weather."""
+        now = len(self.model.commands) * (1 + self.lags) + len(self.weather) if self.outputs else 0
+        return 2 * len(self.signals) + now
 
     @cached_property
     def carried(self) -> bool:
@@ -105,7 +117,7 @@ class Variation:
         """(x, fixed, known, seen) -> (x after one step, outputs there); x is the node with its sensitivities."""
         layout, num = self.layout, len(self.states) * (1 + self.num_columns)
         x, fixed = SX.sym("x", self.size), SX.sym("fixed", self.rates.size1_in(2))
-        known, seen = SX.sym("known", self.rates.size1_in(3)), SX.sym("seen", 2 * len(layout.signals))
+        known, seen = SX.sym("known", self.rates.size1_in(3)), SX.sym("seen", layout.num_seen)
         count = len(layout.model.memory)
         memory = x[num:] if layout.carried else known[known.shape[0] - count :]
         after, later = integrate(
@@ -175,6 +187,19 @@ class _Ship:
         """Actuator states after a time dt [s]."""
         return SX(self.model.advance(SX(len(self.names), 1), *self.inputs, dt))
 
+    def signals(self, state: SX, names: Sequence[str], values: SX) -> SX:
+        """Fitted signals: of the whole state, of which `values` are those called `names`."""
+        shown: dict[str, SX] = {}
+        if self.layout.outputs:
+            outputs = SX(self.model.measured(state, *self.inputs))
+            shown = dict(zip(self.model.outputs, ca.vertsplit(outputs), strict=True))
+        return _signals(self.layout.signals, dict(zip(names, ca.vertsplit(values), strict=True)) | shown, self.value_of)
+
+    @property
+    def now(self) -> SX:
+        """Commands and weather at the instant of a measured output; nothing if no output is fitted."""
+        return ca.vertcat(self.commands, self.weather) if self.layout.outputs else SX(0, 1)
+
 
 @lru_cache(maxsize=32)
 def variation(layout: Layout) -> Variation:
@@ -186,10 +211,7 @@ def variation(layout: Layout) -> Variation:
     z, whole = SX.sym("states", len(needed)), SX(len(ship.names), 1)
     whole[needed] = z
     f, dt = ship.rates(whole)[needed], SX.sym("dt")
-    later, h = (
-        ship.advance(dt),
-        _signals(layout.signals, dict(zip(states, ca.vertsplit(z), strict=True)), ship.value_of),
-    )
+    later, h = ship.advance(dt), ship.signals(whole, states, z)
     width = len(node) + ship.moving.shape[0]
     S, D = SX.sym("S", len(states), width), SX.sym("D", ship.memory.shape[0] if layout.carried else 0, width)
 
@@ -202,7 +224,12 @@ def variation(layout: Layout) -> Variation:
         slope += ca.jacobian(f, ship.memory) @ D
         more = ca.jacobian(later, ship.memory) @ D + direct(later)
     seen, count = SX.sym("seen", 2 * len(layout.signals)), len(layout.signals)
-    R = ca.horzcat(ca.jacobian(h, z) @ S, ca.jacobian(h, ship.seen))
+    moved = ca.jacobian(h, z) @ S
+    if layout.outputs:
+        moved += direct(h)
+        if layout.carried:
+            moved += ca.jacobian(h, ship.memory) @ D
+    R = ca.horzcat(moved, ca.jacobian(h, ship.seen))
     weighted = [seen[count:] * (h - seen[:count]), ca.vec(ca.repmat(seen[count:], 1, R.shape[1]) * R)]
     entries, begin = _begin(states, ship.value_of)
     both = {"z": ca.vertcat(z, ca.vec(S)), "m": ca.vertcat(ship.memory, ca.vec(D)), "fixed": ship.fixed}
@@ -211,7 +238,7 @@ def variation(layout: Layout) -> Variation:
         layout=layout,
         rates=_function("rates", {**both, "known": ship.known}, ca.vertcat(f, ca.vec(slope))),
         advance=_function("advance", timed, ca.vertcat(later, ca.vec(more))),
-        outputs=_function("outputs", {**both, "seen": seen}, ca.vertcat(*weighted)),
+        outputs=_function("outputs", {**both, "seen": ca.vertcat(seen, ship.now)}, ca.vertcat(*weighted)),
         begin=_function("begin", {"measured": entries, "nuisances": ship.q}, begin),
         begin_slope=_function("slope", {"measured": entries, "nuisances": ship.q}, ca.jacobian(begin, ship.q)),
         states=states,
@@ -259,7 +286,7 @@ def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
 
 
 def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
-    """Signals of a log with the sensor faults in `value_of`, from the true states.
+    """Signals of a log with the sensor faults in `value_of`, from the true states and outputs.
 
     Velocities are horizontal. heading_bias [rad] is added to the true heading, and u and v are resolved along the
     biased heading: the velocity over ground is unchanged. The logged point is lever_arm [m] ahead of the origin.
@@ -277,7 +304,7 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
         "north": lambda: state["north"] + x * ca.cos(psi),
         "east": lambda: state["east"] + x * ca.sin(psi),
     }
-    return ca.vertcat(*(read[name]() for name in signals))
+    return ca.vertcat(*(read[name]() if name in read else state[name] for name in signals))
 
 
 def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
@@ -302,7 +329,7 @@ def _entries(states: Sequence[str]) -> tuple[str, ...]:
 def _needed(ship: _Ship) -> list[int]:
     """Indices of the states that influence a fitted signal, directly or through other states; u, v, r always."""
     x = SX.sym("x", len(ship.names))
-    h = _signals(ship.layout.signals, dict(zip(ship.names, ca.vertsplit(x), strict=True)), ship.value_of)
+    h = ship.signals(x, ship.names, x)
     felt, seen = (np.array(ca.DM(ca.jacobian_sparsity(result, x), 1)) != 0 for result in (ship.rates(x), h))
     wanted = seen.any(axis=0) | np.isin(ship.names, ("u", "v", "r"))  # the motion itself
     while (more := wanted | felt[wanted].any(axis=0)).sum() > wanted.sum():

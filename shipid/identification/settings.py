@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
 from shipid.identification.plausible import within
+from shipid.physics.signals import is_output, named
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select
 
@@ -46,7 +47,8 @@ WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.
 class Identify(documents.Checked, BaseModel):
     """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
-    weights : standard deviations of the signals [m/s, rad/s, rad, m]. Units of the nuisance widths: standard deviations
+    weights : standard deviations of the signals [m/s, rad/s, rad, m], and of measured outputs by the names of their
+    columns (`propeller.thrust` [N]), which may be nested tables. Units of the nuisance widths: standard deviations
     of the weights (initial_state), m/s (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency),
     1 (thrust_scale).
     """
@@ -86,12 +88,21 @@ class Identify(documents.Checked, BaseModel):
     )
     drop_to: Literal["base", "zero"] = "base"
 
+    @field_validator("weights", mode="before")
+    @classmethod
+    def _by_column(cls, given: Any) -> Any:
+        """The nested table `propeller = { thrust = 500 }` as the column `propeller.thrust`."""
+        return dict(documents.leaves(given)) if isinstance(given, dict) else given
+
     @model_validator(mode="after")
     def _known(self) -> Identify:
-        for names, valid, what in ((self.weights, SIGNALS, "weights"), (self.nuisance, NUISANCES, "nuisance")):
-            unknown = next((name for name in names if name not in valid), None)
-            if unknown is not None:
-                raise ValueError(f"{what}.{unknown} is no valid name: {choices(unknown, valid)}")
+        for name in self.weights:
+            if name not in SIGNALS and not is_output(name):
+                outputs = f"or a measured output, <component>.<signal> with a signal of {', '.join(named('output'))}"
+                raise ValueError(f"weights.{name} is no valid name: {choices(name, SIGNALS)} ({outputs})")
+        unknown = next((name for name in self.nuisance if name not in NUISANCES), None)
+        if unknown is not None:
+            raise ValueError(f"nuisance.{unknown} is no valid name: {choices(unknown, NUISANCES)}")
         for path, (low, high) in self.bounds.items():
             if not low <= high:
                 raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
@@ -108,7 +119,17 @@ class Identify(documents.Checked, BaseModel):
     @property
     def signals(self) -> dict[str, float]:
         """Fitted column -> standard deviation."""
-        return {column: width for name, width in self.weights.items() for column in SIGNALS[name]}
+        return {column: width for name, width in self.weights.items() for column in columns_of(name)}
+
+    @property
+    def outputs(self) -> list[str]:
+        """Fitted outputs of components, such as `propeller.thrust`."""
+        return [name for name in self.weights if is_output(name)]
+
+
+def columns_of(name: str) -> tuple[str, ...]:
+    """Columns of the data that a name in `weights` fits; an output is its column."""
+    return SIGNALS.get(name, (name,))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from shipid.errors import DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.residuals import Problem, build
-from shipid.identification.settings import BLOCK, SIGNALS, Identify
+from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import LinearFit, whiteness
 from shipid.vessel.load import Vessel
@@ -129,7 +129,9 @@ def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
     settings, seen = solution.settings, whiteness(LinearFit.of(solution))
     factors = {
-        name: max(float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in SIGNALS[name]])), LEAST)
+        name: max(
+            float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in columns_of(name)])), LEAST
+        )
         for name in settings.weights
     }
     widths = settings.widths

@@ -29,7 +29,7 @@ from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, Progress, TextFormat, dated, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
-from shipid.physics.signals import is_command
+from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
@@ -172,7 +172,12 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
         rows = _true_wind(rows)
     known = [name for name in (*required(), *optional()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
-    order = [*known, *commands, "flags"] if mapping.resamples or "latitude" in mapping.columns else list(rows.columns)
+    outputs = [str(name) for name in rows.columns if is_output(str(name))]
+    order = (
+        [*known, *commands, *outputs, "flags"]
+        if mapping.resamples or "latitude" in mapping.columns
+        else list(rows.columns)
+    )
     return Imported(rows[order], first + records + gaps + more + estimated, read, origin, begins)
 
 

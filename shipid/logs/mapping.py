@@ -23,7 +23,7 @@ from shipid.logs.repairs import (
     Strict,
     WrapInterpolation,
 )
-from shipid.physics.signals import is_command, named
+from shipid.physics.signals import is_command, is_output, named
 from shipid.units import DEGREE, KNOT, RPM
 
 UNITS: dict[str, dict[str, float]] = {
@@ -33,6 +33,8 @@ UNITS: dict[str, dict[str, float]] = {
     "rad": {"rad": 1.0, "deg": DEGREE},
     "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
+    "N": {"N": 1.0, "kN": 1e3},
+    "N m": {"N m": 1.0, "kN m": 1e3, "Nm": 1.0, "kNm": 1e3},
     "-": {"-": 1.0, "%": 1e-2},
 }
 """SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8).
@@ -278,8 +280,8 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
     mapped = (*required().keys() - {"t"}, *optional().keys() - set(STANDARD_DEVIATIONS.values()), *INPUTS)
     for name, column in columns.items():
         unit, path = INPUTS.get(name) or unit_of(name), f"columns.{name}"
-        if unit is None or not (name in mapped or is_command(name)):
-            hint = f"or a command, <component>.<signal> with a signal of {', '.join(named('command'))}"
+        if unit is None or not (name in mapped or is_command(name) or is_output(name)):
+            hint = f"or <component>.<signal> with a signal of {', '.join((*named('command'), *named('output')))}"
             raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
         _factor(column.unit, unit, file, f"{path}.unit")
         if (column.direction is None) == (name == "beta_w"):

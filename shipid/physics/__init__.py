@@ -26,7 +26,9 @@ class Term:
     states : for a term with additional states, a function from its block to their names; `function` and `rates` take
         them as the signal `state`.
     rates : d(state)/dt from signals; integrated with the motion.
-    gives : signal -> function of signals. A term whose block says that it is `behind` this one receives that signal.
+    gives : signal -> function of signals. A term whose block says that it is `behind` this one receives a signal of
+        `GIVEN`. An output (`thrust`) is what an instrument on this component shows: a log may have it as
+        `<component>.thrust`. None where the block lacks the parameters of an output.
 
     The parameters of a block are those of `function`, `gives` and `rates` together; each takes those that it declares.
     """
@@ -87,15 +89,28 @@ TERMS: dict[str, Term] = {
     "waves.drift": Term(waves.drift, drawn=waves.drift_widths),
     "wind.table": Term(wind.table),
     "wind.blendermann": Term(wind.blendermann),
-    "thruster.azimuth": Term(thruster.azimuth),
+    "thruster.azimuth": Term(thruster.azimuth, gives={"thrust": thruster.azimuth_thrust}),
     "thruster.tunnel": Term(thruster.tunnel),
-    "thruster.propeller": Term(propeller.propeller, gives={"wash": propeller.wash}),
-    "thruster.controllable_pitch": Term(propeller.controllable_pitch, gives={"wash": propeller.controllable_wash}),
-    "thruster.four_quadrant": Term(propeller.four_quadrant, gives={"wash": propeller.four_quadrant_wash}),
-    "thruster.quadratic": Term(propeller.quadratic, gives={"wash": propeller.quadratic_wash}),
+    "thruster.propeller": Term(
+        propeller.propeller,
+        gives={"wash": propeller.wash, "thrust": propeller.propeller_thrust, "torque": propeller.propeller_torque},
+    ),
+    "thruster.controllable_pitch": Term(
+        propeller.controllable_pitch,
+        gives={"wash": propeller.controllable_wash, "thrust": propeller.controllable_thrust},
+    ),
+    "thruster.four_quadrant": Term(
+        propeller.four_quadrant,
+        gives={"wash": propeller.four_quadrant_wash, "thrust": propeller.four_quadrant_shaft_thrust},
+    ),
+    "thruster.quadratic": Term(
+        propeller.quadratic, gives={"wash": propeller.quadratic_wash, "thrust": propeller.quadratic_shaft_thrust}
+    ),
     "thruster.service_speed": Term(propeller.service_speed),
-    "thruster.rudder": Term(rudder.rudder),
-    "thruster.rudder_polynomial": Term(rudder.rudder_polynomial),
+    "thruster.rudder": Term(rudder.rudder, gives={"normal_force": rudder.normal_force}),
+    "thruster.rudder_polynomial": Term(
+        rudder.rudder_polynomial, gives={"normal_force": rudder.polynomial_normal_force}
+    ),
     "thruster.rudder_coefficients": Term(rudder.rudder_coefficients),
     "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),
 }

@@ -76,6 +76,29 @@ def beyond(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
     return ca.sign(u_P) * ca.fmax(u_P**2 - (limit * n * D_p) ** 2, 0)
 
 
+def polynomial_thrust(
+    u_P: SX,
+    n: SX,
+    D_p: SX,
+    K_T: Mapping[str, SX],
+    K_T_astern: Mapping[str, SX] | None,
+    J_min: SX,
+    J_max: SX,
+    k_astern: SX | float,
+    k_drag: SX | float,
+    rho: SX,
+) -> SX:
+    """Thrust [N] of a screw, rho n^2 D_p^4 K_T(J), with its drag beyond J_min..J_max; see `propeller`."""
+    sense = ca.if_else(n >= 0, 1, -k_astern)
+    K = thrust_coefficient(u_P, n, D_p, K_T, J_min, J_max)
+    if K_T_astern:
+        K = ca.if_else(n >= 0, K, thrust_coefficient(u_P, n, D_p, K_T_astern, J_min, J_max))
+    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * K
+    if given(k_drag, 0.0):
+        thrust -= k_drag * rho * D_p**2 * beyond(u_P, n, D_p, J_min, J_max)
+    return thrust
+
+
 def propeller(
     nu_r: SX,
     n: SX,
@@ -113,19 +136,68 @@ def propeller(
     Y_astern < 0 < N_astern.
     """
     u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    sense = ca.if_else(n >= 0, 1, -k_astern)
-    K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
-    if K_T_astern:
-        K = ca.if_else(n >= 0, K, thrust_coefficient(u_P, n, D_p, K_T_astern, SX(J_min), SX(J_max)))
-    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * K
-    if given(k_drag, 0.0):
-        thrust -= k_drag * rho * D_p**2 * beyond(u_P, n, D_p, SX(J_min), SX(J_max))
+    thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, SX(J_min), SX(J_max), k_astern, k_drag, rho)
     wrench = force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
     if Y_astern or N_astern:
         unit = ca.if_else(n >= 0, 0, rho * n**2 * D_p**2 * D_p**2)
         Y, N = (thrust_coefficient(u_P, n, D_p, K or {}, SX(J_min), SX(J_max)) for K in (Y_astern, N_astern))
         wrench += unit * vector(0, Y, 0, -z * Y, 0, D_p * N)
     return wrench
+
+
+def propeller_thrust(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    K_T: Annotated[Mapping[str, SX], THRUST],
+    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    J_min: Annotated[SX | float, "-"] = -1.0,
+    J_max: Annotated[SX | float, "-"] = 1.5,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    k_drag: Annotated[SX | float, "-"] = 0.0,
+    w_P0: Annotated[SX, "-"],
+    C_1: Annotated[SX, "-"],
+    C_2_plus: Annotated[SX, "-"],
+    C_2_minus: Annotated[SX, "-"],
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Thrust [N] in the shaft of `propeller`: before the thrust deduction."""
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    return polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, SX(J_min), SX(J_max), k_astern, k_drag, rho)
+
+
+def propeller_torque(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    K_Q: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    J_min: Annotated[SX | float, "-"] = -1.0,
+    J_max: Annotated[SX | float, "-"] = 1.5,
+    w_P0: Annotated[SX, "-"],
+    C_1: Annotated[SX, "-"],
+    C_2_plus: Annotated[SX, "-"],
+    C_2_minus: Annotated[SX, "-"],
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX | None:
+    """Torque [N m] in the shaft of `propeller`, Q = sign(n) rho n^2 D_p^5 K_Q(J); None without K_Q.
+
+    K_Q is that behind the ship: of the open-water test over the relative rotative efficiency (ITTC 7.5-02-03-01.4).
+    """
+    if K_Q is None:
+        return None
+    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    K = thrust_coefficient(u_P, n, D_p, K_Q, SX(J_min), SX(J_max))
+    return rho * n * ca.fabs(n) * D_p**2 * D_p**3 * K
 
 
 def wash(
@@ -209,6 +281,30 @@ def controllable_pitch(
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
 
 
+def controllable_thrust(
+    nu_r: SX,
+    n: SX,
+    pitch: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    k_P: Annotated[SX, "-", POSITIVE],
+    k_J: Annotated[SX, "-", POSITIVE],
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Thrust [N] in the shaft of `controllable_pitch`."""
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    return rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
+
+
 def controllable_wash(
     nu_r: SX,
     n: SX,
@@ -288,6 +384,22 @@ def quadratic(
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
 
+def quadratic_shaft_thrust(
+    nu_r: SX,
+    n: SX,
+    *,
+    T_nn: Annotated[SX, "kg m", POSITIVE],
+    T_nu: Annotated[SX | float, "kg"] = 0.0,
+    T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+    dT_nu: Annotated[SX | float, "kg"] = 0.0,
+    k_driven: Annotated[SX | float, "-"] = 1.0,
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+) -> SX:
+    """Thrust [N] in the shaft of `quadratic`."""
+    return quadratic_thrust((1 - w_P0) * nu_r[0], n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
+
+
 def quadratic_wash(
     nu_r: SX,
     n: SX,
@@ -364,6 +476,28 @@ def four_quadrant(
     u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
     thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+
+
+def four_quadrant_shaft_thrust(
+    nu_r: SX,
+    n: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    D_p: Annotated[SX, "m", POSITIVE],
+    beta_deg: Annotated[list[SX], "deg"],
+    C_T: Annotated[list[SX], "-"],
+    w_P0: Annotated[SX | float, "-"] = 0.0,
+    C_1: Annotated[SX | float, "-"] = 0.0,
+    C_2_plus: Annotated[SX | float, "-"] = 1.0,
+    C_2_minus: Annotated[SX | float, "-"] = 1.0,
+    tau: Annotated[SX | float, "-"] = 0.0,
+    C_P: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Thrust [N] in the shaft of `four_quadrant`."""
+    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    return rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
 
 
 def four_quadrant_wash(

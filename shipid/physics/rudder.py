@@ -59,6 +59,45 @@ def rudder(
     angles, f_angle_side does so in proportion to the angle. So F_N has odd and even parts, as the force behind one
     turning screw has; gamma_R_plus and gamma_R_minus of the MMG method are such a difference in the flow across alone.
     """
+    F_N = normal_force(
+        nu_r,
+        delta,
+        wash,
+        A_R=A_R,
+        H_R=H_R,
+        f_alpha=f_alpha,
+        epsilon=epsilon,
+        kappa=kappa,
+        gamma_R_plus=gamma_R_plus,
+        gamma_R_minus=gamma_R_minus,
+        ell_R=ell_R,
+        f_angle=f_angle,
+        f_side=f_side,
+        f_angle_side=f_angle_side,
+        rho=rho,
+    )
+    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+
+
+def normal_force(
+    nu_r: SX,
+    delta: SX,
+    wash: SX,
+    *,
+    A_R: Annotated[SX, "m^2", POSITIVE],
+    H_R: Annotated[SX, "m", POSITIVE],
+    f_alpha: Annotated[SX, "-", POSITIVE],
+    epsilon: Annotated[SX, "-", POSITIVE],
+    kappa: Annotated[SX, "-"],
+    gamma_R_plus: Annotated[SX, "-"],
+    gamma_R_minus: Annotated[SX, "-"],
+    ell_R: Annotated[SX, "m"],
+    f_angle: Annotated[SX | float, "-"] = 0.0,
+    f_side: Annotated[SX | float, "-"] = 0.0,
+    f_angle_side: Annotated[SX | float, "-"] = 0.0,
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Normal force F_N [N] on the blade of `rudder`, > 0 turns the ship to starboard."""
     u_P, u_race, D_p = wash[0], wash[1], wash[2]
     U, beta = drift(nu_r)
     across = U * beta - ell_R * nu_r[5]
@@ -72,7 +111,7 @@ def rudder(
     if given(f_angle, 0.0) or given(f_side, 0.0) or given(f_angle_side, 0.0):
         s = (u_R * ca.sin(delta) - v_R * ca.cos(delta)) / U_R
         F_N *= 1 + f_angle * ca.fabs(s) + f_side * ca.sign(s) + f_angle_side * s
-    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+    return F_N
 
 
 def _forces(F_N: SX, delta: SX, x: SX, y: SX | float, z: SX | float, t_R: SX, a_H: SX, x_H: SX) -> SX:
@@ -106,6 +145,26 @@ def rudder_polynomial(
     v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder` (-gamma_R is the
     value of "v"). F_N and the forces of it are those of `rudder`.
     """
+    F_N = polynomial_normal_force(
+        nu_r, delta, wash, A_R=A_R, f_alpha=f_alpha, epsilon=epsilon, k_x=k_x, v_R=v_R, L_pp=L_pp, rho=rho
+    )
+    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+
+
+def polynomial_normal_force(
+    nu_r: SX,
+    delta: SX,
+    wash: SX,
+    *,
+    A_R: Annotated[SX, "m^2", POSITIVE],
+    f_alpha: Annotated[SX, "-", POSITIVE],
+    epsilon: Annotated[SX, "-", POSITIVE],
+    k_x: Annotated[SX, "-"],
+    v_R: Annotated[Mapping[str, SX], CROSS_FLOWS],
+    L_pp: Annotated[SX, "m", POSITIVE],
+    rho: Annotated[SX, "kg m^-3", POSITIVE],
+) -> SX:
+    """Normal force F_N [N] on the blade of `rudder_polynomial`, > 0 turns the ship to starboard."""
     u_P, u_race = wash[0], wash[1]
     U = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
     prime = {"v": nu_r[1] / U, "r": nu_r[5] * L_pp / U}
@@ -114,8 +173,7 @@ def rudder_polynomial(
     race = u_race * ca.fabs(u_race) - SPEED_FLOOR**2  # the slipstream comes with a floor of its speed
     u_R = epsilon * signed_root(still + k_x * (race - still))
     U_R = ca.sqrt(ca.fmax(u_R**2 + across**2, SPEED_FLOOR**2))
-    F_N = rho / 2 * A_R * f_alpha * U_R * (u_R * ca.sin(delta) - across * ca.cos(delta))
-    return _forces(F_N, delta, x, y, z, t_R, a_H, x_H)
+    return rho / 2 * A_R * f_alpha * U_R * (u_R * ca.sin(delta) - across * ca.cos(delta))
 
 
 def rudder_coefficients(

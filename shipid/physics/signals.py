@@ -13,14 +13,15 @@ from typing import Literal
 
 from shipid.units import DEGREE, RPM
 
-Role = Literal["motion", "command", "environment", "derived"]
+Role = Literal["motion", "command", "output", "environment", "derived"]
 
 
 @dataclass(frozen=True)
 class Signal:
     """One row of the table.
 
-    role : `motion` of the ship; `command`, named `<component>.<signal>` in data; `environment`; `derived` from others.
+    role : `motion` of the ship; `command`, named `<component>.<signal>` in data; `output`, what a component shows on
+        an instrument, named likewise; `environment`; `derived` from others.
     unit : SI unit, `-` for a pure number.
     word : label in figures.
     shown : unit in tables and figures; None: `unit`.
@@ -29,7 +30,7 @@ class Signal:
     shaft : whether it is a shaft speed.
     turns : sign of the yaw rate by a positive angle aft of the origin; 0: the signal does not steer.
     mirror : sign under port-starboard reflection.
-    column : whether a dataset must, may, or cannot have this column. Commands are always allowed.
+    column : whether a dataset must, may, or cannot have this column. Commands and outputs are always allowed.
     names : regular expression of its names in logs, in lower case and without the unit; empty: not in logs.
     plausible : largest plausible magnitude [SI] for checks; None: not checked.
     read_as_SI : a log column without a unit is read as SI up to this magnitude, and in `shown` above it.
@@ -244,6 +245,28 @@ SIGNALS: dict[str, Signal] = {
         neutral=0.8,
         component="propeller",
     ),
+    "thrust": Signal(  # in the shaft: before the thrust deduction
+        "output",
+        "N",
+        "thrust",
+        names=r"thrust\w*|t_?prop\w*|(port|starboard|stbd)_thrust|f_?thrust",
+        component="propeller",
+    ),
+    "torque": Signal(
+        "output",
+        "N m",
+        "torque",
+        names=r"torque\w*|q|q_?(prop|p|shaft)\w*|(port|starboard|stbd)_torque",
+        component="propeller",
+    ),
+    "normal_force": Signal(
+        "output",
+        "N",
+        "normal force",
+        mirror=-1,
+        names=r"(rudder_)?normal_?force\w*|f_?n|rudder_force",
+        component="rudder",
+    ),
 }
 """Name -> row. Columns of datasets and messages list signals in the order of this table."""
 
@@ -265,9 +288,18 @@ def named(role: Role) -> dict[str, Signal]:
 
 def is_command(name: str) -> bool:
     """Whether a name is that of a command, `<component>.<signal>`."""
+    return _is_of_component(name, "command")
+
+
+def is_output(name: str) -> bool:
+    """Whether a name is that of a measured output of a component, such as `propeller.thrust`."""
+    return _is_of_component(name, "output")
+
+
+def _is_of_component(name: str, role: Role) -> bool:
     component, dot, signal = name.partition(".")
     row = SIGNALS.get(signal)
-    return bool(dot) and row is not None and row.role == "command" and component.isidentifier() and component.isascii()
+    return bool(dot) and row is not None and row.role == role and component.isidentifier() and component.isascii()
 
 
 def is_shaft(command: str) -> bool:

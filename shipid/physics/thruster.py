@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any
 
 import casadi as ca
 from casadi import SX
@@ -68,6 +69,13 @@ def azimuth(
     F_x = scale * sense * ca.if_else(ahead, 1, k_astern) * K_x_
     F_y = scale * K_y_
     return force_at(x, y, z, c * F_x - s * F_y, s * F_x + c * F_y)
+
+
+@wraps(azimuth, assigned=("__annotations__",))
+def azimuth_thrust(nu_r: SX, n: SX, alpha: SX, **numbers: Any) -> SX:
+    """Thrust [N] of `azimuth` along the axis of the unit."""
+    force = azimuth(nu_r, n, alpha, **numbers)
+    return ca.cos(alpha) * force[0] + ca.sin(alpha) * force[1]
 
 
 def tunnel(

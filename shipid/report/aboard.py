@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import Floats, PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line, plane
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, axis, layout, line, plane
 from shipid.report.page import page, write
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
@@ -93,7 +92,7 @@ def seen(content: AboardContent) -> Figure:
     )
 
 
-def _map(content: AboardContent, run: str) -> go.Figure:
+def _map(content: AboardContent, run: str) -> Plot:
     track = content.track[content.track["run"] == run]
     points = content.points[content.points["run"] == run]
     times = points["t"].unique()
@@ -107,10 +106,10 @@ def _map(content: AboardContent, run: str) -> go.Figure:
         if content.banded:
             few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
             traces.append(_trace(BAND, *outline(few), 1.2))
-    return go.Figure(traces, plane("east [m]", "north [m]"))
+    return Plot(traces, plane("east [m]", "north [m]"))
 
 
-def _trace(name: str, x: Floats, y: Floats, width: float) -> go.Scatter:
+def _trace(name: str, x: Floats, y: Floats, width: float) -> Trace:
     look = {"color": COLOURS[name], "dash": DASHES.get(name, "solid"), "width": width}
     return line(name, x, y, [name], line=look)
 
@@ -138,7 +137,7 @@ def along(content: AboardContent) -> Figure:
     )
 
 
-def _history(content: AboardContent, run: str) -> go.Figure:
+def _history(content: AboardContent, run: str) -> Plot:
     mine = content.instants[content.instants["run"] == run]
     t = mine["t"].to_numpy() - float(mine["t"].iloc[0])
     traces = [line("error", t, mine["error"].to_numpy(), [PATH], line={"color": COLOURS[PATH], "width": 2})]
@@ -151,7 +150,7 @@ def _history(content: AboardContent, run: str) -> go.Figure:
     marks = {"color": COLOURS[ALARM], "size": 8, "symbol": "triangle-up"}
     traces.append(line(ALARM, t[alarm], np.zeros(alarm.sum()), [ALARM], mode="markers", marker=marks))
     up = axis("at the end of the path [m]", rangemode="tozero")
-    return go.Figure(traces, layout(axis("time in the run [s]"), up))
+    return Plot(traces, layout(axis("time in the run [s]"), up))
 
 
 SECTIONS: dict[str, Section] = {

@@ -7,11 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
 from shipid.report.error_map import cells_map
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line
 from shipid.report.palette import MUTED, styles
 from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
@@ -68,7 +67,7 @@ def coverage(content: ReportContent) -> Figure | None:
             traces.append(points)
         x_axis = axis("share promised [1]", range=[0.45, 1.0], tickvals=sorted(set(frame.level)))
         y_axis = axis("share of whole test paths in the band [1]", range=[0, 1.02])
-        views[str(place)] = [Panel(go.Figure(traces, layout(x_axis, y_axis, hovermode="closest")))]
+        views[str(place)] = [Panel(Plot(traces, layout(x_axis, y_axis, hovermode="closest")))]
     return Figure(
         id="coverage",
         title="What bands promise, and what they hold",

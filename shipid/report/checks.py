@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import logs, tables
 from shipid.report.content import PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, layout, line
 from shipid.report.page import page, write
 from shipid.report.palette import category
 from shipid.report.section import Section
@@ -131,7 +130,7 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
         for name, colour in (("u", 3), ("v", 4))
     ]
     shown = (("deg/s", rates), ("m", drift), ("m/s", speeds))
-    return [Panel(go.Figure(traces, layout(axis("time in the run [s]"), axis(f"[{unit}]")))) for unit, traces in shown]
+    return [Panel(Plot(traces, layout(axis("time in the run [s]"), axis(f"[{unit}]")))) for unit, traces in shown]
 
 
 SECTIONS: dict[str, Section] = {

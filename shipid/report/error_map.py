@@ -8,11 +8,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
 from shipid.report.contours import contour, length, nice_levels, smoothed
-from shipid.report.figure import Chip, Control, Figure, Panel, Scale, apart, axis, label, layout, line
+from shipid.report.figure import (
+    Chip,
+    Control,
+    Figure,
+    Panel,
+    Plot,
+    Scale,
+    Trace,
+    apart,
+    axis,
+    label,
+    layout,
+    line,
+    marks,
+    silent,
+)
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
@@ -180,15 +194,14 @@ def _pieces(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot]) -> lis
     ]
 
 
-def _flat(
-    rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float], pieces: Any
-) -> go.Figure:
+def _flat(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float], pieces: Any) -> Plot:
     top, widths = float(rows.y.max()) * 1.04, _widths(counts)
     most = THICK / 2 * top / (HEIGHT - MARGIN["t"] - MARGIN["b"])
     y = rows.y.to_numpy(dtype=float)
     low, high = _reaches(y, most)
     good, bad = [s for s in spots if math.isfinite(s.H)], [s for s in spots if not math.isfinite(s.H)]
-    cells = go.Bar(
+    cells = marks(
+        "bar",
         x=[spot.size for spot in good],
         y=[round(low[spot.row] + high[spot.row], 4) for spot in good],
         base=[round(y[spot.row] - low[spot.row], 4) for spot in good],
@@ -201,16 +214,21 @@ def _flat(
         hovertemplate="%{customdata}<extra></extra>",
     )
     worse = [spot for spot in good if spot.worse]
-    hatched = go.Bar(
+    hatched = marks(
+        "bar",
         x=[spot.size for spot in worse],
         y=[round(low[spot.row] + high[spot.row], 4) for spot in worse],
         base=[round(y[spot.row] - low[spot.row], 4) for spot in worse],
         width=[widths[spot.size] for spot in worse],
-        marker={"color": "rgba(0,0,0,0)", "line": {"width": 1.2, "color": INK}},
-        marker_pattern={"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16},
+        marker={
+            "color": "rgba(0,0,0,0)",
+            "line": {"width": 1.2, "color": INK},
+            "pattern": {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16},
+        },
         hoverinfo="skip",
     )
-    failed = go.Scatter(
+    failed = marks(
+        "scatter",
         x=[spot.size for spot in bad],
         y=[y[spot.row] for spot in bad],
         mode="markers",
@@ -229,7 +247,7 @@ def _flat(
         edge = float(np.mean([rows.y[rows.A.notna()].max(), strips.y.min()]))
         rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
         plot["shapes"] = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}]
-    return go.Figure([cells, hatched, failed, *lines], plot)
+    return Plot([cells, hatched, failed, *lines], plot)
 
 
 def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
@@ -266,14 +284,13 @@ def _shortened(name: str) -> str:
     return name if len(name) <= SHORT else name[: SHORT - 1] + "…"
 
 
-def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[go.Scatter], list[dict[str, Any]]]:
+def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[Trace], list[dict[str, Any]]]:
     """Ink lines on a pale rim, and the level written once, on the longest piece."""
     traces, names = [], []
     longest: dict[float, Floats] = {}
     for ink in ({"color": "var(--page)", "width": 4}, {"color": INK, "width": 1.5}):
         for height, piece in pieces:
-            traces.append(line(metres(height), piece[:, 0], piece[:, 1], ["iso"], line=ink, hoverinfo="skip"))
-            traces[-1].hovertemplate = None
+            traces.append(silent(line(metres(height), piece[:, 0], piece[:, 1], ["iso"], line=ink)))
     for height, piece in pieces:
         if height not in longest or length(piece) > length(longest[height]):
             longest[height] = piece
@@ -286,7 +303,7 @@ def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[go.Scatter], lis
     return traces, names
 
 
-def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float]) -> go.Figure:
+def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float]) -> Plot:
     """One box per model and N_D, as in the paper's Fig. 8, drawn obliquely: heights of the front are true."""
     depth = {size: len(counts) - 1 - i for i, size in enumerate(counts)}
     back = BACK * span[1]
@@ -294,13 +311,13 @@ def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tu
     for spot in sorted(spots, key=lambda spot: (-depth[spot.size], spot.row)):  # what is nearer covers the rest
         if not math.isfinite(spot.H):
             x, y = _oblique(spot.row, depth[spot.size], 0.0, back)
-            traces.append(go.Scatter(x=[x], y=[y], mode="markers", marker={"symbol": "x", "color": "var(--bad)"}))
+            traces.append(marks("scatter", x=[x], y=[y], mode="markers", marker={"symbol": "x", "color": "var(--bad)"}))
         else:
             colour = f"var(--heat-{level(spot.H, span)})"
             body, side = _box(spot.row, depth[spot.size], spot.H, back)
             traces += [_face(body, colour, INK), _face(side, SHADE, SHADE)]
         traces[-1].update(text=f"{label(spot.model)}, N_D = {spot.size}: H {metres(spot.H)}", hoverinfo="text")
-    return go.Figure(traces, _stage(rows, counts, span, back))
+    return Plot(traces, _stage(rows, counts, span, back))
 
 
 def _oblique(x: float, depth: float, height: float, back: float) -> tuple[float, float]:
@@ -319,11 +336,11 @@ def _box(row: int, depth: int, height: float, back: float) -> tuple[Floats, Floa
     return np.concatenate([outlines[0], hole, outlines[1], hole, outlines[2]]), outlines[2]
 
 
-def _face(outline: Floats, fill: str, edge: str) -> go.Scatter:
+def _face(outline: Floats, fill: str, edge: str) -> Trace:
     """Draw a filled outline, whose text shows wherever the pointer is over it."""
     x, y = outline.T.round(4)
     ink = {"color": edge, "width": 0.6}
-    return go.Scatter(x=x, y=y, mode="lines", fill="toself", fillcolor=fill, line=ink, hoveron="fills", name="")
+    return marks("scatter", x=x, y=y, mode="lines", fill="toself", fillcolor=fill, line=ink, hoveron="fills", name="")
 
 
 def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float], back: float) -> dict[str, Any]:

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import Floats, Indices, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, apart, axis, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, apart, axis, layout, line, silent
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
@@ -23,15 +22,17 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
-STATISTICS = {  # option -> column of the frame, title of the axis
-    "mean": ("mean", "position error, mean"),
-    "90th percentile": ("p90", "position error, 90th percentile"),
-    "along (surge)": ("along", "error along, mean absolute"),
-    "across (sway)": ("across", "error across, mean absolute"),
+STATISTICS = {  # option -> column of the frame, title of the axis, unit
+    "mean": ("mean", "position error, mean", "m"),
+    "90th percentile": ("p90", "position error, 90th percentile", "m"),
+    "along (surge)": ("along", "error along, mean absolute", "m"),
+    "across (sway)": ("across", "error across, mean absolute", "m"),
+    "course": ("course", "error of the course, mean absolute", "deg"),
 }
 BY_AXIS = (
     " Along and across are the axes of the ship at the instant of prediction (11), the directions of surge and sway. "
-    "Predictors give positions, so no error of the heading is shown."
+    "Predictors give positions, so no error of the heading is shown. The course is the direction of the track, "
+    "where the ship truly makes 0.2 m/s or more."
 )
 COMMAND_DASHES = ("solid", "dash", "dot", "dashdot")
 
@@ -42,20 +43,20 @@ def horizon(content: ReportContent) -> Figure | None:
         return None
     frame = _settled(content.horizon, content)
     statistics = {word: given for word, given in STATISTICS.items() if given[0] in frame}
-    columns = [column for column, _ in statistics.values()]
+    columns = [column for column, *_ in statistics.values()]
     means, counts = over_seeds(frame, [*BY, "ahead"], columns), sizes(frame.N_D)
     groups = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])
     seeds = {column: groups[column].agg(["min", "max", "size"]).reset_index() for column in columns}
     views = {}
-    for (i, (column, title)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
-        traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column)
+    for (i, (column, title, unit)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
+        traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
         traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
-        y = axis(f"{title} [m]", rangemode="tozero")
+        y = axis(f"{title} [{unit}]", rangemode="tozero")
         names = _names_at_the_end(traces, float(means[column].max()))
         reach = float(means.ahead.max())
         x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
         plot = layout(x, y, hovermode="x unified", annotations=names)
-        views[f"{i}-{j}"] = [Panel(go.Figure(traces, plot))]
+        views[f"{i}-{j}"] = [Panel(Plot(traces, plot))]
     return Figure(
         id="horizon",
         title="Error over the horizon",
@@ -69,7 +70,7 @@ def horizon(content: ReportContent) -> Figure | None:
         "compensation.",
         height=420,
         views=views,
-        controls=[Control("Position error", list(statistics)), _size_control(counts)],
+        controls=[Control("Error", list(statistics)), _size_control(counts)],
         chips=model_chips(content, set(means.source)),
     )
 
@@ -142,7 +143,7 @@ def _size_control(counts: Sequence[int]) -> Control:
     return Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)
 
 
-def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str) -> list[go.Scatter]:
+def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str, unit: str = "m") -> list[Trace]:
     looks, pure, traces = close_styles(content), data_driven(content), []
     groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
     for key, mine in groups:  # what has no physics first: thick ink must not cover the others
@@ -153,16 +154,21 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
         name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         keep = _visible(x, y)
-        traces.append(line(name, x[keep], y[keep], keys, line={"dash": DASHES[source], **ink}))
+        traces.append(line(name, x[keep], y[keep], keys, unit, line={"dash": DASHES[source], **ink}))
         if model and source == "cooperative":
             mark = {"symbol": looks[model].symbol, "size": 7, "color": ink["color"], "maxdisplayed": 9}
             traces[-1].update(mode="lines+markers", marker=mark)
     return traces
 
 
-def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Scatter]:
+def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
     """Areas from the least to the greatest seed at each time ahead, in the colours of the lines of their models."""
-    colours = {key: trace.line.color for trace in traces for key in trace.meta if "source:cooperative" in trace.meta}
+    colours = {
+        key: trace["line"]["color"]
+        for trace in traces
+        for key in trace["meta"]
+        if "source:cooperative" in trace["meta"]
+    }
     bands = []
     for name, mine in seeds[seeds["size"] > 1].groupby("model", sort=False):
         ahead = mine["ahead"].to_numpy(dtype=float)
@@ -171,19 +177,22 @@ def _seed_bands(traces: Sequence[go.Scatter], seeds: pd.DataFrame) -> list[go.Sc
         if colour is not None:
             keys = ["source:cooperative", f"model:{name}"]
             bands.append(line(f"{name}, seeds", x, y, keys, line={"width": 0}, fill="toself", fillcolor=colour))
-            bands[-1].update(opacity=0.18, hoverinfo="skip", hovertemplate=None)
+            bands[-1] = silent(bands[-1]) | {"opacity": 0.18}
     return bands
 
 
-def _names_at_the_end(traces: Sequence[go.Scatter], most: float) -> list[dict[str, Any]]:
+def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, Any]]:
     """Names beside the ends of the compensated lines, moved apart where they would collide."""
-    ends = sorted((float(t.y[-1]), float(t.x[-1]), t) for t in traces if t.mode == "lines+markers" and len(t.y))
+    ends = sorted(
+        ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
+        key=lambda end: end[:2],
+    )
     heights = apart([height for height, _, _ in ends], 0.055 * most, math.inf)
     notes = []
     for height, (_, place, trace) in zip(heights, ends, strict=True):
-        short = trace.name.removesuffix(", compensated")
+        short = trace["name"].removesuffix(", compensated")
         short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
-        font = {"size": 11, "color": trace.line.color}
+        font = {"size": 11, "color": trace["line"]["color"]}
         notes.append({"x": place, "y": height, "text": short, "xanchor": "left", "xshift": 8, "font": font})
     return [{**note, "showarrow": False, "align": "left"} for note in notes]
 
@@ -227,7 +236,7 @@ def _command_chips(commands: pd.DataFrame) -> list[Chip]:
     ]
 
 
-def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.Figure:
+def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> Plot:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _units(content.commands)
     mine = content.commands[content.commands.run == run]
@@ -249,7 +258,7 @@ def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> go.
     lowest = "y" if not units else f"y{len(units) + 1}"
     x = axis("time of the recording [s]", anchor=lowest)
     y = axis("position error [m]", rangemode="tozero", domain=[1 - ERROR / total, 1.0])
-    return go.Figure(traces, layout(x, y, hovermode="x unified", **axes))
+    return Plot(traces, layout(x, y, hovermode="x unified", **axes))
 
 
 def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) -> str:

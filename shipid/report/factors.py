@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import ReportContent
-from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Figure, Panel, Plot, axis, label, layout, line
 from shipid.report.palette import INK, MUTED, SYMBOLS, category
 from shipid.report.section import Section
 from shipid.report.selection import families
@@ -48,7 +47,7 @@ def factors(content: ReportContent) -> Figure | None:
     )
 
 
-def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], groups: list[str]) -> go.Figure:
+def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], groups: list[str]) -> Plot:
     (low, high), rows = _span(frame), {name: i for i, name in enumerate(names)}
     edge = low - 0.08 * (high - low)
     traces = []
@@ -59,11 +58,11 @@ def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], group
         x = np.array([math.log(factor) if factor > 0 else edge for factor in mine.factor])
         marker = {"symbol": SYMBOLS[i % len(SYMBOLS)], "size": 8, "color": category(i), "opacity": 0.75}
         trace = line(group, x, y, [f"group:{group}"], mode="markers", marker=marker)
-        trace.customdata = [
+        trace["customdata"] = [
             f"{label(str(model))}: {label(str(path))} × {factor:.3g}"
             for model, path, factor in zip(mine.model, mine.path, mine.factor, strict=True)
         ]
-        trace.hovertemplate = "%{customdata}<extra></extra>"
+        trace["hovertemplate"] = "%{customdata}<extra></extra>"
         traces.append(trace)
     room = 0.03 * (high - low)
     span = [(edge if _crosses(frame) else low) - room, high + room]
@@ -75,7 +74,7 @@ def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], group
         {"type": "line", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "layer": "below"}
         | {"line": {"color": INK, "width": 1}}
     ]
-    return go.Figure(traces, plot)
+    return Plot(traces, plot)
 
 
 def _rule(row: int, span: list[float]) -> dict[str, Any]:

@@ -35,12 +35,28 @@ class Chip:
     symbol: str = ""
 
 
+Trace = dict[str, Any]  # as Plotly.js takes it: `type` and the options of that type
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Traces and layout as plain data: Plotly's Python classes take milliseconds a trace to check it."""
+
+    traces: Sequence[Trace]
+    layout: Mapping[str, Any]
+
+
 @dataclass(frozen=True)
 class Panel:
     """One plot with the caption below it."""
 
-    figure: go.Figure
+    plot: Plot
     caption: str = ""
+
+    @property
+    def figure(self) -> go.Figure:
+        """The plot as a checked figure of Plotly; ValueError for an option that there is not."""
+        return go.Figure(self.plot.traces, self.plot.layout)
 
 
 @dataclass(frozen=True)
@@ -154,15 +170,26 @@ def line(
     unit: str = "m",
     mode: str = "lines",
     **options: Any,
-) -> go.Scatter:
+) -> Trace:
     """One line in single precision; its hover says name, x and y."""
-    return go.Scatter(
-        x=np.asarray(x, dtype=np.float32),
-        y=np.asarray(y, dtype=np.float32),
-        mode=mode,
-        name=label(name),
-        meta=list(keys),
-        connectgaps=False,
-        hovertemplate=f"{label(name)}: %{{y:.2f}} {label(unit)}<extra></extra>",
+    return {
+        "type": "scatter",
+        "x": np.asarray(x, dtype=np.float32),
+        "y": np.asarray(y, dtype=np.float32),
+        "mode": mode,
+        "name": label(name),
+        "meta": list(keys),
+        "connectgaps": False,
+        "hovertemplate": f"{label(name)}: %{{y:.2f}} {label(unit)}<extra></extra>",
         **options,
-    )
+    }
+
+
+def marks(kind: str, **options: Any) -> Trace:
+    """Another trace than a line, of a type of Plotly such as `bar`."""
+    return {"type": kind, **options}
+
+
+def silent(trace: Trace) -> Trace:
+    """Return the trace without a hover box."""
+    return {**{key: value for key, value in trace.items() if key != "hovertemplate"}, "hoverinfo": "skip"}

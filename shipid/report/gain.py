@@ -7,10 +7,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, Scale, axis, label, layout, line, logarithmic
+from shipid.report.figure import (
+    Chip,
+    Control,
+    Figure,
+    Panel,
+    Plot,
+    Scale,
+    Trace,
+    axis,
+    label,
+    layout,
+    line,
+    logarithmic,
+    silent,
+)
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
 from shipid.report.selection import data_driven, families, trained
 from shipid.report.wording import counted, listed, metres
@@ -48,12 +61,13 @@ def gain(content: ReportContent) -> Figure:
 
 def unplotted(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
-    names = []
-    for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=False):
-        failed = cells[cells.status.ne("ok") | cells.H.isna()]
-        if len(failed):
-            share = f", {len(failed)} of {len(cells)} seeds" if len(failed) < len(cells) else ""
-            names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
+    names, by = [], ["model", "N_D"]
+    every = content.cells.groupby(by, sort=False).size().to_dict()
+    bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
+    for (model, size), failed in bad.groupby(by, sort=False):
+        count = every[model, size]
+        share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
+        names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
     return f" Not plotted: {listed(names, 6)}; reasons in the table of cells." if names else ""
 
 
@@ -61,9 +75,9 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
     looks, span = styles(content), accuracy_range(content)
     order = [str(name) for name in families(content).model if name in set(content.cells.model)]
     views = {
-        f"{i}-{j}": [Panel(_lines(content, means, statistic, looks, log_axis))]
+        f"{i}-{j}": [Panel(plot)]
         for i, statistic in enumerate(STATISTICS)
-        for j, log_axis in enumerate((False, True))
+        for j, plot in enumerate(_lines(content, means, statistic, looks))
     }
     accuracy = content.cells.groupby("model").A.first()
     chips = [
@@ -97,39 +111,40 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
     )
 
 
-def _lines(
-    content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style], log_axis: bool
-) -> go.Figure:
+def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style]) -> list[Plot]:
+    """Lines over N_D, on a linear and on a logarithmic axis."""
     sizes = sorted(content.cells.N_D.unique())
     traces = []
+    ended = content.cells[content.cells.status.eq("ok")]
+    each = {str(name): seeds for name, seeds in ended.groupby("model", sort=False)}
+    middle = {str(name): mine.set_index("N_D")[statistic.cell] for name, mine in means.groupby("model", sort=False)}
     for name, style in reversed(list(looks.items())):  # what has no physics first: it must not cover the others
-        mine = means[means.model == name].set_index("N_D")[statistic.cell]
-        if mine.empty:
+        if name not in middle:
             continue
         marker = {"symbol": style.symbol, "size": 8, "color": style.colour}
         keys = [f"model:{name}"]
         # A size whose cells all failed stays NaN: the line has a gap there.
-        heights = mine.reindex(sizes).to_numpy()
+        heights = middle[name].reindex(sizes).to_numpy()
         ink = {"color": style.colour, "width": style.width}
         traces.append(line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
-        seeds = content.cells[content.cells.model.eq(name) & content.cells.status.eq("ok")]
+        seeds = each[name]
         if seeds.seed.nunique() > 1:
-            faint = {**marker, "size": 5}
-            each = seeds[statistic.cell].to_numpy()
-            traces.append(line(f"{name}, seed", seeds.N_D.to_numpy(), each, keys, "m", "markers", marker=faint))
-            traces[-1].opacity = 0.4
+            faint, values = {**marker, "size": 5}, seeds[statistic.cell].to_numpy()
+            dots = line(f"{name}, seed", seeds.N_D.to_numpy(), values, keys, "m", "markers", marker=faint)
+            traces.append({**dots, "opacity": 0.4})
     traces.append(_floor(content, statistic, [sizes[0], sizes[-1]], across=True))
     x = axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     title = f"position error, {statistic.name} [m]"
-    y = logarithmic(title) if log_axis else axis(title, rangemode="tozero")
-    return go.Figure(traces, layout(x, y, hovermode="closest"))
+    return [
+        Plot(traces, layout(x, y, hovermode="closest")) for y in (axis(title, rangemode="tozero"), logarithmic(title))
+    ]
 
 
-def _floor(content: ReportContent, statistic: Statistic, ends: list[float], across: bool) -> go.Scatter:
+def _floor(content: ReportContent, statistic: Statistic, ends: list[float], across: bool) -> Trace:
     level = [content.naive[statistic.naive]] * 2
     ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
     trace = line("constant velocity", *((ends, level) if across else (level, ends)), ["naive"], line=ink)
-    trace.hovertemplate = f"constant velocity: {metres(level[0])}<extra></extra>"
+    trace["hovertemplate"] = f"constant velocity: {metres(level[0])}<extra></extra>"
     return trace
 
 
@@ -178,7 +193,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
 
 def _dumbbells(
     content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style], names: list[str]
-) -> go.Figure:
+) -> Plot:
     before = content.models.set_index("model")[statistic.model].reindex(names).astype(float)
     after = means.set_index("model")[statistic.cell].reindex(names)
     traces, texts = [_floor(content, statistic, [len(names) - 0.4, -0.6], across=False)], []
@@ -186,7 +201,7 @@ def _dumbbells(
         colour, old, new = looks[name].colour, before[name], after[name]
         good = content.cells[content.cells.model.eq(name) & content.cells.status.eq("ok")][statistic.cell]
         traces.append(line(name, [old, new], [row, row], ["before", "after"], line={"color": colour, "width": 3}))
-        traces[-1].hoverinfo, traces[-1].hovertemplate = "skip", None
+        traces[-1] = silent(traces[-1])
         traces.append(_dot(name, old, row, "before", "circle-open", colour))
         if len(good) > 1:
             traces += [_dot(name, each, row, "after", "circle", colour, small=True) for each in good]
@@ -194,16 +209,14 @@ def _dumbbells(
         texts.append(_row_text(name, row, old, new))
     x = axis(f"position error, {statistic.name} [m]", rangemode="tozero")
     y = axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
-    return go.Figure(
-        traces, layout(x, y, annotations=texts, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44})
-    )
+    return Plot(traces, layout(x, y, annotations=texts, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
 
 
-def _dot(name: str, value: float, row: int, key: str, symbol: str, colour: str, small: bool = False) -> go.Scatter:
+def _dot(name: str, value: float, row: int, key: str, symbol: str, colour: str, small: bool = False) -> Trace:
     marker = {"symbol": symbol, "size": 7 if small else 13, "color": colour, "line": {"width": 2, "color": colour}}
     what = "physics alone" if key == "before" else "with compensation"
     trace = line(name, [value], [row], [key], mode="markers", marker=marker, opacity=0.4 if small else 1.0)
-    trace.hovertemplate = f"{label(name)}, {what}: %{{x:.2f}} m<extra></extra>"
+    trace["hovertemplate"] = f"{label(name)}, {what}: %{{x:.2f}} m<extra></extra>"
     return trace
 
 

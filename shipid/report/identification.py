@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import Floats, PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, marks, silent
 from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
 from shipid.report.palette import INK, MUTED, category
@@ -111,7 +110,7 @@ def estimates(content: IdentificationContent) -> Figure:
         y = np.repeat(rows, 3).astype(float)
         ink = category(0) if known else MUTED
         bar = line("interval", x, y, [_key(known)], line={"color": ink, "width": 2.5 if known else 1.2})
-        bar.hoverinfo, bar.hovertemplate = "skip", None
+        bar = silent(bar)
         marker = {
             "symbol": "circle" if known else "circle-open",
             "color": ink,
@@ -120,11 +119,11 @@ def estimates(content: IdentificationContent) -> Figure:
         }
         dots = frame.loc[mine, "factor"].to_numpy(dtype=float)
         dot = line("estimate", dots, rows.astype(float), [_key(known)], mode="markers", marker=marker)
-        dot.customdata = [_hover(row) for row in frame[mine].to_dict("records")]
-        dot.hovertemplate = "%{customdata}<extra></extra>"
+        dot["customdata"] = [_hover(row) for row in frame[mine].to_dict("records")]
+        dot["hovertemplate"] = "%{customdata}<extra></extra>"
         traces += [bar, dot]
     base = line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line={"color": INK, "width": 1, "dash": "dot"})
-    base.hoverinfo, base.hovertemplate = "skip", None
+    base = silent(base)
     y_axis = axis("", tickvals=list(range(len(frame))), ticktext=list(map(label, frame["name"])), showgrid=False)
     y_axis["range"] = [len(frame) - 0.4, -0.6]
     x_axis = axis("factor on the base value [1]", nticks=9, range=[low, high])
@@ -140,7 +139,7 @@ def estimates(content: IdentificationContent) -> Figure:
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,
-        views={"": [Panel(go.Figure([base, *traces], plot))]},
+        views={"": [Panel(Plot([base, *traces], plot))]},
         chips=[
             Chip(_key(True), "identified", category(0), symbol="circle"),
             Chip(_key(False), "not identified", MUTED, symbol="circle-open", width=1.2),
@@ -222,7 +221,8 @@ def correlations(content: IdentificationContent) -> Figure | None:
         return None
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
     font = {"font": {"size": 13}}
-    heat = go.Heatmap(
+    heat = marks(
+        "heatmap",
         z=matrix.astype(np.float32), x=names, y=names, zmin=-1, zmax=1, colorscale=scale, xgap=1, ygap=1,
         colorbar={"thickness": 12, "dtick": 0.5, "title": {"text": "correlation [1]", "side": "right"} | font},
         hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",
@@ -241,7 +241,7 @@ def correlations(content: IdentificationContent) -> Figure | None:
         "of the other, and only their combination is known.",
         alternative="Heat map of the correlations of all pairs of estimates.",
         height=WIDTH * len(names) + SIDE,
-        views={"": [Panel(go.Figure([heat], plot))]},
+        views={"": [Panel(Plot([heat], plot))]},
     )
 
 
@@ -342,7 +342,7 @@ def residuals(content: IdentificationContent) -> Figure | None:
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,
-        views={"": [Panel(go.Figure(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
+        views={"": [Panel(Plot(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
         chips=[Chip(name, name, category(i)) for i, name in enumerate(names)],
     )
 
@@ -367,7 +367,7 @@ def profiles(content: IdentificationContent) -> Figure | None:
             axis(f"factor of {label(str(path))} [1]", nticks=6),
             axis("worse by [variances]", nticks=6, rangemode="tozero"),
         )
-        panels.append(Panel(go.Figure([end, curve], layout(*axes, hovermode="closest"))))
+        panels.append(Panel(Plot([end, curve], layout(*axes, hovermode="closest"))))
         sentences.append(str(mine["sentence"].iloc[0]))
     return Figure(
         id="profiles",

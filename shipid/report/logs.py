@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import tables
 from shipid.report.content import PUBLISHED, ReportContent
-from shipid.report.figure import Chip, Figure, Panel, axis, label, layout, line, plane
+from shipid.report.figure import Chip, Figure, Panel, Plot, Trace, axis, label, layout, line, plane
 from shipid.report.palette import MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import thinned
@@ -41,7 +40,7 @@ def manoeuvres(content: ReportContent) -> Figure | None:
             points = points[thinned(points, extent / PIXELS)]
             ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == category(TEST) else 1.2}
             traces.append(line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink))
-            traces[-1].hovertemplate = f"{label(str(run))} ({label(name)})<extra></extra>"
+            traces[-1]["hovertemplate"] = f"{label(str(run))} ({label(name)})<extra></extra>"
     counts = tracks.groupby("set").run.nunique()
     east, north = (distance(high - low) for low, high in bounds)
     runs = listed([f"{counted(int(counts[name]), 'run')} ({name})" for name in names], 6)
@@ -52,7 +51,7 @@ def manoeuvres(content: ReportContent) -> Figure | None:
         how="Logged positions, north up, equal axes; points closer to the line than a pixel are left out.",
         alternative="Map of the tracks of all manoeuvres, coloured by set.",
         height=520,
-        views={"": [Panel(go.Figure(traces, plane("east [m]", "north [m]", bounds)))]},
+        views={"": [Panel(Plot(traces, plane("east [m]", "north [m]", bounds)))]},
         chips=[Chip(f"set:{name}", name, set_colour(name)) for name in names],
     )
 
@@ -77,7 +76,7 @@ def envelope(content: ReportContent) -> Figure | None:
     )
 
 
-def _ranges(mine: pd.DataFrame) -> go.Figure:
+def _ranges(mine: pd.DataFrame) -> Plot:
     """One quantity: a bar from smallest to largest and a dot at the mean, one row per set."""
     traces, names = [], [str(name) for name in mine["set"]]
     quantity, unit = str(mine.quantity.iloc[0]), str(mine.unit.iloc[0])
@@ -87,21 +86,21 @@ def _ranges(mine: pd.DataFrame) -> go.Figure:
         bar = line(names[row], [numbers[0], numbers[2]], [row, row], [], line={"color": ink, "width": 5})
         dot = line(names[row], numbers[1:2], [row], [], mode="markers", marker={"color": ink, "size": 11})
         text = " / ".join(number(value) for value in numbers)
-        bar.opacity = 0.55
+        bar["opacity"] = 0.55
         if names[row] == PUBLISHED:
             bar, dot = _open_bar(numbers, row)
         for trace in (bar, dot):
-            trace.hovertemplate = f"{label(names[row])}: {text} {label(unit)}<extra></extra>"
+            trace["hovertemplate"] = f"{label(names[row])}: {text} {label(unit)}<extra></extra>"
         traces += [bar, dot]
     y = axis("", tickvals=list(range(len(names))), ticktext=[label(name) for name in names], showgrid=False)
     y["range"] = [len(names) - 0.4, -0.6]
     low, high = float(mine["min"].min()), float(mine["max"].max())
     room = 0.06 * (high - low) or 1.0
     x = axis(f"{label(quantity)} [{label(unit)}]", nticks=6, range=[low - room, high + room])
-    return go.Figure(traces, layout(x, y, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
+    return Plot(traces, layout(x, y, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44}))
 
 
-def _open_bar(numbers: Sequence[float], row: int) -> tuple[go.Scatter, go.Scatter]:
+def _open_bar(numbers: Sequence[float], row: int) -> tuple[Trace, Trace]:
     """Return the outline of a bar and an open dot: the published range and mean."""
     low, mean, high = numbers
     x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]

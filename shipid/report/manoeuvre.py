@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import Floats, PageContent, Sentence
-from shipid.report.figure import Chip, Figure, Panel, axis, layout, line, plane
+from shipid.report.figure import Chip, Figure, Panel, Plot, Trace, axis, layout, line, plane, silent
 from shipid.report.page import page, write
 from shipid.report.palette import GRID, MUTED, category
 from shipid.report.section import Section
@@ -126,12 +125,12 @@ def track(content: ManoeuvreContent) -> Figure:
     gap = np.full((1, 2), np.nan)
     drawn = np.vstack([part for hull in hulls for part in (hull, gap)])
     ships = line("ship", drawn[:, 0], drawn[:, 1], ["ship"], line={"color": MUTED, "width": 1})
-    ships.hoverinfo, ships.hovertemplate = "skip", None
+    ships = silent(ships)
     path = line(
         "track", log["east"].to_numpy(), log["north"].to_numpy(), ["track"], line={"color": category(0), "width": 2.5}
     )
-    path.customdata = log["t"].to_numpy(dtype=np.float32)
-    path.hovertemplate = "t = %{customdata:.1f} s<br>%{x:.1f} m east, %{y:.1f} m north<extra></extra>"
+    path["customdata"] = log["t"].to_numpy(dtype=np.float32)
+    path["hovertemplate"] = "t = %{customdata:.1f} s<br>%{x:.1f} m east, %{y:.1f} m north<extra></extra>"
     spans = [(float(np.nanmin(column)), float(np.nanmax(column))) for column in drawn.T]
     bounds = [
         (min(low, float(log[name].min())), max(high, float(log[name].max())))
@@ -145,7 +144,7 @@ def track(content: ManoeuvreContent) -> Figure:
         how="Path of the logged point, north up, equal axes; the outline of the ship is to scale, at even times.",
         alternative="Map of the track.",
         height=460,
-        views={"": [Panel(go.Figure([ships, path], plane("east [m]", "north [m]", bounds)))]},
+        views={"": [Panel(Plot([ships, path], plane("east [m]", "north [m]", bounds)))]},
         chips=[Chip("track", "track", category(0), width=2.5), Chip("ship", "ship", MUTED, width=1)],
     )
 
@@ -188,7 +187,7 @@ def histories(content: ManoeuvreContent) -> Figure:
         alternative="Heading, helm, speeds and yaw rate over time.",
         height=270,
         views={"": panels},
-        chips=[Chip(key, str(lines[key].name), lines[key].line.color) for key in shown],
+        chips=[Chip(key, lines[key]["name"], lines[key]["line"]["color"]) for key in shown],
     )
 
 
@@ -196,10 +195,10 @@ def _ink(index: int) -> dict[str, object]:
     return {"color": category(index), "width": 2}
 
 
-def _panel(title: str, traces: list[go.Scatter], content: ManoeuvreContent | None = None) -> Panel:
+def _panel(title: str, traces: list[Trace], content: ManoeuvreContent | None = None) -> Panel:
     """One quantity over time; execute headings are drawn for a zigzag."""
     heading = _value(content, "execute heading") if content and content.kind == "zigzag" else float("nan")
-    ends = [float(traces[0].x[0]), float(traces[0].x[-1])]
+    ends = [float(traces[0]["x"][0]), float(traces[0]["x"][-1])]
     marks = [
         line(
             f"{level:g} deg", ends, [level, level], ["heading"], "deg", line={"color": MUTED, "width": 1, "dash": "dot"}
@@ -207,7 +206,7 @@ def _panel(title: str, traces: list[go.Scatter], content: ManoeuvreContent | Non
         for level in ((heading, -heading) if np.isfinite(heading) else ())
     ]
     y = axis(title, nticks=6, zeroline=True, zerolinecolor=GRID)
-    return Panel(go.Figure([*marks, *traces], layout(axis("time [s]", nticks=6), y, hovermode="closest")))
+    return Panel(Plot([*marks, *traces], layout(axis("time [s]", nticks=6), y, hovermode="closest")))
 
 
 def _value(content: ManoeuvreContent, measure: str) -> float:
@@ -232,7 +231,7 @@ def spiral(content: ManoeuvreContent) -> Figure | None:
         how="One point for each level that became steady, joined in the order performed; > 0 is to starboard.",
         alternative="Steady yaw rate over helm angle.",
         height=420,
-        views={"": [Panel(go.Figure([trace], layout(x, y, hovermode="closest")))]},
+        views={"": [Panel(Plot([trace], layout(x, y, hovermode="closest")))]},
     )
 
 

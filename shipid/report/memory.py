@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import Floats, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, marks
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import spread
@@ -145,7 +144,7 @@ def _upright(moments: Floats) -> list[dict[str, Any]]:
     return [{**rule, "x0": t, "x1": t, "line": {"color": MUTED, "width": 1, "dash": "dot"}} for t in moments.tolist()]
 
 
-def _along(frame: pd.DataFrame, moments: Floats, rows: Sequence[Row]) -> go.Figure:
+def _along(frame: pd.DataFrame, moments: Floats, rows: Sequence[Row]) -> Plot:
     t, traces, axes = frame.t.to_numpy(dtype=float), [], {}
     for place, row in enumerate(rows):
         suffix = "" if place == 0 else str(place + 1)
@@ -158,7 +157,7 @@ def _along(frame: pd.DataFrame, moments: Floats, rows: Sequence[Row]) -> go.Figu
         axes[f"yaxis{suffix}"] = axis(row.title, domain=_domain(place, len(rows)), anchor="x", nticks=4)
     y = axes.pop("yaxis")
     x = axis("time of the recording [s]", anchor=f"y{len(rows)}")
-    return go.Figure(traces, layout(x, y, hovermode="x unified", shapes=_upright(moments), **axes))
+    return Plot(traces, layout(x, y, hovermode="x unified", shapes=_upright(moments), **axes))
 
 
 def gain(content: ReportContent) -> Figure | None:
@@ -224,7 +223,7 @@ def _amounts(frame: pd.DataFrame) -> tuple[list[int], list[str]]:
     return amounts, [str(amount) if amount else "physics alone" for amount in amounts]
 
 
-def _differences(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
+def _differences(frame: pd.DataFrame, models: Sequence[str]) -> Plot:
     amounts, names = _amounts(frame)
     shown = [name for name in models if frame.model.eq(name).any()]
     traces = []
@@ -256,7 +255,7 @@ def _differences(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
     below = axis("difference of H [m]", domain=[0.0, 0.44], anchor="x")
     zero = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y2", "y0": 0, "y1": 0}
     shapes = [{**zero, "line": {"color": INK, "width": 1}}]
-    return go.Figure(traces, layout(across, y, hovermode="closest", yaxis2=below, shapes=shapes))
+    return Plot(traces, layout(across, y, hovermode="closest", yaxis2=below, shapes=shapes))
 
 
 def _interval(row: dict[Any, Any]) -> str:
@@ -314,7 +313,7 @@ def _extremes(frame: pd.DataFrame) -> Iterator[tuple[str, str]]:
             yield str(comparison), model
 
 
-def _window_lines(frame: pd.DataFrame, moments: Floats) -> go.Figure:
+def _window_lines(frame: pd.DataFrame, moments: Floats) -> Plot:
     t = frame.t.to_numpy(dtype=float)
     before, after = (frame[column].to_numpy(dtype=float) for column in ("error_without", "error_with"))
     first, second = (str(frame[column].iloc[0]) for column in ("without", "with"))
@@ -328,7 +327,7 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> go.Figure:
     y = axis("position error [m]", rangemode="tozero", domain=[0.45, 1.0])
     below = axis("difference [m]", domain=[0.0, 0.36], anchor="x", nticks=5, zeroline=True, zerolinecolor=INK)
     inside = moments[(moments >= t.min()) & (moments <= t.max())]
-    return go.Figure(traces, layout(x, y, hovermode="x unified", yaxis2=below, shapes=_upright(inside)))
+    return Plot(traces, layout(x, y, hovermode="x unified", yaxis2=below, shapes=_upright(inside)))
 
 
 def _takeaway_windows(frame: pd.DataFrame, comparison: str, model: str) -> str:
@@ -370,7 +369,7 @@ def difference_map(content: ReportContent) -> Figure | None:
     )
 
 
-def _cells(frame: pd.DataFrame, span: float) -> go.Figure:
+def _cells(frame: pd.DataFrame, span: float) -> Plot:
     amounts, names = _amounts(frame)
     accuracy = _by_accuracy(frame)
     models = [str(name) for name in accuracy.index]
@@ -378,7 +377,8 @@ def _cells(frame: pd.DataFrame, span: float) -> go.Figure:
         (amounts.index(int(row["N_D"])), models.index(str(row["model"])), row) for row in frame.to_dict("records")
     ]
     shares = [min(abs(float(row["difference"])) / max(span, 1e-12), 1.0) for *_, row in places]
-    boxes = go.Bar(
+    boxes = marks(
+        "bar",
         x=[x for x, _, _ in places],
         y=[0.9] * len(places),
         base=[y - 0.45 for _, y, _ in places],
@@ -390,7 +390,8 @@ def _cells(frame: pd.DataFrame, span: float) -> go.Figure:
         customdata=[f"{label(str(row['with']))}, N_D = {row['N_D']}: {_interval(row)}" for *_, row in places],
         hovertemplate="%{customdata}<extra></extra>",
     )
-    words = go.Scatter(
+    words = marks(
+        "scatter",
         x=[x for x, _, _ in places],
         y=[y for _, y, _ in places],
         mode="text",
@@ -410,7 +411,7 @@ def _cells(frame: pd.DataFrame, span: float) -> go.Figure:
         range=[-0.6, len(models) - 0.4],
         showgrid=False,
     )
-    return go.Figure([boxes, words], layout(x, y, hovermode="closest", barmode="overlay"))
+    return Plot([boxes, words], layout(x, y, hovermode="closest", barmode="overlay"))
 
 
 def _written(row: dict[Any, Any]) -> str:

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
@@ -137,7 +136,7 @@ def _methods_axis(order: Sequence[str]) -> dict[str, Any]:
     return axis("", **ticks, range=[-0.6, len(order) - 0.4])
 
 
-def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> go.Figure:
+def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> Plot:
     traces = []
     for k, family in enumerate(families):
         rows = mine[mine.family.eq(family) & mine.H.notna()].to_dict("records")
@@ -152,10 +151,10 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
     errors = mine.H[mine.H > 0]
     span = float(errors.max() / errors.min()) if len(errors) else 1.0
     x = logarithmic("position error, H [m]", (1, 2, 3, 5) if span < 6 else (1, 2, 5) if span < 30 else (1,))
-    return go.Figure(traces, layout(x, _methods_axis(order), hovermode="closest"))
+    return Plot(traces, layout(x, _methods_axis(order), hovermode="closest"))
 
 
-def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> go.Figure:
+def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> Plot:
     traces = []
     for k, family in enumerate(families):
         rows = mine[mine.family.eq(family) & mine.difference.notna() & mine.method.ne(mine.reference)].to_dict(
@@ -173,7 +172,7 @@ def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[st
         traces.append(trace)
     zero = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 0, "x1": 0, "line": {"color": INK, "width": 1}}
     shown = layout(axis("difference of H [m]"), _methods_axis(order), hovermode="closest", shapes=[zero])
-    return go.Figure(traces, shown)
+    return Plot(traces, shown)
 
 
 def _finite(value: float) -> float:

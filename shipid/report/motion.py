@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
-from shipid.report.figure import Panel, axis, layout, line, plane
+from shipid.report.figure import Panel, Plot, axis, layout, line, plane
 from shipid.report.palette import GRID
 
 POINTS = 600  # of one line: more than pixels are wide
@@ -35,14 +34,14 @@ def panels(rows: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], framed: S
             for name, mine in parts.items()
         ]
         y = axis(f"{title} [{unit}]", nticks=6, zeroline=True, zerolinecolor=GRID)
-        result.append(Panel(go.Figure(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
+        result.append(Panel(Plot(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
     tracks = [
         line(name, mine["east"].to_numpy(), mine["north"].to_numpy(), [name], line=inks[name])
         for name, mine in parts.items()
     ]
     shown = pd.concat([parts[name] for name in framed])
     bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
-    return [*result, Panel(go.Figure(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
+    return [*result, Panel(Plot(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
 
 
 def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
@@ -65,13 +67,19 @@ class Shown(Protocol):
         ...
 
 
-def render(content: ReportContent) -> str:
+def render(content: ReportContent, say: Callable[[str], object] | None = None) -> str:
     """Write the page of a study as text."""
     windows = paths.window_data(content) if content.snapshots else None
-    return page(content, SECTIONS, "study", windows)
+    return page(content, SECTIONS, "study", windows, say)
 
 
-def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: dict[str, Any] | None = None) -> str:
+def page(
+    content: Shown,
+    sections: Mapping[str, Section],
+    kicker: str,
+    windows: dict[str, Any] | None = None,
+    say: Callable[[str], object] | None = None,
+) -> str:
     """Write the sections that have something to show as one page of HTML.
 
     Parameters
@@ -80,10 +88,11 @@ def page(content: Shown, sections: Mapping[str, Section], kicker: str, windows: 
     sections : registry of the page: id -> section, in order.
     kicker : what kind of page it is, above the title.
     windows : what page.js lets a reader browse, as `paths.window_data` returns it.
+    say : called with the heading of each section that is about to be drawn.
 
     Raises ValueError for a sentence that links to a figure which no section declares.
     """
-    parts = drawn(sections, content)
+    parts = drawn(sections, content, say)
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -116,9 +125,9 @@ def _check_links(answer: Sequence[Sentence], known: set[str]) -> None:
             raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
 
 
-def write_report(content: ReportContent, file: Path) -> Path:
+def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
     """Write the report as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(render(content), file)
+    return write(render(content, say), file)
 
 
 def write(text: str, file: Path) -> Path:
@@ -136,12 +145,23 @@ def _figures(parts: Sequence[Drawn]) -> list[Figure]:
 
 def _views(figure: Figure) -> dict[str, Any]:
     return {
-        key: [
-            {"data": spec["data"], "layout": spec["layout"]}
-            for spec in (json.loads(p.figure.to_json()) for p in panels)
-        ]
+        key: [{"data": _plain(panel.plot.traces), "layout": _plain(panel.plot.layout)} for panel in panels]
         for key, panels in figure.views.items()
     }
+
+
+def _plain(value: Any) -> Any:
+    """Content of JSON as Plotly.js takes it: columns of numbers as bytes, and what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f":
+        data = base64.b64encode(np.ascontiguousarray(value, dtype="<f4").tobytes()).decode("ascii")
+        return {"dtype": "f4", "bdata": data}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:

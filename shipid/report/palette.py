@@ -77,9 +77,11 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
     return result
 
 
-def close_styles(content: ReportContent) -> dict[str, Style]:
+@lru_cache(maxsize=4)
+def close_styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink."""
-    frame, result = families(content), {}
+    frame = families(content)
+    result: dict[str, Style] = {}
     of_family = dict(zip(frame.model.astype(str), frame.family, strict=True))
     physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]
     for index, name in enumerate(physics):

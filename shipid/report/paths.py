@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, choices
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import model_chips
-from shipid.report.figure import Chip, Control, Figure, FixedWindow, line, plane
+from shipid.report.figure import Chip, Control, Figure, FixedWindow, Plot, line, plane
 from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
@@ -202,9 +201,7 @@ def _spans(shot: dict[str, Any], lines: set[int]) -> list[list[float]]:
     return [[round(low - room, 2), round(high + room, 2)] for low, high in spans]
 
 
-def window_figure(
-    content: ReportContent, run: str | None = None, t: float | None = None, N_D: int | None = None
-) -> go.Figure:
+def window_plot(content: ReportContent, run: str | None = None, t: float | None = None, N_D: int | None = None) -> Plot:
     """Draw one window of a test run as the browser of the page draws it.
 
     Parameters
@@ -241,7 +238,7 @@ def window_figure(
                 keys = [*look["keys"], "band"]
                 traces.append(line(f"{look['name']}, band", *_aside(outline), keys, line=ink, **shade))
             traces.append(line(look["name"], *_aside(points), look["keys"], line=look["line"]))
-    return go.Figure(traces, plane("y, to starboard [m]", "x, ahead [m]"))
+    return Plot(traces, plane("y, to starboard [m]", "x, ahead [m]"))
 
 
 def _aside(points: Floats) -> tuple[Floats, Floats]:

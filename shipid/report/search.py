@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import TRIAL, Floats, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, axis, label, layout, line, logarithmic
+from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import sizes
@@ -82,11 +81,14 @@ def spoken(name: str) -> str:
 
 def importance(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
-    correlations = []
-    for _, mine in frame[frame.value.notna() & frame[name].notna()].groupby("cell"):
-        if mine[name].nunique() > 1 and mine.value.nunique() > 1 and len(mine) > 2:
-            correlations.append(float(np.corrcoef(mine[name].rank(), mine.value.rank())[0, 1]))
-    return float(np.mean(correlations)) if correlations else math.nan
+    known = frame[frame.value.notna() & frame[name].notna()]
+    cells = known.groupby("cell")
+    ranks = pd.DataFrame({"x": cells[name].rank(), "y": cells["value"].rank()})
+    ranks -= ranks.groupby(known.cell).transform("mean")
+    products = pd.DataFrame({"xy": ranks.x * ranks.y, "xx": ranks.x**2, "yy": ranks.y**2})
+    sums = products.groupby(known.cell).sum()
+    sums = sums[(cells.size() > 2) & (sums.xx > 0) & (sums.yy > 0)]
+    return float((sums.xy / np.sqrt(sums.xx * sums.yy)).mean()) if len(sums) else math.nan
 
 
 def _relative(trials: pd.DataFrame) -> pd.DataFrame:
@@ -106,7 +108,7 @@ def _chips(frame: pd.DataFrame) -> list[Chip]:
     return [*chips, Chip("chosen", "chosen", category(0), "none", symbol="diamond"), Chip("median", "median", INK)]
 
 
-def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
+def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Plot:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
     traces = []
     looks = {
@@ -125,14 +127,14 @@ def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure
             line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line={"color": INK, "width": 2.5})
         )
     traces.append(_dots(best, name, "chosen", ["chosen"], diamond))
-    return go.Figure(traces, _frame(name, every))
+    return Plot(traces, _frame(name, every))
 
 
-def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dict[str, Any]) -> go.Scatter:
+def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dict[str, Any]) -> Trace:
     y = mine.ratio.clip(upper=CEILING).fillna(FAILED).to_numpy(dtype=float)
     trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
     known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
-    trace.hovertemplate = f"{label(what)}: {label(spoken(name))} %{{x:.3g}}{known}<extra></extra>"
+    trace["hovertemplate"] = f"{label(what)}: {label(spoken(name))} %{{x:.3g}}{known}<extra></extra>"
     return trace
 
 

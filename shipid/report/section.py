@@ -52,12 +52,17 @@ def part(content: object, name: str) -> Any:
     return getattr(content, "frames", {}).get(name) if value is None else value
 
 
-def drawn(sections: Mapping[str, Section], content: object) -> list[Drawn]:
-    """Draw the sections that have something to show, in the order of the registry."""
+def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None) -> list[Drawn]:
+    """Draw the sections that have something to show, in the order of the registry.
+
+    say : called with the heading of each before it is drawn.
+    """
     result = []
     for name, section in sections.items():
         if any(_empty(part(content, need)) for need in section.needs):
             continue
+        if say is not None:
+            say(f"drawing: {section.title}")
         items = [item for item in section.draw(content) if item is not None]
         if items:
             result.append(Drawn(name, section.title, items))

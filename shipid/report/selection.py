@@ -53,8 +53,12 @@ def middles(content: ReportContent) -> dict[str, str]:
     }
 
 
+@lru_cache(maxsize=4)
 def exemplars(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
+    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation.
+
+    The list is shared by all who ask: not to be changed.
+    """
     names = [str(name) for name in families(content).model]
     middle = {*middles(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]

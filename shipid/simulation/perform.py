@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.engine.casadi import orders_of
+from shipid.engine.casadi import orders_of, outputs_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
@@ -19,7 +19,7 @@ from shipid.simulation.approach import Controls, steady
 from shipid.simulation.log import ON_BOARD, logged, run_names
 from shipid.simulation.manoeuvre import Approached, Manoeuvre
 from shipid.units import DEGREE
-from shipid.vessel.dynamics import HELM, dynamics
+from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -35,6 +35,7 @@ def perform(
     method: Method = "rk4",
     environment: Mapping[str, float | Array] | None = None,
     components: Mapping[str, Array] | None = None,
+    outputs: Sequence[str] = (),
     engine: str = "auto",
 ) -> pd.DataFrame:
     """Simulate manoeuvres and log them; manoeuvres with equal helmsmen run in one rollout.
@@ -49,6 +50,7 @@ def perform(
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series
         (num_instants, num_manoeuvres) at t = 0, step, 2 step, ... to the end of the longest log; default 0.
     components : wave components for each manoeuvre, from `shipid.simulation.sea.wave_loads`; default: calm water.
+    outputs : of the vessel's components, such as `propeller.thrust`, that are logged too.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def perform(
             {channel: values[:, places] for channel, values in weather.items()},
             {path: drawn[places] for path, drawn in seas.items()},
         )
-        columns = _together(controls, helmsman, batch, every, how)
+        columns = _together(controls, helmsman, batch, every, how, outputs)
         for sample, place in enumerate(places):
             logs[place] = {name: values[: rows[place], sample] for name, values in columns.items()}
     frame: dict[str, Any] = {"run": np.repeat(names, rows)}
@@ -113,7 +115,12 @@ class _Batch:
 
 
 def _together(
-    controls: Controls, helmsman: Helmsman | None, batch: _Batch, every: int, how: Mapping[str, Any]
+    controls: Controls,
+    helmsman: Helmsman | None,
+    batch: _Batch,
+    every: int,
+    how: Mapping[str, Any],
+    outputs: Sequence[str] = (),
 ) -> dict[str, Array]:
     """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
     vessel, num_steps = controls.vessel, every * (batch.rows - 1)
@@ -149,7 +156,14 @@ def _together(
     moments = np.arange(batch.rows) * every
     felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}
     log = logged(path, model.state)
-    log |= _orders(vessel, helmsman, path, commands, felt, np.minimum(moments, num_steps - 1))
+    steps = np.minimum(moments, num_steps - 1)
+    if helmsman is None:
+        log |= {name: commands[name][steps] + 0.0 for name in model.ordered}
+    else:
+        log |= _of_records(model.ordered, orders_of, vessel, model, path, commands, felt, steps)
+    if outputs:
+        shown = _of_records(tuple(model.outputs), outputs_of, vessel, model, path, commands, felt, steps)
+        log |= {name: shown[name] for name in outputs}
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}
     return log | {name: values for name, values in felt.items() if name in ON_BOARD}
@@ -216,31 +230,27 @@ def _start(
     return start, memory, helms
 
 
-def _orders(
+def _of_records(
+    names: Sequence[str],
+    function: Callable[..., Array],
     vessel: Vessel,
-    helmsman: Helmsman | None,
+    model: Dynamics,
     path: Trajectories,
     commands: Mapping[str, Array],
     weather: Mapping[str, Array],
-    moments: NDArray[np.intp],
+    steps: NDArray[np.intp],
 ) -> dict[str, Array]:
-    """Command -> ordered values (num_records, num_samples) from each record on; the last record repeats the last order.
+    """Orders of a helmsman, or outputs of components: name -> (num_records, num_samples).
 
-    commands : (num_steps, num_samples). moments : (num_records,) step of each record. weather : (num_records, ...).
+    commands : (num_steps, num_samples). steps : (num_records,) step from each record on; the last record repeats the
+    last. weather : (num_records, ...).
     """
-    model = dynamics(vessel, helmsman)
     records, samples = path.states.shape[0], path.states.shape[2]
-    if helmsman is None:
-        return {name: commands[name][moments] + 0.0 for name in model.ordered}
-    given = np.stack([commands[name][moments] for name in model.commands], axis=-1)
-    felt = np.zeros((records, samples, len(model.environment)))
-    for channel, name in enumerate(model.environment):
-        felt[..., channel] = weather[name]
-    memory = [path.names.index(f"actual.{name}") for name in model.memory]
-    states = path.states[:, 0, :, : len(model.state) + len(model.hidden)]
-    values = np.array(list(vessel.parameters.values()))
-    parts = (states, path.states[:, 0][..., memory], given, felt)  # (num_records, num_samples, channel)
-    state, hidden, inputs, environment = (part.reshape(records * samples, part.shape[-1]).T for part in parts)
-    orders = orders_of(model, state, hidden, inputs, environment, values)
-    ordered = orders.reshape(-1, records, samples).swapaxes(0, 1)
-    return {name: ordered[:, channel] + 0.0 for channel, name in enumerate(model.ordered)}
+    still = np.zeros((records, samples))
+    states = [path[name][:, 0] if name in path.names else still for name in (*model.state, *model.hidden)]
+    memory = [path[f"actual.{name}"][:, 0] for name in model.memory]
+    given = [commands[name][steps] for name in model.commands]
+    felt = [still + weather[name] for name in model.environment]
+    inputs = (np.array(part).reshape(len(part), records * samples) for part in (states, memory, given, felt))
+    values = function(model, *inputs, np.array(list(vessel.parameters.values()))).reshape(-1, records, samples)
+    return {name: value + 0.0 for name, value in zip(names, values, strict=True)}

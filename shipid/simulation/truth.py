@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.document import Checked
 from shipid.errors import DocumentError, ShipidError, choices
+from shipid.physics.signals import is_output
 from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
 from shipid.simulation.draw import Draw
@@ -52,7 +53,9 @@ class Truth(Checked, BaseModel):
     gusts: Gusts | None = None
     waves: Sea | None = None
     current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
-    sensors: dict[str, Sensor] = Field(default={}, description="logged column -> sensor model")
+    sensors: dict[str, Sensor] = Field(
+        default={}, description="logged column -> sensor model; an output (propeller.thrust) is logged where it has one"
+    )
     manoeuvre: Annotated[list[Draw], Field(min_length=1, description="kinds, drawn by their shares")] = [Draw()]
 
     @model_validator(mode="before")
@@ -97,7 +100,7 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
     if truth.gusts is not None and "V_w" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
     columns = [column_of(name) for name in model.state]
-    columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment)]
+    columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment), *model.outputs]
     unknown = next((name for name in truth.sensors if name not in columns), None)
     controls = Controls(vessel)
     for place, block in enumerate(truth.manoeuvre):
@@ -151,6 +154,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
             method=truth.method,
             environment=environment,
             components=None if truth.waves is None else wave_loads(vessel, draw_components(truth.waves, chi, keys)),
+            outputs=[name for name in truth.sensors if is_output(name)],
         )
     except ShipidError as error:
         raise DocumentError(error.message, path="truth") from None

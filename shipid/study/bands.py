@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -51,16 +52,31 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
     return low, high
 
 
-def regions(results: Results, level: float) -> Iterator[tuple[dict[str, Any], Region, Array]]:
-    """Row, region and errors (T, S, 2) [m] of every cell whose band promises a level."""
-    for row in results.rows:
+def regions(
+    results: Results, levels: Sequence[float], rows: Sequence[Mapping[str, Any]] | None = None
+) -> Iterator[tuple[Mapping[str, Any], dict[float, Region], Array]]:
+    """Row, region by level and errors (T, S, 2) [m] of every cell, or of some rows, whose band promises a level."""
+    for row in results.rows if rows is None else rows:
         bands = results.bands.get(row["cell"])
-        if bands is not None and bands.promises(level):
+        if bands is not None and any(bands.promises(level) for level in levels):
             paths = results.paths[row["cell"]]
-            region = bands.region(paths, results.test.columns, results.test.step, level)
-            yield row, region, results.test.future - paths
+            yield (
+                row,
+                bands.regions(paths, results.test.columns, results.test.step, levels),
+                results.test.future - paths,
+            )
 
 
+def _largest(results: Results) -> Iterator[tuple[Mapping[str, Any], Region, Array]]:
+    """Row, region at the level of the study and errors (T, S, 2) [m] of the cells of the largest N_D and first seed."""
+    level, cells = results.plan.study.bands.level, results.cells
+    largest, seed = cells["N_D"].max(), cells["seed"].min()
+    rows = [row for row in results.rows if row["N_D"] == largest and row["seed"] == seed]
+    for row, by_level, errors in regions(results, [level], rows):
+        yield row, by_level[level], errors
+
+
+@lru_cache(maxsize=1)  # the answer and the figures ask for it
 def coverage_frame(results: Results) -> pd.DataFrame:
     """Share of whole test paths in their bands, by model, N_D and level, over seeds.
 
@@ -68,24 +84,28 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
     length, rows = ship_length(results), []
-    for level in sorted({*SHOWN, results.plan.study.bands.level}):
-        held: dict[tuple[str, str, int], list[Array]] = {}
-        sizes: dict[tuple[str, str, int], list[tuple[float, float]]] = {}
-        for row, region, errors in regions(results, level):
-            key = (row["model"], row["family"], int(row["N_D"]))
-            held.setdefault(key, []).append(region.holds(errors))
-            sizes.setdefault(key, []).append((float(region.radius.mean()), float(region.radius[-1].mean())))
-        for (model, family, N_D), parts in held.items():
+    levels = sorted({*SHOWN, results.plan.study.bands.level})
+    held: dict[float, dict[tuple[str, str, int], list[Array]]] = {level: {} for level in levels}
+    sizes: dict[tuple[float, str, str, int], list[tuple[float, float]]] = {}
+    for row, by_level, errors in regions(results, levels):
+        key = (row["model"], row["family"], int(row["N_D"]))
+        for level, region in by_level.items():
+            held[level].setdefault(key, []).append(region.holds(errors))
+            ends = float(region.radius.mean()), float(region.radius[-1].mean())
+            sizes.setdefault((level, *key), []).append(ends)
+    for level in levels:
+        for (model, family, N_D), parts in held[level].items():
             mean = np.mean(parts, axis=0)  # seeds predict the same windows: they are no further evidence
             low, high = share_interval(mean, results.test.run)
-            width, end = np.mean(sizes[model, family, N_D], axis=0)
+            width, end = np.mean(sizes[level, model, family, N_D], axis=0)
             names = {"model": model, "family": family, "N_D": N_D, "level": level}
-            row = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
-            rows.append({**row, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
+            found = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
+            rows.append({**found, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
     return pd.DataFrame(rows, columns=columns)
 
 
+@lru_cache(maxsize=1)
 def groups_frame(results: Results) -> pd.DataFrame:
     """Coverage at the level of the study at the largest N_D, by kind of manoeuvre, time ahead and speed.
 
@@ -94,17 +114,13 @@ def groups_frame(results: Results) -> pd.DataFrame:
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, rows = results.plan.study.bands.level, results.test, []
-    largest = results.cells["N_D"].max()
-    seed = results.cells["seed"].min()
     kinds = kinds_of_runs(results.dataset)
     kind = np.array([kinds.get(str(run), "other") for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
     decimals = max(0, 1 - math.floor(math.log10(max(float(edges[-1]), 1e-3))))  # two digits of the greatest speed
     part = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, SPEEDS - 1)
-    for row, region, errors in regions(results, level):
-        if row["N_D"] != largest or row["seed"] != seed:
-            continue
+    for row, region, errors in _largest(results):
         bands, held, radius = results.bands[row["cell"]], region.holds(errors), region.radius.mean(axis=0)
 
         def add(by: str, group: str, chosen: Array, inside: Array, wide: float, note: str = "") -> None:
@@ -159,17 +175,15 @@ def worst_frame(results: Results) -> pd.DataFrame:
 
     Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border)).
     """
-    level, test, rows = results.plan.study.bands.level, results.test, []
-    largest, seed = results.cells["N_D"].max(), results.cells["seed"].min()
+    test, rows = results.test, []
     kinds = kinds_of_runs(results.dataset)
-    for row, region, errors in regions(results, level):
-        if row["N_D"] == largest and row["seed"] == seed:
-            reach = region.reach(errors).max(axis=0)
-            for run in test.spans:
-                mine = test.run == run
-                inside = float((reach[mine] <= 1).mean())
-                entry = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
-                rows.append({**entry, "reach": float(reach[mine].max())})
+    places = {run: test.run == run for run in test.spans}
+    for row, region, errors in _largest(results):
+        reach = region.reach(errors).max(axis=0)
+        for run, mine in places.items():
+            inside = float((reach[mine] <= 1).mean())
+            entry = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
+            rows.append({**entry, "reach": float(reach[mine].max())})
     columns = ["model", "run", "kind", "coverage", "reach"]
     return pd.DataFrame(rows, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])
 

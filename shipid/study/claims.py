@@ -30,6 +30,7 @@ RENEWED, LATE = 10.0, 60.0  # s: how often a claim is renewed, and after how lon
 WAIT, LONGEST_WAIT = 1.0, 15.0  # s between looks at what others finish: it grows
 SHORT_WAIT = 0.05  # s, for what takes others a moment
 MISSED = 8  # claims that are refused until the folder is listed anew
+SHARE = 50  # or one in so many units: a listing costs about as much as a hundred refusals among 10,000
 
 
 class TakenOver(ShipidError):
@@ -131,7 +132,7 @@ class Claims:
             if not free:
                 break
             reach, missed = 1, 0  # where many take from one list, they move apart
-            while free and missed <= max(MISSED, len(units) // 500):  # a list is used as long as most of it holds
+            while free and missed <= max(MISSED, len(units) // SHARE):  # a list is used as long as most of it holds
                 unit = free.pop(random.randrange(min(reach, len(free))))
                 if self._takes(unit, is_finished):
                     yield unit

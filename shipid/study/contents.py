@@ -23,6 +23,7 @@ from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)
 
+Say = Callable[[str], object]
 PAGES = "report"  # name of the claim on the pages
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
@@ -40,8 +41,15 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
 
-def report_content(results: Results) -> ReportContent:
-    """Assemble everything that the report of a study shows."""
+def report_content(results: Results, say: Say | None = None) -> ReportContent:
+    """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
+    frames = {}
+    for name, frame in FRAMES.items():
+        if say is not None:
+            say(f"{results.plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
+        frames[name] = frame(results)
+    if say is not None:
+        say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
     return ReportContent(
         title=results.plan.study.question,
         name=results.plan.name,
@@ -63,49 +71,52 @@ def report_content(results: Results) -> ReportContent:
         study_document=results.plan.text(),
         command=parts.reproducing_command(results),
         best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
-        frames={name: frame(results) for name, frame in FRAMES.items()},
+        frames=frames,
     )
 
 
-def write_pages(folder: Path) -> Path:
+def write_pages(folder: Path, say: Say | None = None) -> Path:
     """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
 
     A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
-    with `methods.csv` beside it.
+    with `methods.csv` beside it. say : called with a few words on how far it is.
 
     Raises ResultError if the folder holds no run or cannot be written.
     """
     store.stored_plan(folder)
     with Claims(folder) as claims, claims.alone(PAGES):
-        return _write(folder)
+        return _write(folder, say)
 
 
-def _write(folder: Path) -> Path:
+def _write(folder: Path, say: Say | None) -> Path:
     """Write the pages, alone; those of an unfinished run are as old as the results that were read for them."""
     plan = store.stored_plan(folder)
     with temporary_folder(folder) as place:
         read = place.stat().st_mtime_ns
-    report, whole = _write_parts(plan, folder) if plan.parts else _write_one(folder)
+    report, whole = _write_parts(plan, folder, say) if plan.parts else _write_one(folder, say)
     if not whole:
         os.utime(report, ns=(read, read))
     return report
 
 
-def _write_one(folder: Path) -> tuple[Path, bool]:
+def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
     with Claims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
-        results = read_results(folder)
+        results = read_results(folder, say)
         store.write_results(folder, results.cells, whole=results.complete)
-    content = report_content(results)
+    content = report_content(results, say)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
-    report = write_report(content, folder / REPORT)
+    report = write_report(content, folder / REPORT, say)
     log.debug("report written: %s", report)
     return report, results.complete
 
 
-def share_pages(folder: Path) -> Path:
-    """Write the pages where several processes may end together: one writes, the others wait for it."""
+def share_pages(folder: Path, say: Say | None = None) -> Path:
+    """Write the pages where several processes may end together: one writes, the others wait for it.
+
+    say : called with a few words on how far it is.
+    """
     report, parts = folder / REPORT, store.stored_plan(folder).parts
     places = [store.part_folder(folder, name) for name in parts] or [folder]
 
@@ -117,11 +128,11 @@ def share_pages(folder: Path) -> Path:
             return False
 
     with Claims(folder) as claims:
-        claims.once(PAGES, is_done, lambda: _write(folder))
+        claims.once(PAGES, is_done, lambda: _write(folder, say))
     return report
 
 
-def _write_parts(plan: Plan, folder: Path) -> tuple[Path, bool]:
+def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of all parts that have results and one that compares methods over them, and whether all is in it."""
     cells: list[pd.DataFrame] = []
     notes: dict[str, str] = {}
@@ -131,7 +142,7 @@ def _write_parts(plan: Plan, folder: Path) -> tuple[Path, bool]:
         if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
             notes[name] = "no cell is finished yet"
             continue
-        write_pages(mine)
+        write_pages(mine, say)
         results = read_results(mine)
         whole.append(results.complete)
         cells.append(methods.method_cells(results, part.condition, name))

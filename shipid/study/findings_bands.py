@@ -63,7 +63,8 @@ def band_findings(results: Results, physics: Sequence[str]) -> list[Finding]:
         return undecided(CLAIMS, results.missing)
     level, run = results.plan.study.bands.level, results.test.run
     bands = {
-        str(row["cell"]): (region.radius.mean(axis=0), region.holds(e)) for row, region, e in regions(results, level)
+        str(row["cell"]): (by_level[level].radius.mean(axis=0), by_level[level].holds(errors))
+        for row, by_level, errors in regions(results, [level])
     }
     table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
     sound = tuple(name for name in physics if name in table.H and name in table.A)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from itertools import pairwise
@@ -16,12 +16,20 @@ import pandas as pd
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.files import read_json
+from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands, Region
-from shipid.metrics import error_by_axis, over_horizon, over_horizon_by_axis, over_time, position_error, summary
+from shipid.metrics import (
+    course_over_horizon,
+    error_by_axis,
+    over_horizon,
+    over_horizon_by_axis,
+    over_time,
+    position_error,
+    summary,
+)
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
-from shipid.predictor import Predictor
+from shipid.predictor import Predictor, checked_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import NO_MODEL, Plan, Way
@@ -32,10 +40,43 @@ from shipid.vessel.outline import ship_outline
 ALL_KINDS = "all"
 MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
+STRIDE = 20  # cells read between words on how far it is
+MOST_KEPT = 2**30  # bytes of predicted paths in memory
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
-@dataclass(frozen=True, repr=False)
+class StoredPaths(Mapping[str, np.ndarray]):
+    """Predicted test paths (T, S, 2) [m] by cell, read from their files when they are asked for.
+
+    The last ones stay in memory, up to `MOST_KEPT`. files : cell -> its file. kept : cell -> paths without a file.
+    """
+
+    def __init__(self, files: Mapping[str, Path], kept: Mapping[str, np.ndarray]) -> None:
+        self._files, self._kept = files, kept
+        self._read: dict[str, np.ndarray] = {}
+        self._bytes = 0
+
+    def __getitem__(self, cell: str) -> np.ndarray:
+        if cell in self._kept:
+            return self._kept[cell]
+        if cell not in self._read:
+            self._read[cell] = read_arrays(self._files[cell])["paths"]
+            self._bytes += self._read[cell].nbytes
+            while self._bytes > MOST_KEPT and len(self._read) > 1:
+                self._bytes -= self._read.pop(next(iter(self._read))).nbytes
+        return self._read[cell]
+
+    def __contains__(self, cell: object) -> bool:
+        return cell in self._files or cell in self._kept
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self._files, *self._kept))
+
+    def __len__(self) -> int:
+        return len(self._files) + len(self._kept)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Results:
     """A run's folder, read: the plan, one row per cell, models, test windows, and errors (T, S) of every cell.
 
@@ -117,8 +158,11 @@ def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     return cells.assign(model=[plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)])
 
 
-def read_results(folder: str | os.PathLike[str]) -> Results:
-    """Read a run's folder and predict every test window with every stored cell."""
+def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
+    """Read a run's folder: its tables, and the path that every cell predicts on every test window.
+
+    say : called with a few words on how far it is.
+    """
     folder = Path(folder)
     plan = store.stored_plan(folder)
     if plan.parts:
@@ -128,24 +172,32 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     cells = _labelled(store.read_rows(folder, plan), plan)
     test, physics, naive = store.read_test(folder)
     dataset = read_dataset(folder / store.DATASET)
-    paths = {}
     bands: dict[str, Bands] = {}
     no_band: dict[str, str] = {}
+    files: dict[str, Path] = {}
+    kept: dict[str, np.ndarray] = {}
     known: dict[str, Estimates] = {}
-    for row in cells.to_dict("records"):
-        if row["status"] == "ok":
-            predictor = Predictor.load(store.cell_file(folder, row["cell"]))
+    good = cells[cells["status"] == "ok"].to_dict("records")
+    for count, row in enumerate(good, start=1):
+        cell = row["cell"]
+        if say is not None and count % STRIDE == 0:
+            say(f"reading cells: {count} of {len(good)}")
+        file = store.cell_file(folder, cell)
+        if store.paths_file(folder, cell).is_file():
+            files[cell] = store.paths_file(folder, cell)
+            band, reason = read_bands(file)
+        else:  # of an earlier version
+            predictor = Predictor.load(file)
             alone = physics.get(row["foundation"])  # None where its numbers depend on the cell
-            instants = instants_of(
-                plan, predictor.vessel, dataset, test, _observed(predictor, known_by_then(plan, dataset), known)
-            )
-            paths[row["cell"]] = predictor.predict(instants, alone)
-            if predictor.bands is not None:
-                bands[row["cell"]] = predictor.bands
-            try:
-                predictor.check_level(plan.study.bands.level)
-            except DataError as error:
-                no_band[row["cell"]] = error.message
+            estimates = _observed(predictor, known_by_then(plan, dataset), known)
+            kept[cell] = predictor.predict(instants_of(plan, predictor.vessel, dataset, test, estimates), alone)
+            band, reason = predictor.bands, predictor.no_band
+        if band is not None:
+            bands[cell] = band
+        try:
+            checked_bands(band, reason, plan.study.bands.level)
+        except DataError as error:
+            no_band[cell] = error.message
     return Results(
         folder=folder,
         plan=plan,
@@ -154,7 +206,7 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
         test=test,
         physics=physics,
         naive=naive,
-        paths=paths,
+        paths=StoredPaths(files, kept),
         dataset=dataset,
         provenance=read_json(folder / store.PROVENANCE),
         bands=bands,
@@ -200,7 +252,7 @@ def _shown_cells(results: Results) -> list[dict[str, Any]]:
 
 
 def horizon_frame(results: Results) -> pd.DataFrame:
-    """Mean and 90th percentile error, mean error along x and across [m], per step ahead [s].
+    """Mean and 90th percentile error, mean error along x and across [m] and of the course [deg], per step ahead [s].
 
     Of physics, cooperative models and the naive floor; x and y are those of the frame (11).
     """
@@ -248,6 +300,7 @@ def _horizon(results: Results, path: np.ndarray, model: str, N_D: int, seed: int
     keys = {"model": model, "N_D": N_D, "seed": seed, "source": source}
     ahead = test.step * np.arange(1, test.horizon + 1)
     errors = {**over_horizon(position_error(path, true)), **over_horizon_by_axis(path, true)}
+    errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
     return pd.DataFrame({**keys, "ahead": ahead, **errors})
 
 

@@ -96,7 +96,7 @@ def _computed(
     floor = float(prepared.naive.mean())
 
     def computed(batch: Batch, *journal: Any) -> pd.DataFrame:
-        rows = [row for row, _ in run_unit(turn, prepared, turn.whole(batch), device, *journal)]
+        rows = [cell.row for cell in run_unit(turn, prepared, turn.whole(batch), device, *journal)]
         return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
 
     if kept is None or claims is None:

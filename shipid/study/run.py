@@ -50,7 +50,7 @@ PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow",
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
 MENDING, MENDED = "mending", "mended"  # claims: on the look at all files, and of the process that has looked
-Results = list[tuple[dict[str, Any], Predictor | None]]
+Results = list[store.Cell]
 Computed = Iterator[tuple[Unit, Results | str]]
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
@@ -226,20 +226,20 @@ def _shared(
 ) -> Iterator[Event]:
     """Compute every unit that is not finished yet, here or, where another process is at work on it, there."""
     units = {unit.key: unit for unit in plan.units}
-    known = {unit.key for unit in store.finished(folder, plan.units)}
+    known = store.finished_keys(folder, units)
     cells = _cells(units[key] for key in known)
     yield Event("start", done=cells, total=plan.cells)
     wait = WAIT
     while True:
         if known >= units.keys():  # unless another process has just mended some of them
-            known = {unit.key for unit in store.finished(folder, plan.units)}
+            known = store.finished_keys(folder, units)
             cells = _cells(units[key] for key in known)
         if not (left := [key for key in units if key not in known]):
             return
         before = len(known)
         free = claims.free(
             left,
-            lambda: {unit.key for unit in store.finished(folder, plan.units)},
+            partial(store.finished_keys, folder, units),
             lambda key: store.is_finished(folder, units[key]),
         )
         for unit, results in compute(units[key] for key in free):
@@ -254,10 +254,10 @@ def _shared(
             finally:
                 claims.give_back(unit.key)
             known.add(unit.key)
-            for row, _ in results:
+            for cell in results:
                 cells += 1
-                yield Event("cell", done=cells, total=plan.cells, row=row)
-        known |= {unit.key for unit in store.finished(folder, plan.units)}
+                yield Event("cell", done=cells, total=plan.cells, row=cell.row)
+        known |= store.finished_keys(folder, units)
         if cells < _cells(units[key] for key in known):
             cells = _cells(units[key] for key in known)
             yield Event("others", done=cells, total=plan.cells)
@@ -266,10 +266,8 @@ def _shared(
         wait = pause(wait) if len(known) == before else WAIT
 
 
-def run_batch(
-    plan: Plan, prepared: Prepared, batch: Batch, device: str
-) -> list[tuple[dict[str, Any], Predictor | None]]:
-    """All cells of one batch at once: (row of results, predictor) each."""
+def run_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> Results:
+    """All cells of one batch at once."""
     return run_unit(plan, prepared, plan.whole(batch), device)
 
 
@@ -281,7 +279,7 @@ def run_unit(
     trials: Path | None = None,
     check: Callable[[], object] = lambda: None,
 ) -> Results:
-    """All cells of one unit of work: (row of results, predictor) each. Pure: the same on every worker.
+    """All cells of one unit of work. Pure: the same on every worker.
 
     trials : the folder of the journals in which searches go on; on a machine that does not see it, they are kept in
         memory. check : called before each write to a journal; what it raises ends the search.
@@ -309,7 +307,7 @@ def run_unit(
         errors, seconds = left_out.get((name, way.name), (None, 0.0))
         row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
         if result.corrector is None:
-            predictor, outcome = None, _failed(one.sentence or "no training converged")
+            predictor, paths, outcome = None, None, _failed(one.sentence or "no training converged")
         else:
             predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
             if one.foundation.identify is None and result.left_out is not None:
@@ -317,8 +315,8 @@ def run_unit(
             bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
             known_why = {} if bands is not None else {"no_band": reason}
             predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
-            outcome = _judged(plan, prepared, one, predictor, way)
-        results.append(({**row, **outcome}, predictor))
+            outcome, paths = _judged(plan, prepared, one, predictor, way)
+        results.append(store.Cell({**row, **outcome}, predictor, paths))
     return results
 
 
@@ -428,23 +426,25 @@ def _failed(sentence: str, status: str = "failed") -> dict[str, Any]:
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
-def _judged(plan: Plan, prepared: Prepared, one: Prediction, predictor: Predictor, way: Way) -> dict[str, Any]:
-    """Errors [m] of a predictor on the test windows, and what its search chose."""
+def _judged(
+    plan: Plan, prepared: Prepared, one: Prediction, predictor: Predictor, way: Way
+) -> tuple[dict[str, Any], Array | None]:
+    """Errors [m] of a predictor on the test windows and what its search chose, and its paths where they are finite."""
     chosen, test = predictor.corrector.hyperparameters, prepared.test
     words = ", ".join(f"{name} {chosen[name]:.3g}" for name in way.method.varied() if name in chosen)
     failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
     if failed.any():
         share = f"physics diverges on {failed.mean():.1%} of the test windows"
         sentence = share if np.isfinite(one.paths).all() else one.sentence
-        return _failed(sentence, "diverged") | {"hyperparameters": words}
+        return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
     paths = predictor.predict(instants, one.test_paths)
     if not np.isfinite(paths).all():
-        return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}
+        return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}, None
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
     errors |= _promise(plan, predictor, instants, paths, test)
-    return {**errors, "status": "ok", "sentence": one.sentence, "hyperparameters": words}
+    return {**errors, "status": "ok", "sentence": one.sentence, "hyperparameters": words}, paths
 
 
 def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:

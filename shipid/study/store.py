@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -42,6 +42,14 @@ UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m
 METRICS = tuple(UNITS)
 
 
+class Cell(NamedTuple):
+    """Result of a cell: its row, and where it has a result its predictor and the test paths (T, S, 2) [m] it gives."""
+
+    row: dict[str, Any]
+    predictor: Predictor | None = None
+    paths: np.ndarray | None = None
+
+
 def open_folder(folder: Path, plan: Plan) -> None:
     """Make the folder of a run, or check that an existing one belongs to the same study.
 
@@ -62,7 +70,14 @@ def open_folder(folder: Path, plan: Plan) -> None:
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
     _mend(folder, plan)
-    for place in (folder, folder / "cells", folder / "batches", folder / seals.FOLDER, folder / JOURNALS):
+    for place in (
+        folder,
+        folder / "cells",
+        folder / "predictions",
+        folder / "batches",
+        folder / seals.FOLDER,
+        folder / JOURNALS,
+    ):
         sweep(place)
 
 
@@ -168,6 +183,11 @@ def cell_file(folder: Path, cell: str) -> Path:
     return folder / "cells" / f"{cell}.npz"
 
 
+def paths_file(folder: Path, cell: str) -> Path:
+    """Where the predicted test paths of a cell are."""
+    return folder / "predictions" / f"{cell}.npz"
+
+
 def part_folder(folder: Path, part: str) -> Path:
     """Where the run of one part of a study is: a folder like that of any run."""
     return folder / PARTS / part
@@ -175,9 +195,17 @@ def part_folder(folder: Path, part: str) -> Path:
 
 def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
     """Units whose results are stored whole: with a seal, or in a batch that was one unit to an earlier version."""
+    known = {unit.key: unit for unit in units}
+    done = finished_keys(folder, known)
+    return [unit for key, unit in known.items() if key in done]
+
+
+def finished_keys(folder: Path, units: Mapping[str, Unit]) -> set[str]:
+    """Keys of the units, by key, whose results are stored whole; 10,000 take some milliseconds."""
     sealed = seals.sealed(folder)
     batches = {name for name in sealed - seals.FIRST.keys() if WITH not in name}
-    return [unit for unit in units if unit.key in sealed or (batches and unit.batch.key in batches)]
+    before = {key for key, unit in units.items() if unit.batch.key in batches} if batches else set()
+    return (sealed & units.keys()) | before
 
 
 def is_finished(folder: Path, unit: Unit) -> bool:
@@ -185,15 +213,18 @@ def is_finished(folder: Path, unit: Unit) -> bool:
     return seals.is_sealed(folder, unit.key) or seals.is_sealed(folder, unit.batch.key)
 
 
-def write_unit(folder: Path, unit: Unit, results: Sequence[tuple[dict[str, Any], Predictor | None]]) -> None:
-    """Store the rows and predictors of a unit; the seal comes last, when all the rest is on the disk."""
+def write_unit(folder: Path, unit: Unit, results: Sequence[Cell]) -> None:
+    """Store the rows, predictors and test paths of a unit; the seal comes last, when all the rest is on the disk."""
     if is_finished(folder, unit):  # by a process that took it over while this one was held up
         return
     files = []
-    for row, predictor in results:
+    for row, predictor, paths in results:
         if predictor is not None:
             files.append(predictor.save(cell_file(folder, row["cell"])))
-    write_json(rows_file(folder, unit.key), [row for row, _ in results])
+        if paths is not None:
+            files.append(paths_file(folder, row["cell"]))
+            write_arrays(files[-1], {"paths": paths})
+    write_json(rows_file(folder, unit.key), [cell.row for cell in results])
     seals.remove(folder, RESULTS)  # of the tables, which do not hold this unit
     seals.write_seal(folder, unit.key, [rows_file(folder, unit.key), *files])
 

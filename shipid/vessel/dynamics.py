@@ -12,7 +12,7 @@ import numpy as np
 from casadi import SX
 
 from shipid.errors import DocumentError, choices
-from shipid.physics import ACTUATORS, TERMS, Term
+from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
@@ -56,14 +56,17 @@ class Dynamics:
     rates : (state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt.
     advance : (state, memory, commands, environment, parameters, dt) -> memory after dt, exactly.
     orders : (state, memory, commands, environment, parameters) -> order of each actuator.
+    measured : (state, memory, commands, environment, parameters) -> what instruments on the components show.
     state, hidden : names of the entries of the state vector: eta and nu, then the states that terms keep.
     memory, commands, environment, parameters : names of the entries of each other input vector.
     ordered : names of the orders; they are the commands unless a helmsman gives them.
+    outputs : name -> unit of the entries of `measured`: `propeller.thrust`.
     """
 
     rates: ca.Function
     advance: ca.Function
     orders: ca.Function
+    measured: ca.Function
     sums: tuple[SumOverComponents, ...]
     state: tuple[str, ...]
     hidden: tuple[str, ...]
@@ -72,6 +75,7 @@ class Dynamics:
     environment: tuple[str, ...]
     parameters: tuple[str, ...]
     ordered: tuple[str, ...]
+    outputs: dict[str, str]
     helmsman: Helmsman | None = None
 
     @property
@@ -148,7 +152,9 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         force -= coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
-    summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
+    given = _given(terms, available, bound, value_of)
+    summed, mapped = _sum_of_terms(terms, {**available, **given}, states_of, bound, value_of)
+    shown = _shown(terms, {**available, **given}, bound, value_of)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
@@ -166,6 +172,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         rates=function("rates", ca.vertcat(kinematics(eta, nu)[rows], acceleration, *more), tau_extra),
         advance=function("advance", ca.vertcat(*helm_after, *lags_after), dt),
         orders=function("orders", ca.vertcat(*(orders[name] for name in ordered))),
+        measured=function("measured", ca.vertcat(SX(0, 1), *shown.values())),
         sums=tuple(
             SumOverComponents(path, function(f"sum_{i}", wrench[rows], entry), widths, arrays)
             for i, (path, entry, wrench, widths, arrays) in enumerate(mapped)
@@ -177,6 +184,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
         ordered=ordered,
+        outputs=units(shown),
         helmsman=helmsman,
     )
 
@@ -258,10 +266,9 @@ def _sum_of_terms(
     Each of the latter is (path, component symbol, wrench of one component, widths, arrays).
     """
     total, mapped = SX(6, 1), []
-    given = _given(terms, available, bound, value_of)
     for path, key, block in terms:
         term = TERMS[key]
-        extra = _commands_of(path, available) | {name: given[f"{block[BEHIND]}.{name}"] for name in behind(term)}
+        extra = _of_component(path, term, block, available)
         if path in states_of:
             extra["state"] = states_of[path]
         wrench = partial(_wrench, term, {**available, **extra}, _values(bound[path], value_of))
@@ -282,6 +289,11 @@ def _commands_of(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
     return {name: available[f"{component}.{name}"] for name in named("command") if f"{component}.{name}" in available}
 
 
+def _of_component(path: str, term: Term, block: Mapping[str, Any], available: Mapping[str, SX]) -> dict[str, SX]:
+    """Signals of one component: commands, and what the component that it is behind gives."""
+    return _commands_of(path, available) | {name: available[f"{block[BEHIND]}.{name}"] for name in behind(term)}
+
+
 def _given(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
@@ -292,10 +304,29 @@ def _given(
     result = {}
     for path, key, _ in terms:
         for name, function in TERMS[key].gives.items():
-            here = {**available, **_commands_of(path, available)}
-            result[f"{path.rsplit('.', 1)[-1]}.{name}"] = _called(
-                TERMS[key], function, here, _values(bound[path], value_of)
-            )
+            if name in GIVEN:
+                here = {**available, **_commands_of(path, available)}
+                result[f"{path.rsplit('.', 1)[-1]}.{name}"] = _called(
+                    TERMS[key], function, here, _values(bound[path], value_of)
+                )
+    return result
+
+
+def _shown(
+    terms: list[tuple[str, str, Mapping[str, Any]]],
+    available: Mapping[str, SX],
+    bound: Mapping[str, Binding],
+    value_of: Mapping[str, SX],
+) -> dict[str, SX]:
+    """Outputs of all components, by name: `propeller.thrust`."""
+    result = {}
+    for path, key, block in terms:
+        for name, function in TERMS[key].gives.items():
+            if name not in GIVEN:
+                here = {**available, **_of_component(path, TERMS[key], block, available)}
+                value = _called(TERMS[key], function, here, _values(bound[path], value_of))
+                if value is not None:
+                    result[f"{path.rsplit('.', 1)[-1]}.{name}"] = value
     return result
 
 

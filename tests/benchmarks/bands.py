@@ -258,7 +258,7 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
         study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
         turn = replace(plan, study=study, batches=(Batch(amount, 0),))
         prepared = prepare(turn, dataset)
-        for row, predictor in run_batch(turn, prepared, turn.batches[0], "cpu"):
+        for row, predictor, _ in run_batch(turn, prepared, turn.batches[0], "cpu"):
             assert predictor is not None
             instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
             frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},

@@ -18,7 +18,7 @@ def run() -> dict[str, Any]:
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}
     for batch in plan.batches:
         start = time.perf_counter()
-        rows = [row for row, _ in run_batch(plan, prepared, batch, "cpu")]
+        rows = [cell.row for cell in run_batch(plan, prepared, batch, "cpu")]
         seconds = (time.perf_counter() - start) / len(rows)
         errors = [row["H"] for row in rows if row["foundation"] != NO_MODEL]
         mean = sum(errors) / len(errors)

@@ -14,10 +14,10 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.claims import LATE, Claims
 from shipid.study.contents import write_pages
@@ -68,7 +68,7 @@ def played(cells: int, workers: int) -> dict[str, float]:
         return seconds
 
 
-def _played(plan: Plan, folder: Path, workers: int, cell: tuple[dict[str, Any], Predictor | None]) -> dict[str, float]:
+def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[str, float]:
     """Seconds that claims and files take until every cell is stored."""
     units, seconds = {unit.key: unit for unit in plan.units}, {"claims": 0.0, "files": 0.0}
     rng, left = random.Random(1), len(units)
@@ -76,7 +76,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: tuple[dict[str, Any], 
     def taken(claims: Claims) -> Iterator[str]:
         return claims.free(
             list(units),
-            lambda: {unit.key for unit in store.finished(folder, plan.units)},
+            partial(store.finished_keys, folder, units),
             lambda key: store.is_finished(folder, units[key]),
         )
 
@@ -121,11 +121,12 @@ def _dies(folder: Path, key: str, claims: Claims) -> None:
     os.utime(file, (late, late))
 
 
-def _as(unit: Unit, cell: tuple[dict[str, Any], Predictor | None]) -> list[tuple[dict[str, Any], Predictor | None]]:
+def _as(unit: Unit, cell: store.Cell) -> list[store.Cell]:
     """The result of one cell under the name of another."""
-    row, predictor = cell
+    row, predictor, paths = cell
     foundation, method = unit.pairs[0]
     name = unit.batch.cell(foundation, method)
     assert predictor is not None
     mine = {"cell": name, "foundation": foundation, "method": method, "N_D": unit.batch.N_D, "seed": unit.batch.seed}
-    return [({**row, **mine}, replace(predictor, provenance={**predictor.provenance, **mine}))]
+    predictor = replace(predictor, provenance={**predictor.provenance, **mine})
+    return [store.Cell({**row, **mine}, predictor, paths)]

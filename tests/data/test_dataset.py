@@ -141,7 +141,14 @@ def test_sample_unwraps_angles() -> None:
 
 @pytest.mark.parametrize(
     ("name", "unit"),
-    [("port.n", "rev/s"), ("rudder_1.delta", "rad"), ("r", "rad/s"), ("port.thrust", None), ("n", None)],
+    [
+        ("port.n", "rev/s"),
+        ("rudder_1.delta", "rad"),
+        ("r", "rad/s"),
+        ("port.thrust", "N"),
+        ("thrust", None),
+        ("n", None),
+    ],
 )
 def test_unit_of(name: str, unit: str | None) -> None:
     assert unit_of(name) == unit

@@ -51,6 +51,17 @@ def test_each_step_alone_needs_less_than_the_whole_path(seed: int) -> None:
     assert (alone.reach(made_.errors) <= 1).mean() == pytest.approx(0.9, abs=0.06)
 
 
+def test_regions_of_several_levels_are_those_of_each() -> None:
+    made_, bands = STRANGE[1]
+    few = replace(bands, runs=4)  # too few for 0.9
+    found = few.regions(made_.paths, made_.columns, 1.0, [0.5, 0.8, 0.9])
+    assert list(found) == [0.5, 0.8]
+    for level, region in found.items():
+        alone = few.region(made_.paths, made_.columns, 1.0, level)
+        np.testing.assert_array_equal(region.along, alone.along)
+        np.testing.assert_array_equal(region.holds(made_.errors), alone.holds(made_.errors))
+
+
 def test_far_from_training_bands_grow_without_bound() -> None:
     made_, bands = STRANGE[0]
     away = [{**made_.columns, "u": made_.columns["u"] + shift} for shift in (0.0, 1e2, 1e3, 1e4)]

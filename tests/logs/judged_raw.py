@@ -99,7 +99,11 @@ def _fault(name: str, column: Suggestion, true: RawColumn | None, mirror: bool) 
         relative = true.signal == "awa"
         fits = relative == bool(column.extra.get("relative")) and true.signal in ("awa", "wind_from")
         return "" if fits else f"from {column.source!r}"
-    if "." in name:
+    if kind in ("thrust", "torque"):
+        if not true.signal.startswith(f"{kind}."):
+            return f"from {column.source!r}, which is {true.signal or 'nothing'}"
+        wanted = 1.0
+    elif "." in name:
         side = next((side for side in ("port", "starboard") if name.startswith(side)), "")
         of_side = not side or any(one.startswith(side) for one in signals) or len(signals) > 1
         if not of_side or not any(one.endswith(f".{kind}") for one in signals):

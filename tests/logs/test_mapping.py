@@ -30,6 +30,8 @@ DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m,
     "rad": {"rad": 1, "deg": 2 * math.pi / 360},
     "rad/s": {"rad/s": 1, "deg/s": 2 * math.pi / 360, "deg/min": 2 * math.pi / 360 / 60},
     "rev/s": {"rev/s": 1, "rpm": 1 / 60, "rad/s": 1 / (2 * math.pi)},
+    "N": {"N": 1, "kN": 1000},
+    "N m": {"N m": 1, "kN m": 1000, "Nm": 1, "kNm": 1000},
     "-": {"-": 1, "%": 1 / 100},
 }
 

@@ -11,6 +11,7 @@ from shipid.logs.mapping import UNITS
 from shipid.physics.signals import (
     SIGNALS,
     is_command,
+    is_output,
     is_shaft,
     mirror_sign,
     named,
@@ -74,6 +75,13 @@ def test_commands_are_told_by_their_last_name() -> None:
 )
 def test_what_a_command_is_called(name: str, command: bool) -> None:
     assert is_command(name) == command
+
+
+def test_outputs_are_no_commands() -> None:
+    assert [is_output(name) for name in ("port.thrust", "rudder.normal_force", "thrust", "port.n", "a b.thrust")] == [
+        True, True, False, False, False,
+    ]  # fmt: skip
+    assert not any(is_command(f"port.{name}") for name in named("output"))
 
 
 def test_units_of_sailors() -> None:

@@ -10,14 +10,14 @@ from shipid.report.figure import apart, axis, label, layout, line, logarithmic, 
 
 def test_names_of_the_user_are_text_for_plotly():
     assert label("<b>a & b</b>") == "&lt;b&gt;a &amp; b&lt;/b&gt;"
-    assert line("<b>", [0.0], [1.0], []).name == "&lt;b&gt;"
+    assert line("<b>", [0.0], [1.0], [])["name"] == "&lt;b&gt;"
 
 
 def test_a_line_is_in_single_precision_and_keeps_its_gaps():
     drawn = line("a", [0.0, 1.0, 2.0], [1.0, np.nan, 2.0], ["model:a"])
-    assert drawn.y.dtype == np.float32
-    assert drawn.connectgaps is False
-    assert list(drawn.meta) == ["model:a"]
+    assert drawn["y"].dtype == np.float32
+    assert drawn["connectgaps"] is False
+    assert drawn["meta"] == ["model:a"]
 
 
 def test_ticks_of_a_logarithmic_axis_are_numbers_one_can_read():

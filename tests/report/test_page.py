@@ -10,13 +10,12 @@ from importlib.resources import files
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs_version
 
 from shipid.errors import ResultError
 from shipid.report import ReportContent, Sentence, write_report
-from shipid.report.figure import Figure, Panel, axis, layout, line
+from shipid.report.figure import Figure, Panel, Plot, axis, layout, line
 from shipid.report.page import render
 from shipid.report.palette import close_styles, styles
 from shipid.report.section import Section, declared
@@ -255,12 +254,21 @@ def test_views_exist_for_every_choice(sections):
                 assert set(item.views) == {"-".join(map(str, index)) for index in np.ndindex(*shape)}
 
 
+def test_every_plot_is_one_that_plotly_takes(sections):
+    """Plots are plain data; Plotly's classes refuse an option that there is not."""
+    for section in sections:
+        for item in section.items:
+            for panels in item.views.values() if isinstance(item, Figure) else ():
+                for panel in panels:
+                    assert len(panel.figure.data) == len(panel.plot.traces)
+
+
 def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
     """One record in the registry: no other place is edited, not even for a link from the answer."""
 
     def toy(content):
         frame = content.frames["tides"]
-        plot = go.Figure([line("tide", frame.t, frame.height, [])], layout(axis("time [h]"), axis("height [m]")))
+        plot = Plot([line("tide", frame.t, frame.height, [])], layout(axis("time [h]"), axis("height [m]")))
         return [
             Figure(
                 id="tide",

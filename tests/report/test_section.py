@@ -29,6 +29,13 @@ def test_a_section_needs_its_parts(need, shown):
     assert [one.id for one in drawn({"a": section}, content)] == ["a"] * shown
 
 
+def test_it_says_which_section_is_drawn():
+    said = []
+    sections = {"a": Section("First", lambda _: [table("a")]), "b": Section("Second", lambda _: [], needs=("absent",))}
+    drawn(sections, SimpleNamespace(), said.append)
+    assert said == ["drawing: First"]
+
+
 def test_nothing_is_drawn_of_a_section_that_is_left_out():
     def fails(_):
         raise AssertionError

@@ -251,3 +251,16 @@ def test_a_current_carries_ship_and_sea_along() -> None:
         np.testing.assert_allclose(path[name][:, 0, 1], path[name][:, 0, 0], atol=1e-8, err_msg=name)
     drift = V_c[1] * 30.0
     np.testing.assert_allclose(path["north"][-1, 0, 1] - path["north"][-1, 0, 0], drift * np.cos(2.2), atol=1e-7)
+
+
+def test_a_sensor_of_an_output_logs_it() -> None:
+    """With a noisy sensor the log has the thrust of one unit, true but for the noise; without one it has none."""
+    assert not [name for name in simulate(truth(duration=10.0), SHIP) if str(name).endswith(".thrust")]
+    exact, noisy = (
+        simulate(truth(duration=10.0, sensors={"port.thrust": {"noise": noise}}), SHIP)["port.thrust"]
+        for noise in (0.0, 50.0)
+    )
+    assert exact.abs().max() > 1000
+    assert 20 < np.std(noisy - exact) < 80
+    with pytest.raises(DocumentError, match=r"truth.sensors.port.torque: no logged column"):
+        simulate(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)

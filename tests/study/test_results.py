@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -228,3 +229,28 @@ def test_without_xarray_is_one_line(read: Results, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(frames, "find_spec", lambda _: None)
     with pytest.raises(ShipidError, match="needs xarray"):
         read.to_xarray()
+
+
+def test_stored_paths_are_those_of_the_predictors(tiny_run: Path, tmp_path: Path) -> None:
+    """Read from files, as a folder of an earlier version predicts them again."""
+    shutil.copytree(tiny_run, tmp_path / "run")
+    shutil.rmtree(tmp_path / "run" / "predictions")
+    for seal in (tmp_path / "run" / "seals").iterdir():
+        kept = [line for line in seal.read_text().splitlines(keepends=True) if "  predictions/" not in line]
+        seal.write_text("".join(kept))
+    said: list[str] = []
+    stored, again = read_results(tiny_run), read_results(tmp_path / "run", said.append)
+    assert list(stored.paths) == list(again.paths)
+    for cell, paths in stored.paths.items():
+        np.testing.assert_allclose(again.paths[cell], paths, rtol=0, atol=1e-9)
+    assert stored.bands.keys() == again.bands.keys()
+    assert stored.no_band == again.no_band
+
+
+def test_few_paths_stay_in_memory(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = dict(read_results(tiny_run).paths)
+    monkeypatch.setattr(frames, "MOST_KEPT", 1)
+    paths = read_results(tiny_run).paths
+    for cell in [*whole, *whole]:
+        np.testing.assert_array_equal(paths[cell], whole[cell])
+    assert len(paths._read) == 1  # type: ignore[attr-defined]

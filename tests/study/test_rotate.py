@@ -59,7 +59,7 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     for test in ("a", "b"):
         own, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(own, dataset)
-        rows = [row for row, _ in run_batch(own, prepared, own.batches[0], "cpu")]
+        rows = [row for row, *_ in run_batch(own, prepared, own.batches[0], "cpu")]
         turn = found[found["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         assert (turn["N_D"] == 5).all()

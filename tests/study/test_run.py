@@ -98,10 +98,10 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
     prepared = prepare(plan, obtain(plan))
-    whole = {row["cell"]: (row, one) for row, one in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    whole = {row["cell"]: (row, one) for row, one, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
     found = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
     assert len(found) == len(whole) == plan.cells
-    for row, predictor in found:
+    for row, predictor, _ in found:
         expected, other = whole[row["cell"]]
         assert _plain(row) == _plain(expected)
         assert predictor is not None
@@ -224,12 +224,12 @@ def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:
     batch = plan.whole(plan.batches[0])
     row = dict.fromkeys(store.METRICS, 1.0) | {"trials": [], "N_D": 4, "seed": 0, "status": "ok"}
     rows = [{**row, "cell": f"{f}+{m}", "foundation": f, "method": m} for f, m in batch.pairs]
-    store.write_unit(folder, batch, [(row, None) for row in rows])
+    store.write_unit(folder, batch, [store.Cell(row) for row in rows])
     assert store.finished(folder, plan.units) == list(plan.units)
     found = store.read_rows(folder, plan)
     assert list(zip(found["foundation"], found["method"], strict=True)) == list(batch.pairs)
     one = plan.units[1]
-    store.write_unit(folder, one, [(rows[-1], None)])  # finished already: nothing is stored twice
+    store.write_unit(folder, one, [store.Cell(rows[-1])])  # finished already: nothing is stored twice
     assert len(store.read_rows(folder, plan)) == len(rows)
 
 

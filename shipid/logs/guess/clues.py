@@ -27,6 +27,10 @@ UNIT_WORDS = {
     "rev/s": r"rps|1/s|rev/s|hz|s-1",
     "m": r"m|metres?|meters?|meter",
     "km": r"km",
+    "N": r"n|newtons?",
+    "kN": r"kn|kilo ?newtons?",
+    "N m": r"n[ .*·]?m|newton ?met(er|re)s?",
+    "kN m": r"kn[ .*·]?m",
     "%": r"%|percent|pct|prozent",
 }
 """Unit -> regular expression of how logs write it, in lower case."""
@@ -90,6 +94,8 @@ def unit_said(name: str, si: str) -> str | None:
     ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
     if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
         ends.append("rpm" if "rpm" in bare.lower() else "rps")
+    if si in ("N", "N m") and (force := re.search(r"[kK]?N[mM]?$", bare)):  # `thrust_kN` is cut before the N
+        ends = [force[0]]
     for said in [*reversed(inside), *ends]:
         for unit, expected in UNIT_WORDS.items():
             if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(expected, said.strip().lower()):

@@ -20,6 +20,7 @@ from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_s
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
 from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
+from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import choose_pose
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
@@ -87,6 +88,7 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
         _runs(state, source)
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
+    outputs = reserve_outputs(state)
     choose_pose(state, source.path)
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
         choose_yaw_rate(state, 0.05)
@@ -94,6 +96,7 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)
+    suggest_outputs(state, outputs)
     _others(state)
     defects_of_rows(state, sniffed)
     defects_of_motion(state)

@@ -71,7 +71,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         component = side_of(name) or SIGNALS[signal].component
         if not azimuth and signal == "delta" and side_of(name):
             component = f"rudder_{side_of(name)}" if state.called("n") == [] else str(side_of(name))
-        state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+        state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
 
 
@@ -142,7 +142,7 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
                 said = unit_said(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if said else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            state.suggest(_unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+            state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
 def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
@@ -229,7 +229,8 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 
-def _unique(name: str, used: dict[str, int]) -> str:
+def unique(name: str, used: dict[str, int]) -> str:
+    """Return the name of a column, with a number after its component where it is used already."""
     used[name] = used.get(name, 0) + 1
     component, _, signal = name.partition(".")
     return name if used[name] == 1 else f"{component}_{used[name]}.{signal}"

@@ -59,7 +59,7 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
         ("Kurs über Grund", "course"),
         ("Fahrt durchs Wasser", ""),
         ("Vy / m/s", "v"),
-        ("Drehmoment / kNm", ""),
+        ("Drehmoment / kNm", "torque"),
         ("Taux de giration", "r"),
         ("VITESSE ARBRE [rpm]", "n"),
         ("BT_speed_[RPM]", "n"),
@@ -72,7 +72,7 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
         ("Giri elica", "n"),
         ("Sbandamento", "phi"),
         ("Rudder pump 1", ""),
-        ("T_prop", ""),
+        ("T_prop", "thrust"),
     ],
 )
 def test_the_best_meaning(name: str, meaning: str) -> None:

@@ -1,8 +1,9 @@
 """Multipurpose naval vessel, 51.5 m, with roll: Blanke and Christensen (1993), 10th Ship Control Systems Symposium.
 
-Numbers of Perez for the vessel of ADI-Limited, as in the MSS toolbox (navalvessel.m). N_{phi|uv|} multiplies phi|uv|,
-as its name and its siblings in sway and roll have it; navalvessel.m multiplies it by phi|u phi|. The hull alone: the
-source takes the forces of screws and rudders from outside, here as X, Y, K, N in N and N m.
+Written from navalvessel.m of the MSS toolbox (numbers of Perez for the vessel of ADI-Limited) by a person who had not
+read the vessel document, but for one term: N_{phi|uv|} multiplies phi|uv|, as its name and its siblings in sway and
+roll have it; navalvessel.m multiplies it by phi|u phi|. The hull alone: the source takes the forces of screws and
+rudders from outside, here as X, Y, K, N in N and N m.
 """
 
 from __future__ import annotations
@@ -14,27 +15,33 @@ DRAWN = {
     **{"X": (-1e5, 3e5), "Y": (-1e5, 1e5), "K": (-3e5, 3e5), "N": (-2e6, 2e6)},
 }
 
+RHO, GRAVITY, VOLUME = 1014.0, 9.81, 357.0
+MASS = RHO * VOLUME
+X_G, Z_G = -3.38, 2.3 - 3.36
+
 
 def accelerations(
     *, u: float, v: float, p: float, r: float, phi: float, X: float, Y: float, K: float, N: float
 ) -> np.ndarray:
-    rho, g, volume, gm = 1014.0, 9.81, 357.0, 1.1
-    m, I_xx, I_zz, x_G, z_G = volume * rho, 2.3763e6, 47.934e6, -3.38, -(3.36 - 2.3)
-    M = np.array(
-        [
-            [m + 17400.0, 0, 0, 0],
-            [0, m + 393000, -(m * z_G - 296000), m * x_G + 1400000],
-            [0, -(m * z_G + 296000), I_xx + 774000, 0],
-            [0, m * x_G - 538000, 0, I_zz + 38.7e6],
-        ]
-    )
-    X_h = -1.96e3 * u * abs(u) + 0.33 * m * v * r
-    Y_h = -11800 * abs(u) * v + 131000 * u * r - 3700 * v * abs(v) - 794000 * v * abs(r) - 182000 * r * abs(v)
-    Y_h += 10800 * phi * abs(u * v) + 251000 * phi * abs(u * r) - 74 * phi * u**2
-    K_h = 9260 * abs(u) * v - 102000 * u * r + 29300 * v * abs(v) + 621000 * v * abs(r) + 142000 * r * abs(v)
-    K_h += -8400 * phi * abs(u * v) - 196000 * phi * abs(u * r) - 1180 * phi * u**2
-    K_h += -15500 * abs(u) * p - 416000 * p * abs(p) - 500000 * p - 0.325 * m * g * phi**3 - rho * g * gm * volume * phi
-    N_h = -92000 * abs(u) * v - 4710000 * abs(u) * r - 202000000 * r * abs(r) - 15600000 * r * abs(v)
-    N_h += -214000 * phi * abs(u * v) - 4980000 * phi * u * abs(r) - 8000 * phi * u * abs(u)
-    turning = m * np.array([r * v + x_G * r**2 - z_G * p * r, -u * r, z_G * u * r, -x_G * u * r])
-    return np.linalg.solve(M, np.array([X_h + X, Y_h + Y, K_h + K, N_h + N]) + turning)
+    surge, sway, yaw, roll = abs(u), abs(v), abs(r), abs(p)
+    lever_x, lever_z = MASS * X_G, MASS * Z_G
+    inertia = np.zeros((4, 4))
+    inertia[0, 0] = MASS + 17400
+    inertia[1] = [0, MASS + 393e3, 296e3 - lever_z, lever_x + 1400e3]
+    inertia[2] = [0, -lever_z - 296e3, 2.3763e6 + 774e3, 0]
+    inertia[3] = [0, lever_x - 538e3, 0, 47.934e6 + 38.7e6]
+
+    heeled = phi * surge * np.array([sway, yaw, surge])  # phi|uv|, phi|ur|, phi u^2
+    crossed = np.array([v * sway, v * yaw, r * sway])  # v|v|, v|r|, r|v|
+    force = np.array([X, Y, K, N])
+    force[0] += -1960 * u * surge + 0.33 * MASS * v * r
+    force[1] += -11800 * surge * v + 131e3 * u * r + crossed @ [-3700, -794e3, -182e3] + heeled @ [10800, 251e3, -74]
+    force[2] += 9260 * surge * v - 102e3 * u * r + crossed @ [29300, 621e3, 142e3] + heeled @ [-8400, -196e3, -1180]
+    force[2] += -(15500 * surge + 416e3 * roll + 500e3) * p
+    force[2] += MASS * GRAVITY * (-0.325 * phi**3 - 1.1 * phi)  # weight is buoyancy
+    force[3] += -surge * (92e3 * v + 4710e3 * r) - 202e6 * r * yaw - 15.6e6 * r * sway
+    force[3] += -214e3 * heeled[0] - u * phi * (4980e3 * yaw + 8000 * surge)
+
+    force[0] += MASS * (v * r - Z_G * p * r + X_G * r * r)
+    force[1:] += MASS * u * r * np.array([-1, Z_G, -X_G])
+    return np.linalg.solve(inertia, force)

@@ -1,0 +1,102 @@
+"""Measured outputs of components, such as the thrust of a propeller, beside what a vessel predicts for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset, pieces, unit_of
+from shipid.engine.casadi import memory_along, outputs_of
+from shipid.errors import DataError
+from shipid.simulation.log import aboard, column_of
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+OFF = 0.15  # of the prediction: a larger scale error or scatter is reported
+
+
+def common_outputs(vessel: Vessel, dataset: Dataset) -> list[str]:
+    """Outputs that were measured and that the vessel predicts; none where a command was not recorded."""
+    model = dynamics(vessel)
+    if not set(model.commands) <= set(dataset.commands):
+        return []
+    return [name for name in dataset.outputs if name in model.outputs]
+
+
+def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
+    """Outputs that the vessel predicts in the recorded motion, by the recorded orders, through the actuators' lags.
+
+    Returns one row for each row of the dataset, with `run`, `t` [s] and a column [SI] for each of `common_outputs`.
+    Nothing is simulated but the actuators, so that errors of the hull do not count. Currents are taken as 0.
+    """
+    model, wanted = dynamics(vessel), common_outputs(vessel, dataset)
+    places = [list(model.outputs).index(name) for name in wanted]
+    values, parts = np.array(list(vessel.parameters.values())), []
+    for run, rows in pieces(dataset):
+        columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
+        still = np.zeros(len(rows))
+        motion = columns | aboard(columns)
+        states = [motion.get(column_of(name), still) for name in (*model.state, *model.hidden)]
+        memory = memory_along(vessel, {name: columns[name] for name in model.commands}, columns["t"]) or {}
+        seen = (
+            states,
+            [memory[name] for name in model.memory],
+            [columns[name] for name in model.commands],
+            [columns.get(name, still) for name in model.environment],
+        )
+        state, reached, orders, weather = (np.array(part).reshape(len(part), len(rows)) for part in seen)
+        shown = outputs_of(model, state, reached, orders, weather, values)[places]
+        parts.append(pd.DataFrame({"run": run, "t": columns["t"], **dict(zip(wanted, shown, strict=True))}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
+    """Measured outputs beside the predicted ones, run by run.
+
+    Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted,
+    by least squares) and `error` (root mean square of the difference); empty without a common output.
+    """
+    table: list[dict[str, Any]] = []
+    predictions = predicted_outputs(vessel, dataset)
+    runs = dataset.frame["run"].to_numpy()
+    ordered = pd.concat([rows for _, rows in pieces(dataset)], ignore_index=True)
+    for name in predictions.columns[2:]:
+        for run in dict.fromkeys(runs):
+            here = (predictions["run"] == run).to_numpy()
+            y, f = ordered[name].to_numpy()[here], predictions[name].to_numpy()[here]
+            power = float(f @ f)
+            row = {"output": name, "run": str(run), "unit": unit_of(name), "measured": _rms(y), "predicted": _rms(f)}
+            table.append(row | {"scale": float(f @ y) / power if power else np.inf, "error": _rms(y - f)})
+    names = ["output", "run", "unit", "measured", "predicted", "scale", "error"]
+    return pd.DataFrame(table, columns=names)
+
+
+def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
+    """Rows as those of `check_dataset`: whether measured outputs are within 15 % of what the vessel predicts.
+
+    DataError if no output that the vessel predicts was measured.
+    """
+    if not common_outputs(vessel, dataset):
+        measured = ", ".join(dataset.outputs) or "none"
+        predicted = ", ".join(dynamics(vessel).outputs) or "none"
+        raise DataError(
+            f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel"
+        )
+    table = []
+    for row in compare_outputs(vessel, dataset).to_dict("records"):
+        scatter = row["error"] / max(row["predicted"], 1e-300)
+        off = f"(difference {100 * scatter:.2g} %)"
+        sentence = f"{row['output']} is {row['scale']:.3g} times what {vessel.name} predicts {off}"
+        words = "; wrong sign?" if row["scale"] < 0 else "; right unit, right size of the component?"
+        ok = scatter <= OFF
+        table.append({
+            "check": f"output {row['output']}", "run": row["run"], "value": scatter, "unit": "1", "limit": OFF,
+            "ok": ok, "sentence": sentence + ("" if ok else words),
+        })  # fmt: skip
+    return pd.DataFrame(table, columns=["check", "run", "value", "unit", "limit", "ok", "sentence"])
+
+
+def _rms(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

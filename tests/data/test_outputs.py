@@ -1,0 +1,99 @@
+"""Measured outputs beside those that a vessel predicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.data.outputs import check_outputs, common_outputs, compare_outputs, predicted_outputs
+from shipid.errors import DataError
+from shipid.logs.importing import import_log
+from shipid.logs.mapping import read_mapping
+from shipid.simulation.manoeuvre import Excitation
+from shipid.simulation.perform import perform
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+
+SHIPS = {"kvlcc2-l7": 600.0, "gunnerus-28.9-6dof": 150.0, "container-175": 100.0}
+OPEN_WATER = {"1": 0.03668, "J": -0.01298, "JJ": -0.02347}  # K_Q of HSVA's model, parabola up to J = 0.9
+
+
+def log_of(ship: Vessel, n_rpm: float) -> Dataset:
+    """Two runs of random orders, with all outputs."""
+    runs = [
+        Excitation(
+            name=name,
+            signal="aprbs",
+            angle_deg=10.0,
+            n_rpm=n_rpm,
+            amplitude_rpm=0.2 * n_rpm,
+            duration=30.0,
+            hold=(5.0, 9.0),
+            seed=seed,
+        )
+        for seed, name in enumerate("ab")
+    ]
+    frame = perform(ship, runs, step=0.5, outputs=list(dynamics(ship).outputs))
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    return Dataset(frame, {"clock": "run", "flags": []})
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_vessel_predicts_what_was_simulated_on_it(name: str) -> None:
+    """Beyond the first seconds, in which the log does not say where shaft and rudder were."""
+    ship = load_vessel(name)
+    log = log_of(ship, SHIPS[name])
+    found, names = predicted_outputs(ship, log), common_outputs(ship, log)
+    assert list(found.columns) == ["run", "t", *names]
+    assert names
+    assert names == list(dynamics(ship).outputs)
+    late = (log.frame["t"] > 15).to_numpy()
+    for output in names:
+        true = log.frame[output].to_numpy()[late]
+        np.testing.assert_allclose(found[output][late], true, atol=0.02 * np.abs(true).max())
+
+
+def test_the_scale_of_a_misread_thrust_is_reported() -> None:
+    ship = load_vessel("kvlcc2-l7")
+    log = log_of(ship, 600.0)
+    assert check_outputs(ship, log)["ok"].all()
+    wrong = Dataset(log.frame.assign(**{"propeller.thrust": -1.4 * log.frame["propeller.thrust"]}), log.metadata)
+    table = check_outputs(ship, wrong).set_index("check")
+    assert not table.loc["output propeller.thrust", "ok"].any()
+    assert table.loc["output rudder.normal_force", "ok"].all()
+    assert "wrong sign" in table.loc["output propeller.thrust", "sentence"].iloc[0]
+    assert compare_outputs(ship, wrong)["scale"].iloc[0] == pytest.approx(-1.4, abs=0.05)
+
+
+def test_nothing_to_compare_is_said() -> None:
+    ship = load_vessel("kvlcc2-l7")
+    log = log_of(ship, 600.0)
+    bare = Dataset(log.frame.drop(columns=["propeller.thrust", "rudder.normal_force"]), log.metadata)
+    with pytest.raises(DataError, match=r"predicts propeller.thrust, rudder.normal_force; the data have none"):
+        check_outputs(ship, bare)
+    assert common_outputs(load_vessel("gunnerus-28.9"), log) == []
+
+
+def test_hsva_measured_what_the_open_water_curve_predicts(shared_data: Path, tmp_path: Path) -> None:
+    """Thrust and torque of the free tank model, against her open-water curve, with a published wake."""
+    text = Path("studies/mappings/kvlcc2-hsva.toml").read_text("utf-8")
+    kept = [line for line in text.splitlines() if not line.startswith(("sha256", "url"))]
+    more = [
+        f'[columns."propeller.{name}"]\nfrom = "{name}"\nunit = "{unit}"'
+        for name, unit in (("thrust", "N"), ("torque", "Nm"))
+    ]
+    file = tmp_path / "hsva.toml"
+    file.write_text("\n".join(kept + more).replace('Z_*.dat"', 'Z_35*.dat"'), "utf-8")
+    log = import_log(read_mapping(file), shared_data / "kvlcc2_hsva")
+    ship = load_vessel("kvlcc2-hsva").with_values({"thruster.propeller.K_Q": OPEN_WATER})
+    found = compare_outputs(ship, log).set_index("output")
+    assert found["scale"]["propeller.thrust"] == pytest.approx(1.078, abs=0.002)
+    assert found["scale"]["propeller.torque"] == pytest.approx(1.014, abs=0.002)
+    assert check_outputs(ship, log)["ok"].all()
+    straight = log.frame[pd.Series(log.frame["t"] < 1.0)]
+    K_T = straight["propeller.thrust"].mean() / (1000 * 10.2295**2 * 0.204**4)
+    assert pytest.approx(0.229, abs=0.01) == K_T  # J = 0.36 in her open-water curve: a wake of 0.36, published 0.40

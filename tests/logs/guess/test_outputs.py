@@ -1,0 +1,63 @@
+"""Measured thrust and torque are found by their names and units, and no other column is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
+from tests.logs.simulated import si_log, state_with_pose
+
+LOG = si_log()
+FORCE = 1000.0 + 10 * np.sin(0.1 * LOG["t"].to_numpy())
+
+
+def told(**columns: np.ndarray) -> dict[str, tuple[str, str]]:
+    state = state_with_pose(columns)
+    suggest_outputs(state, reserve_outputs(state))
+    return {one.name: (one.source, one.unit) for one in state.suggestions}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("thrust", ("propeller.thrust", "N")),
+        ("Thrust [kN]", ("propeller.thrust", "kN")),
+        ("thrust_kN", ("propeller.thrust", "kN")),
+        ("thrustkN", ("propeller.thrust", "kN")),
+        ("THRUST_KN", ("propeller.thrust", "kN")),
+        ("T_prop [N]", ("propeller.thrust", "N")),
+        ("Schub_BB [kN]", ("port.thrust", "kN")),
+        ("shaftTorque_kNm", ("propeller.torque", "kN m")),
+        ("torque stbd (Nm)", ("starboard.torque", "N m")),
+        ("Q [kNm]", ("propeller.torque", "kN m")),
+        ("Drehmoment", ("propeller.torque", "N m")),
+        ("rudder force [N]", ("rudder.normal_force", "N")),
+        ("q", None),
+        ("thrust_cmd", None),
+        ("thrust [%]", None),
+        ("bow thruster", None),
+        ("thruster angle", None),
+        ("torque [A]", ("propeller.torque", "N m")),
+        ("power_kw", None),
+    ],
+)
+def test_a_name_says_an_output_and_its_unit(name: str, expected: tuple[str, str] | None) -> None:
+    assert told(**{name: FORCE}) == ({} if expected is None else {expected[0]: (name, expected[1])})
+
+
+def test_a_unit_that_nobody_says_is_asked_for() -> None:
+    state = state_with_pose({"thrust": FORCE})
+    suggest_outputs(state, reserve_outputs(state))
+    assert [question.about for question in state.questions] == [("thrust",)]
+
+
+def test_an_output_belongs_to_the_only_shaft() -> None:
+    state = state_with_pose({"thrust [N]": FORCE, "rpm": FORCE})
+    state.suggest("thruster.n", "rpm", "rpm", 1.0, "a test")
+    suggest_outputs(state, reserve_outputs(state))
+    assert state.suggestions[-1].name == "thruster.thrust"
+
+
+def test_a_constant_column_is_no_measurement() -> None:
+    assert told(**{"thrust [N]": 0 * FORCE}) == {}
