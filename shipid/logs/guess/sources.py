@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from shipid.data.dataset import Array
 from shipid.errors import DataError, ShipidError
 from shipid.logs.guess.sniff import SAMPLE, Sniffed, sniff
 from shipid.logs.guess.words import is_run
@@ -110,7 +109,7 @@ def _is_held(name: str, log: Sniffed) -> bool:
 
 
 def _count(log: Sniffed, column: str | None, pause: float) -> int:
-    new: Array = np.diff(log.t) > pause
+    new = np.diff(log.t) > pause
     return 1 + int(np.sum(new | (np.diff(log.columns[column]) != 0) if column is not None else new))
 
 

@@ -368,7 +368,8 @@ def is_magnetic(name: str) -> bool:
 
 def side_of(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
-    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", name.lower()))
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))  # 1/s is no starboard
+    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:
             return side

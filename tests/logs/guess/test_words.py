@@ -92,7 +92,8 @@ def test_an_order_of_the_rudder_is_a_command() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "side"), [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None)]
+    ("name", "side"),
+    [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None), ("n act[1/s]", None)],
 )
 def test_sides(name: str, side: str | None) -> None:
     assert side_of(name) == side
