@@ -165,6 +165,7 @@ MAPPING = {
     "estimate": ("[estimate]", set()),
     "repair": ("[[repair]]", set()),
     "segment": ("[[segment]]", set()),
+    "parts": ("[parts]", set()),
     "resample": ("[resample]", set()),
     "format": ("[format]", set()),
     "file.format": ("[format]", set()),
@@ -175,7 +176,7 @@ MAPPING = {
 def test_every_key_of_a_mapping_is_in_the_section_of_its_block(path: str, model: type[BaseModel]) -> None:
     heading, elsewhere = MAPPING[path]
     text = page("reference-mapping-document")
-    tables = {"format", "clock", "columns", "file", "repair", "segment", "resample", "estimate", "origin"}
+    tables = {"format", "clock", "columns", "file", "repair", "segment", "parts", "resample", "estimate", "origin"}
     missing = keys(model) - named(section(text, heading)) - elsewhere - (tables if not path else set())
     assert not missing, missing
     channels = section(text, "Channels")

@@ -98,7 +98,8 @@ def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) 
     answer.rows("findings", findings, table(["finding", "sure", "what"], shown) if findings else None)
     source = guessed.source
     if source.pattern is not None:
-        sentence = f"{len(source.files)} files {source.pattern!r} are one source of as many runs"
+        count = f"{source.held} runs" if source.parts else "as many runs"
+        sentence = f"{len(source.files)} files {source.pattern!r} are one source of {count}"
         answer.say(sentence, files=len(source.files), pattern=source.pattern)
     left = [{"left out": name, "because": why} for name, why in source.skipped.items()]
     answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)

@@ -26,7 +26,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
-from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Segment, Source, read_mapping, to_si
+from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, Progress, TextFormat, dated, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command, is_output
@@ -34,17 +34,22 @@ from shipid.physics.signals import is_command, is_output
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
 Records = list[dict[str, Any]]
+Begins = list[tuple[float, str]]
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
 class Imported:
-    """One log in SI units and body-fixed axes, with its repairs, the number of rows read and the origin [deg]."""
+    """One log in SI units and body-fixed axes, with its repairs, the number of rows read and the origin [deg].
+
+    begins : time [s] and name of every run in it, where the mapping parts it.
+    """
 
     rows: pd.DataFrame
     records: Records
     read: int
     origin: tuple[float, float] | None
+    begins: Begins
 
 
 def import_log(
@@ -96,13 +101,16 @@ def import_log(
     if parts[0].origin is not None:
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
-    kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in logs}
-    metadata |= {"manoeuvres": kinds} if kinds else {}
-    if mapping.source.runs is None:
+    if mapping.parts is not None:
+        runs = [piece for run, part in zip(logs, parts, strict=True) for piece in _parted(part, run)]
+        frame = pd.concat(runs, ignore_index=True)
+    elif mapping.source.runs is None:
         segments = mapping.segment or (_whole(rows, mapping, source),)
         frame = _cut(rows, segments, to_si(mapping.clock.unit, "t"), source)
     else:
         frame = pd.concat([_named(part.rows, run) for run, part in zip(logs, parts, strict=True)], ignore_index=True)
+    kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
+    metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
     return _resampled(dataset, mapping.resample.step) if mapping.resample else dataset
 
@@ -145,7 +153,7 @@ def sha256_of(file: Path) -> str:
 
 
 def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Progress | None) -> Imported:
-    rows, first, read = _columns(mapping, file, progress)
+    rows, first, read, begins = _columns(mapping, file, progress)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
     rows, records = apply_repairs(rows, wrapping, off)
@@ -170,7 +178,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
         if mapping.resamples or "latitude" in mapping.columns
         else list(rows.columns)
     )
-    return Imported(rows[order], first + records + gaps + more + estimated, read, origin)
+    return Imported(rows[order], first + records + gaps + more + estimated, read, origin, begins)
 
 
 def _added(parts: list[Records]) -> Records:
@@ -189,16 +197,20 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> tuple[pd.DataFrame, Records, int]:
-    """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0."""
+def _columns(
+    mapping: Mapping, file: Path, progress: Progress | None = None
+) -> tuple[pd.DataFrame, Records, int, Begins]:
+    """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0; begins of runs."""
     here = {column.source for column in mapping.columns.values() if not column.file}
     here |= {mapping.clock.date} if mapping.clock.date is not None else set()
+    here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
     log = read_table(file, mapping.format, mapping.clock.source, here, progress)
     records = _passed_over(log)
     if mapping.clock.repeated == "drop":
         log, more = _once(log, mapping.clock, mapping.format, file)
         records += more
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
+    begins = _begins(log, t, mapping.parts, file) if mapping.parts is not None else []
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
@@ -232,7 +244,28 @@ def _columns(mapping: Mapping, file: Path, progress: Progress | None = None) -> 
         records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
     else:
         columns = {name: values for name, (_, values) in channels.items()}
-    return pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False), records, read
+    rows = pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False)
+    return rows, records, read, begins
+
+
+def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path) -> Begins:
+    """Return where runs begin in the rows of a log at t (N,) [s]: after a pause, or where the column changes.
+
+    Runs are named after the value of the column, else after their number.
+    """
+    new = np.append(True, np.diff(t) > (np.inf if parts.pause is None else parts.pause))
+    if parts.source is None:
+        return [(float(t[row]), str(number)) for number, row in enumerate(np.flatnonzero(new), 1)]
+    column = _column(log, parts.source, file, "parts.from").ffill().bfill()
+    if pd.api.types.is_float_dtype(column.dtype) and (column == column.round()).all():
+        column = column.astype("int64")
+    texts = column.astype(str).str.strip().to_numpy(dtype=object)
+    new |= np.append(True, texts[1:] != texts[:-1])
+    found: Begins = []
+    for row in np.flatnonzero(new):
+        same = sum(name.rpartition(" (")[0] == texts[row] or name == texts[row] for _, name in found)
+        found.append((float(t[row]), f"{texts[row]} ({same + 1})" if same else str(texts[row])))
+    return found
 
 
 def _passed_over(table: pd.DataFrame) -> Records:
@@ -459,6 +492,8 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
                 _unwrap(values)
             else:
                 values[known] = np.unwrap(values[known])
+            if is_command(name) and known.any():  # an azimuth about 360 deg is one about 0
+                values -= 2 * np.pi * np.round(np.median(values[known]) / (2 * np.pi))
         turned[name] = values
     return rows.assign(**turned)
 
@@ -599,6 +634,17 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_named(part, segment.run))
     return runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
+
+
+def _parted(log: Imported, name: str) -> Iterator[pd.DataFrame]:
+    """Yield the runs of a log, each after its name in it; a run of a single row is no run."""
+    t = log.rows["t"].to_numpy()
+    starts = np.array([start for start, _ in log.begins])
+    number = np.searchsorted(starts, t + clock_slack(t), side="right") - 1
+    for index, (_, run) in enumerate(log.begins):
+        rows = log.rows.loc[number == index]
+        if len(rows) > 1:
+            yield _named(rows.reset_index(drop=True), f"{name} {run}")
 
 
 def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:

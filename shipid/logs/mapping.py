@@ -162,6 +162,13 @@ class Segment(Strict):
     manoeuvre: Manoeuvre | None = None
 
 
+class Parts(Strict):
+    """Where a new run begins in a file of several: a column that changes its value, or a pause of the clock [s]."""
+
+    source: str | None = Field(default=None, alias="from")
+    pause: float | None = Field(default=None, gt=0)
+
+
 class Resample(Strict):
     """Instants `step` [s] apart from the start of every unbroken stretch."""
 
@@ -182,6 +189,7 @@ class Mapping(Strict):
     estimate: Estimate | None = None
     repair: tuple[SerializeAsAny[Repair], ...] = ()
     segment: tuple[Segment, ...] = ()
+    parts: Parts | None = None
     resample: Resample | None = None
     digest: str
 
@@ -379,6 +387,12 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             file=file,
             path="segment",
         )
+    if mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None:
+        message = "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]"
+        raise DocumentError(message, file=file, path="parts")
+    if mapping.parts is not None and mapping.segment:
+        message = "both [parts] and segments say where runs begin: remove one of them"
+        raise DocumentError(message, file=file, path="parts")
     for index, repair in enumerate(mapping.repair):
         if isinstance(repair, WrapInterpolation) and mapping.resamples:
             message = "cannot see false samples after resampling: import without step, file and latency"

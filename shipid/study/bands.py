@@ -99,8 +99,8 @@ def coverage_frame(results: Results) -> pd.DataFrame:
             low, high = share_interval(mean, results.test.run)
             width, end = np.mean(sizes[level, model, family, N_D], axis=0)
             names = {"model": model, "family": family, "N_D": N_D, "level": level}
-            found = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
-            rows.append({**found, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
+            entry = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
+            rows.append({**entry, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
     return pd.DataFrame(rows, columns=columns)
 

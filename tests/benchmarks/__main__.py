@@ -54,6 +54,7 @@ def main() -> int:
     parser.add_argument("--record", action="store_true", help="accept the ratios measured now")
     parser.add_argument("--replicates", type=int, default=200, help="of the groups coverage, bands and verdicts")
     parser.add_argument("--logs", type=int, default=400, help="of the group guess")
+    parser.add_argument("--folders", type=int, default=0, help="raw folders of the group guess")
     asked = parser.parse_args()
     unknown = [name for name in asked.groups if name not in GROUPS]
     if unknown:
@@ -63,7 +64,7 @@ def main() -> int:
         "coverage": {"replicates": asked.replicates},
         "bands": {"replicates": asked.replicates},
         "verdicts": {"tables": asked.replicates},
-        "guess": {"logs": asked.logs},
+        "guess": {"logs": asked.logs, "folders": asked.folders},
     }
     figures = {name: measure(name, **options.get(name, {})) for name in asked.groups or THREADS}
     again = {ratio.group for ratio in compare(figures, recorded) if ratio.regressed and not asked.record}

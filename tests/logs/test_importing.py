@@ -272,3 +272,30 @@ def test_wind_felt_on_board_becomes_the_wind_over_ground(
     frame = import_log(read_mapping(plain_mapping(columns)), log).frame
     np.testing.assert_allclose(frame["V_w"], speed, atol=1e-6)
     np.testing.assert_allclose(np.exp(1j * frame["beta_w"]), np.exp(1j * towards), atol=1e-6)
+
+
+def test_files_are_parted_by_a_column_and_by_pauses(plain_mapping: Write, tmp_path: Path) -> None:
+    first, second, third = (turning(T + start) for start in (0.0, 300.0, 420.0))  # a pause, and none
+    log = as_log(pd.concat([first, second, third]).drop_duplicates("t"), tmp_path / "log.csv")
+    table = pd.read_csv(log)
+    table.assign(run=np.where(table["time"] < 420.0, "a", "b")).to_csv(log, index=False)
+    parted = {
+        "pause = 60.0": ["log 1", "log 2"],
+        'from = "run"': ["log a", "log b"],
+        'from = "run"\npause = 60.0': ["log a", "log a (2)", "log b"],
+    }
+    for keys, names in parted.items():
+        dataset = import_log(read_mapping(plain_mapping(f"\n[parts]\n{keys}\n")), log)
+        assert dataset.runs == names
+        assert len(dataset.frame) == len(table)
+    missing = plain_mapping('\n[parts]\nfrom = "runn"\n')
+    with pytest.raises(DataError, match="did you mean"):
+        import_log(read_mapping(missing), log)
+
+
+def test_an_azimuth_about_360_is_one_about_0(plain_mapping: Write, tmp_path: Path) -> None:
+    log = as_log(turning(T), tmp_path / "log.csv")
+    pd.read_csv(log).assign(azimuth=(np.linspace(-5.0, 40.0, len(T)) % 360).round(3)).to_csv(log, index=False)
+    more = '\n[columns."port.alpha"]\nfrom = "azimuth"\nunit = "deg"\nwrap = true\n'
+    alpha = import_log(read_mapping(plain_mapping(more)), log).frame["port.alpha"]
+    np.testing.assert_allclose(np.degrees(alpha), np.linspace(-5.0, 40.0, len(T)), atol=1e-3)

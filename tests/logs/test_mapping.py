@@ -96,6 +96,8 @@ def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
         ('[repair]\nkind = "scale"\n', None, "repair", r"write \[\[repair\]\]"),
         ('[[segment]]\nrun = "a"\nstart = 5.0\nend = 2.0\n', None, "segment.0", "must lie before"),
         ('[[segment]]\nrun = "a"\nstart = 1.0\nend = 2.0\n' * 2, None, "segment.1", "a run 'a' exists"),
+        ("[parts]\n", None, "parts", "says nothing"),
+        ('[parts]\npause = 9.0\n[[segment]]\nrun = "a"\nstart = 1.0\nend = 2.0\n', None, "parts", "remove one of them"),
     ],
 )
 def test_a_contradiction_is_refused_with_its_key(

@@ -10,19 +10,20 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows
-from shipid.logs.guess.words import fits, is_order
-from shipid.logs.mapping import UNITS
+from shipid.logs.guess.words import fits, is_order, parts_of, units_in
+from shipid.logs.mapping import INPUTS, UNITS
+from shipid.physics.signals import SIGNALS
 
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?",
     "m/s": r"mps|m/s|ms|m/sec|m s-1|ms-1",
     "km/h": r"kmh|km/h|kph",
-    "deg": r"degs?|°|degrees?|grad|deg t|deg true|grader|º",
+    "deg": r"degs?|°|degrees?|grad|deg t|deg true|grader|grados|gradi|graden|degres?|º",
     "rad": r"rads?|radians?",
-    "deg/s": r"(deg|°|grad)/s(ec)?|dps|degs?_?p?e?r?_?s(ec)?",
-    "deg/min": r"(deg|°|grad)/min|dpm|deg_?p?e?r?_?min",
-    "rad/s": r"rad/s(ec)?|rads|rad_?s(ec)?",
-    "rpm": r"rpm|1/min|min-1|u/min|r/min|o/min|rev/min",
+    "deg/s": r"(deg|°|º|grad)/s(ec)?|dps|degs?_?p?e?r?_?s(ec)?",
+    "deg/min": r"(deg|°|º|grad)/min|dpm|deg_?p?e?r?_?min",
+    "rad/s": r"rad/s(ec)?|rads|rad_?p?e?r?_?s(ec)?",
+    "rpm": r"rpm|1/min|min-1|min\^-1|u/min|r/min|o/min|rev/min|tr/min|omw/min|varv/min|giri/min|rev_?p?e?r?_?min",
     "rev/s": r"rps|1/s|rev/s|hz|s-1",
     "m": r"m|metres?|meters?|meter",
     "km": r"km",
@@ -33,6 +34,8 @@ UNIT_WORDS = {
     "%": r"%|percent|pct|prozent",
 }
 """Unit -> regular expression of how logs write it, in lower case."""
+FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma")
+"""Units of quantities that no column of a dataset has, in lower case."""
 
 
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
@@ -84,7 +87,7 @@ def unit_in_name(name: str, si: str) -> str | None:
 
     A unit is in brackets, or it is the last part or the last two parts of a name.
     """
-    inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
+    inside = units_in(name)
     bare = re.sub(r"[\[(].*", "", name).strip()
     parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
     alone = len(parts) < 2 and si != "rev/s"
@@ -100,6 +103,40 @@ def unit_in_name(name: str, si: str) -> str | None:
             ):
                 return unit
     return None
+
+
+def unit_of_another(name: str, meaning: str) -> str | None:
+    """Return the unit in a name where a column of this meaning cannot have it; None if it can, or no unit is there.
+
+    Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end.
+    """
+    si = si_of(meaning)
+    if si not in UNITS or unit_in_name(name, si) is not None:
+        return None
+    last = re.split(r"[_ ]", name.strip())[-1]
+    said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or last.lower() in ("rpm", "rps") else [])
+    for word in said:
+        text = word.strip().lower()
+        known = any(re.fullmatch(expected, text) for expected in UNIT_WORDS.values())
+        if known or (si != "rev/s" and FOREIGN.fullmatch(text)) or word in ("kN", "Nm", "kNm", "N"):
+            return word
+    return None
+
+
+def names_another(name: str, meaning: str) -> bool:
+    """Whether a word of a name, not a mere letter, says a quantity of another unit: a roll is no yaw rate."""
+    scores = fits(name)
+    best = max(scores, key=lambda one: scores[one], default=meaning)
+    word = max((len(part) for part in parts_of(name)), default=0) > 2
+    clear = scores.get(best, 0.0) >= 0.9 and scores.get(meaning, 0.0) < STRONG
+    return (word and clear and si_of(best) != si_of(meaning)) or unit_of_another(name, meaning) is not None
+
+
+def si_of(meaning: str) -> str:
+    """Return the SI unit of a meaning; empty for a quantity of no use."""
+    if meaning in SIGNALS:
+        return SIGNALS[meaning].unit
+    return INPUTS.get(meaning, {"x": "m", "y": "m", "": ""}.get(meaning, "m/s"))
 
 
 def _may_be(scores: dict[str, float], meanings: tuple[str, ...]) -> bool:
@@ -145,6 +182,7 @@ class State:
 
     def _fitting(self, meaning: str, names: list[str]) -> list[str]:
         scores = {name: fits(name).get(meaning, 0.0) for name in names}
+        scores = {name: 0.0 if score and unit_of_another(name, meaning) else score for name, score in scores.items()}
         chosen = [name for name in names if scores[name] > 0 and scores[name] >= max(fits(name).values()) - NEARLY]
         return sorted(chosen, key=lambda name: -scores[name])
 
@@ -156,7 +194,12 @@ class State:
         free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
         if not meanings:
             return [name for name in free if fits(name).get("", 0.0) < STRONG]
-        return [name for name in free if _may_be(fits(name), meanings)]
+        return [name for name in free if _may_be(self._united(name, meanings), meanings)]
+
+    @staticmethod
+    def _united(name: str, meanings: tuple[str, ...]) -> dict[str, float]:
+        """How well a name fits each meaning; as a quantity of no use where its unit fits none of those asked."""
+        return {"": 1.0} if all(unit_of_another(name, meaning) for meaning in meanings) else fits(name)
 
     @property
     def numbered(self) -> bool:

@@ -84,6 +84,8 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     )
     state.taken.update(numbering)
+    if source.parts:
+        _runs(state, source)
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
     outputs = reserve_outputs(state)
@@ -100,6 +102,16 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     defects_of_motion(state)
     left = reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
+
+
+def _runs(state: State, source: Source) -> None:
+    """Report how files of several runs are parted."""
+    column, pause = source.parts.get("from"), source.parts.get("pause")
+    said = [f"column {column!r} says them"] if column else []
+    said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []
+    state.taken.update({column} if column else ())
+    sentence = f"{source.held} runs in {len(source.files)} files: {' and '.join(said)}"
+    state.find("several runs in a file", (column,) if column else (), 0.9, sentence)
 
 
 def _others(state: State) -> None:

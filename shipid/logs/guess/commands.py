@@ -19,6 +19,7 @@ SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
 NEAR = 15.0  # times from that: a unit further off is doubted
 
@@ -34,6 +35,7 @@ def choose_commands(state: State) -> None:
 def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _named(state, [signal for signal in named("command") if steers(signal)])
+    turned = {name for name, signal in angles if _centred(state, name, signal)}
     power = {name: 0.0 if r is None else _power(state, r, name) for name in state.eligible()}
     by_name = bool(angles)
     if not angles and r is not None:
@@ -45,7 +47,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     for name, signal in angles:
         unit = likely_unit(state, name, signal)
         effect = power.get(name, 0.0)
-        extra: dict[str, Any] = {}
+        extra: dict[str, Any] = {"wrap": True} if name in turned else {}
         followed = 0.0
         why = "by its name; it is not seen to turn the ship, so that its sign is not known"
         confidence = 0.5 if by_name else 0.4
@@ -73,6 +75,17 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     return azimuth
 
 
+def _centred(state: State, name: str, signal: str) -> bool:
+    """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
+    values = state.columns[name]
+    turn = 2 * np.pi / to_si(likely_unit(state, name, signal), f"x.{signal}")
+    jumps = np.abs(np.diff(values)) > 0.8 * turn
+    if not jumps.any() or np.ptp(values) > 1.02 * turn:
+        return False
+    state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
+    return True
+
+
 def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
     """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
     orders: dict[str, tuple[float, str]] = {}
@@ -87,7 +100,7 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
         number = next((part for part in reversed(parts_of(name)) if part.isdigit()), None)
         groups.setdefault((side_of(name) or number, orders[name][1]), []).append(name)
     chosen = []
-    sided = any(side is not None for side, _ in groups)
+    sided = any(side is not None and side not in TUNNELS for side, _ in groups)
     for (side, signal), names in groups.items():
         if side is None and sided and is_order(names[0]):
             continue
@@ -119,17 +132,34 @@ def _held(values: Array) -> float:
 
 def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
     for signal in (signal for signal in named("command") if not steers(signal)):
-        for name, _ in _named(state, [signal]):
+        for name, _ in sorted(_named(state, [signal]), key=lambda one: side_of(one[0]) in TUNNELS):
             usual = SIGNALS[signal].component
             fallback = AZIMUTH if azimuth and usual == SCREW else usual
             component = side_of(name) or fallback
             if SIGNALS[signal].shaft:
-                unit, confidence, why, extra = _shaft_unit(state, name)
+                unit, confidence, why, extra = (_tunnel_unit if component in TUNNELS else _shaft_unit)(state, name)
             else:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
             state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+
+
+def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
+    """Return the same as `_shaft_unit` of a screw that does not drive the ship: her way says nothing of its unit."""
+    top = float(np.abs(state.columns[name]).max())
+    why = f"by its name; up to {top:.4g}"
+    written = unit_in_name(name, "rev/s")
+    if written is not None and written != "%":
+        return written, 0.9, why, {}
+    if written == "%":
+        return _shaft_unit(state, name)
+    others = [one.unit for one in state.suggestions if one.name.endswith(".n")]
+    unit = others[0] if others else likely_unit(state, name, "n")
+    state.ask(
+        ("n",), f"in which unit is {name!r}, up to {top:.4g}? The way of the ship does not say: {unit} is a guess"
+    )
+    return unit, 0.4, f"{why}; in {unit} as the other shafts" if others else why, {}
 
 
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
@@ -195,6 +225,9 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     written = unit_in_name(name, row.unit)
     if written is not None and written != "%":
         return written
+    heading = next((one.unit for one in state.suggestions if one.name == "psi"), None)
+    if row.angle and row.role == "motion" and heading == row.read_in:  # a roll of a degree is no roll of a radian
+        return row.read_in
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 

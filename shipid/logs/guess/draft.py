@@ -46,7 +46,7 @@ def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
     if guess.source.pattern is None and guess.file.stat().st_size > LARGE:
         return text + "\n# A large log: find its manoeuvres with `shipid data segment`.\n"
     try:
-        if guess.source.pattern is not None:
+        if guess.source.pattern is not None or guess.source.parts:
             import_log(_read(text), guess.file)
             return text
         segments = segment_log(_read(text), guess.file)
@@ -102,7 +102,7 @@ def _head(guess: Guess) -> Iterator[str]:
     if source.pattern is None:
         yield from _lines({"sha256": sha256_of(guess.file)})
     else:
-        yield f"# {len(source.files)} files, one run each"
+        yield f"# {len(source.files)} files, {'see [parts]' if source.parts else 'one run each'}"
         yield from _lines({"runs": source.pattern})
         if source.skipped:
             yield from (f"# ! {name} is left out: {reason}" for name, reason in source.skipped.items())
@@ -113,6 +113,9 @@ def _head(guess: Guess) -> Iterator[str]:
                 f"{tomlkit.item(run).as_string()} = {tomlkit.item(kind).as_string()}"
                 for run, kind in source.manoeuvres.items()
             )
+    if source.parts:
+        yield f"\n[parts]    # where runs begin: {source.held} runs in {len(source.files)} files"
+        yield from _lines(source.parts)
     yield "\n[format]"
     yield from _lines(guess.sniffed.form)
     yield "\n[clock]"

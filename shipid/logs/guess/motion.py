@@ -10,7 +10,7 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, to_si
@@ -309,7 +309,7 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     ]
     if not state.numbered and (not candidates or (not named and candidates[0][0].left > most)):
         # a name that says something else misleads, if the integral of its column is the heading to within little
-        others = [name for name in state.free() if np.ptp(state.columns[name]) > 0]
+        others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
         candidates = [entry for entry in _rates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED]
     if not candidates or (not named and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():

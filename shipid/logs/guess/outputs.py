@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.logs.guess.clues import STRONG, State, unit_in_name
+from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.commands import unique
-from shipid.logs.guess.unused import wrong_unit
 from shipid.logs.guess.words import fits, is_order, side_of
 from shipid.physics.signals import SIGNALS, is_shaft, named, row_of, signal_of
 
@@ -19,7 +18,7 @@ def reserve_outputs(state: State) -> dict[str, str]:
             scores, unit = fits(name), unit_in_name(name, row.unit)
             rivals = [score for meaning, score in scores.items() if meaning != signal]
             clear = unit not in (None, "%") or max(rivals, default=0.0) < scores[signal]
-            clear = clear and scores[signal] >= STRONG and wrong_unit(name, row.unit) is None
+            clear = clear and scores[signal] >= STRONG and unit_of_another(name, signal) is None
             if clear and not is_order(name) and np.ptp(state.columns[name]) > 0 and name not in chosen:
                 chosen[name] = signal
     state.taken.update(chosen)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import fits, is_order, parts_of
+from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
 from shipid.logs.mapping import to_si
 
 GOOD, POOR = 0.05, 0.2  # misfit of a course and a heading: 1 - agreement
@@ -33,6 +33,8 @@ class Pose:
     """A hypothesis: columns of position and heading, and how course and heading agree.
 
     same, mirrored : mean of exp(i (course - psi)) and of exp(i (course + psi)). cost : misfit, less for fitting names.
+    settled : column of a course over ground that shows the frame; empty where none does. east_sign : -1 where the
+    second axis is to the west.
     """
 
     north: str
@@ -43,6 +45,8 @@ class Pose:
     same: complex
     mirrored: complex
     cost: float
+    settled: str = ""
+    east_sign: int = 1
 
     @property
     def misfit(self) -> float:
@@ -58,6 +62,7 @@ def choose_pose(state: State, file: Path) -> None:
     """
     pairs = list(_named_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name)]
+    headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
     sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
     best = _best(state, pairs, sure or headings)
     if best is None or best.misfit > POOR:
@@ -80,7 +85,35 @@ def choose_pose(state: State, file: Path) -> None:
             f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the "
             f"position and {best.heading!r} the heading?",
         )
-    _take(state, best, sure)
+    _take(state, best if best.on_globe or best.misfit > POOR else _by_course(state, best), sure)
+
+
+def _by_course(state: State, best: Pose) -> Pose:
+    """Return the hypothesis in the frame of a course over ground, which counts clockwise from north by its nature.
+
+    A track in x and y and a yaw angle have a mirror image of the same motion; a logged course has none.
+    """
+    track = state.chosen.change(plane(state, best.north, best.east, on_globe=False))
+    size = float(np.sum(np.abs(track)))
+    middle = (state.chosen.first + state.chosen.last) // 2
+    for name in state.all_called("course"):
+        if name == best.heading or is_order(name) or fits(name).get("psi", 0.0) >= fits(name)["course"]:
+            continue
+        unit = unit_in_name(name, "rad") or best.unit
+        unit = unit if float(np.ptp(state.columns[name])) <= 1.01 * 2 * np.pi / to_si(unit, "psi") else "deg"
+        course, _ = evidence.heal(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
+        turned = np.exp(1j * to_si(unit, "psi") * course[middle])
+        spread = 1.0 - abs(complex(np.mean(turned)))
+        same, mirrored = (complex(np.sum(track * way)) / size for way in (np.conj(turned), turned))
+        if spread < STRAIGHT or abs(mirrored) < 1.0 - POOR or (1.0 - abs(mirrored)) * MIRROR > 1.0 - abs(same):
+            continue  # where it agrees as it is, it may be a course in the same local frame: that settles nothing
+        if abs(np.angle(mirrored * -1j)) < 0.3:  # x is east
+            turn = {"same": 1j * np.conj(best.mirrored), "mirrored": 1j * np.conj(best.same)}
+            return replace(best, north=best.east, east=best.north, settled=name, **turn)
+        if abs(np.angle(mirrored)) < 0.3:  # y is west
+            turn = {"same": np.conj(best.mirrored), "mirrored": np.conj(best.same)}
+            return replace(best, east_sign=-1, settled=name, **turn)
+    return best
 
 
 def _named_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
@@ -230,7 +263,7 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     )
     swap = False
     if mirrored and quarter in (1, -1):
-        swap = not best.on_globe and (compass or not clear) and quarter == 1
+        swap = not best.on_globe and (compass or not clear) and quarter == 1 and not best.settled
         if swap and clear:
             sentence = f"course and heading agree only with {north!r} as east and {east!r} as north"
             state.find("north and east swapped", (north, east), abs(best.mirrored), sentence)
@@ -256,8 +289,14 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
     names = ("latitude", "longitude") if best.on_globe else ("north", "east")
     why = f"course over ground keeps to the heading (agreement {agreement:.3f} of 1)"
-    for name, source in zip(names, (north, east), strict=True):
-        state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why)
+    for name, source, way in zip(names, (north, east), (1, best.east_sign), strict=True):
+        more = {"sign": -1} if way < 0 else {}
+        state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why, **more)
+    if best.settled and (best.east_sign < 0 or sign < 0):
+        sentence = (
+            f"{best.settled!r} counts clockwise from north, and agrees with the track only with {north!r} as north"
+        )
+        state.find("frame by the course", (north, east), 0.9, sentence)
     if false.any():
         across = "360" if unit == "deg" else "2 pi"
         sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
@@ -269,7 +308,8 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     if heading not in sure and not state.numbered:
         confidence = min(confidence, 0.5)
     state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
-    state.position = plane(state, north, east, best.on_globe)
+    place = plane(state, north, east, best.on_globe)
+    state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
 
@@ -283,11 +323,11 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
     """Ask for what neither names nor motion decide: the frame, its mirror image, whether a heading is a course."""
     if course:
         state.ask(("psi",), f"is {best.heading!r} the heading, or the course over ground? By its name it may be either")
-    if not best.on_globe and not clear and (state.numbered or not compass):
+    if not best.on_globe and not clear and not best.settled:
         state.ask(
             ("psi", "north", "east"),
-            f"is {best.north!r} north and does {best.heading!r} count to starboard, or is {best.north!r} east and does "
-            "it count to port? Motion is the same in both; port and starboard change places",
+            f"is {best.north!r} north and does {best.heading!r} count to starboard, or does it count to port, with z "
+            f"upwards, or with {best.north!r} east? Motion is the same in both; port and starboard change places",
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
     unnamed = not compass and not set(parts_of(best.heading)) & YAW

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.guess.words import parts_of
+from shipid.logs.guess.words import is_run, parts_of
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.readers import (
     LONGEST_LINE,
@@ -283,6 +283,8 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
             column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")
         values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
         values[np.isinf(values)] = np.nan
+        if np.isnan(values).any() and is_run(name):  # names of runs, as numbers
+            values = pd.factorize(table.iloc[:, index].ffill().bfill())[0].astype(np.float64)
         if np.isnan(values).all() and table.iloc[:, index].dropna().astype(str).str.strip().ne("").any():
             words.append(name)
         elif name and name not in columns:

@@ -8,16 +8,19 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from shipid.errors import DataError, ShipidError
-from shipid.logs.guess.sniff import Sniffed, sniff
+from shipid.logs.guess.sniff import SAMPLE, Sniffed, sniff
+from shipid.logs.guess.words import is_run
 from shipid.logs.importing import run_of
 from shipid.logs.kinds import declared_kind
 
 ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".parquet", ".mat", ".nmea")
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
+STOPPED, FEWEST, HELD = 20.0, 10.0, 10  # usual steps, and s, of a pause between two runs; rows of a run
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class Source:
 
     path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
     skipped : files that are left out, with the reason. manoeuvres : run -> kind, as its name says.
+    parts : keys of [parts] where a file holds several runs; empty else. held : runs that this gives.
     sniffed : all rows, as of one log.
     """
 
@@ -34,6 +38,8 @@ class Source:
     files: dict[str, Path]
     skipped: dict[str, str]
     manoeuvres: dict[str, str]
+    parts: dict[str, Any]
+    held: int
     sniffed: Sniffed
 
 
@@ -46,7 +52,9 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
     """
     folder, pattern = _pattern(path)
     if pattern is None:
-        return Source(path, None, {path.stem: path}, {}, {}, sniff(path, names))
+        log = sniff(path, names)
+        parts, held = _parts({path: log}, by_pause=False)
+        return Source(path, None, {path.stem: path}, {}, {}, parts, held, log)
     files = sorted(file for file in folder.glob(pattern) if file.is_file())
     if not files:
         raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
@@ -64,7 +72,45 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
     kept = _alike(sniffed, folder, skipped)
     runs = {run_of(file, folder, pattern): file for file in kept}
     kinds = {run: kind for run, file in runs.items() if (kind := declared_kind(file.stem))}
-    return Source(folder, pattern, runs, skipped, kinds, _joined(list(kept.values())))
+    parts, held = _parts(kept, by_pause=True)
+    return Source(folder, pattern, runs, skipped, kinds, parts, held, _joined(list(kept.values())))
+
+
+def _parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any], int]:
+    """Return the keys of [parts] for files of several runs, and the number of runs; nothing, 0 where each holds one.
+
+    A column that says the run is taken if its values are held; pauses of the clock that are long beside all other
+    steps part the runs, too.
+    """
+    first = next(iter(logs.values()))
+    told = [name for name in first.columns if is_run(name) and all(_is_held(name, log) for log in logs.values())]
+    column = next((name for name in told if any(np.ptp(log.columns[name]) > 0 for log in logs.values())), None)
+    steps = [np.diff(log.t) for file, log in logs.items() if file.stat().st_size <= SAMPLE] if by_pause else []
+    usual = float(np.median(np.concatenate(steps))) if steps else 0.0
+    long = max(STOPPED * usual, FEWEST)
+    pauses = np.concatenate([part[part > long] for part in steps]) if steps else np.empty(0)
+    keys: dict[str, Any] = {"from": column} if column is not None else {}
+    if len(pauses):
+        rest = max((float(part[part <= long].max()) for part in steps if np.any(part <= long)), default=usual)
+        keys["pause"] = float(f"{np.sqrt(rest * float(pauses.min())):.2g}") if rest > 0 else long
+        keys["pause"] = max(keys["pause"], float(f"{rest:.2g}") + usual)
+    if not keys:
+        return {}, 0
+    return keys, sum(_count(log, column, keys.get("pause", np.inf)) for log in logs.values())
+
+
+def _is_held(name: str, log: Sniffed) -> bool:
+    """Whether a column has whole values, each in a long stretch of rows."""
+    values = log.columns.get(name)
+    if values is None or not np.isfinite(values).all() or np.any(values % 1):
+        return False
+    stretches = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(values) != 0, [True]])))
+    return bool(np.median(stretches) >= HELD)
+
+
+def _count(log: Sniffed, column: str | None, pause: float) -> int:
+    new = np.diff(log.t) > pause
+    return 1 + int(np.sum(new | (np.diff(log.columns[column]) != 0) if column is not None else new))
 
 
 def _pattern(path: Path) -> tuple[Path, str | None]:

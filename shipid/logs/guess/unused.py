@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
-from shipid.logs.guess.clues import UNIT_WORDS, State, unit_in_name
+from shipid.logs.guess.clues import State, unit_of_another
 from shipid.logs.guess.words import fits, is_order
-from shipid.logs.mapping import INPUTS, UNITS
+from shipid.logs.mapping import INPUTS
 from shipid.physics.signals import SIGNALS
 
 ALIKE = (
@@ -35,7 +33,7 @@ def _reason(state: State, name: str, numbers: bool) -> str:
     meaning = meanings[0]
     if not meaning or meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:
         return "it is a quantity that a dataset does not take"
-    if (unit := wrong_unit(name, _unit(meaning))) is not None:
+    if (unit := unit_of_another(name, meaning)) is not None:
         return f"its unit {unit} does not fit {_word(meaning)}"
     group = next((alike for alike in ALIKE if meaning in alike), {meaning})
     better = [one.source for one in state.suggestions if one.name.rsplit(".", 1)[-1] in group]
@@ -51,20 +49,3 @@ def _word(meaning: str) -> str:
     return {"x": "the position", "y": "the position"}.get(meaning) or (
         SIGNALS[meaning].word if meaning in SIGNALS else meaning.replace("_", " ")
     )
-
-
-def _unit(meaning: str) -> str:
-    if meaning in SIGNALS:
-        return SIGNALS[meaning].unit
-    return INPUTS.get(meaning, "m" if meaning in ("x", "y") else "m/s")
-
-
-def wrong_unit(name: str, si: str) -> str | None:
-    """The unit in brackets in a name, where it is known and does not convert to the SI unit."""
-    if si not in UNITS or unit_in_name(name, si) is not None:
-        return None
-    inside = re.findall(r"[\[(]([^\])]*)[\])]", name)
-    known = (
-        word for word in inside for expected in UNIT_WORDS.values() if re.fullmatch(expected, word.strip().lower())
-    )
-    return next(known, None)

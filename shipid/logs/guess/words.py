@@ -14,105 +14,158 @@ from functools import cache
 from shipid.physics.signals import SIGNALS
 
 PHRASES: dict[str, str] = {
-    "latitude": ("lat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, geogr breite"),
+    "latitude": (
+        "lat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, geogr breite, "
+        "breedtegraad, breedte, geogr bredde, ligne latitude, latitude gps"
+    ),
     "longitude": (
-        "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, geogr laenge"
+        "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, geogr "
+        "laenge, lengtegraad, geogr lengde, longitude gps"
     ),
     "north": (
-        "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, "
-        "nordwert, hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta "
-        "north, dist north"
+        "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, nordwert, "
+        "hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta north, dist north"
     ),
     "east": (
-        "e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
-        "rechtswert, utm e, utm east, utm x, oest, oestlig, este, ye, ned y, ned e, ned east, delta east, "
-        "dist east"
+        "est, e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
+        "rechtswert, utm e, utm east, utm x, oest, oestlig, este, ye, ned y, ned e, ned east, delta east, dist "
+        "east"
     ),
-    "x": "x, pos x, x pos, odom x, x coordinate, enu x, local x",
-    "y": "y, pos y, y pos, odom y, y coordinate, enu y, local y",
+    "x": ("xpos, posx, x, pos x, x pos, odom x, x coordinate, enu x, local x"),
+    "y": ("ypos, posy, y, pos y, y pos, odom y, y coordinate, enu y, local y"),
     "psi": (
-        "psi, heading, hdg, hdt, head, gyro, compass, kompass, kreisel kurs, kreisel, steuer kurs, "
-        "vorauskurs, yaw, yaw angle, yaw pos, yaw 0, gier winkel, gir vinkel, kurs vinkel, baug retning, ship "
-        "heading, gyro heading, compass heading, gyro hdg, kurs, course, eta 3, eta 6, theta z, rumbo, cap, "
-        "styrt kurs, hehdt, bow angle"
+        "magnet kompass, magnetic heading, magnetic compass, psi, heading, hdg, hdt, head, gyro, compass, "
+        "kompass, kreisel kurs, kreisel, steuer kurs, vorauskurs, yaw, yaw angle, yaw pos, yaw 0, gier winkel, "
+        "gir vinkel, kurs vinkel, baug retning, ship heading, gyro heading, compass heading, gyro hdg, kurs, "
+        "course, eta 3, eta 6, theta z, rumbo, cap, styrt kurs, hehdt, bow angle, kurs winkel, rw kurs, rwk, "
+        "kompass kurs, gyro kurs, cap vrai, cap compas, cap gyro, cap navire, cap magnetique, rumbo verdadero, "
+        "rumbo aguja, proa, prua, prora, prua vera, prua bussola, koers, voorliggende koers, kompas koers, gyro "
+        "koers, styret kurs, styrd kurs, kompas kurs, lacet, angle lacet, angulo guinada, guinada, imbardata, "
+        "gier hoek, stevn"
     ),
     "speed": (
-        "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fueg, "
-        "fug, geschwindigkeit, fart, fart over grunn, vtg sog, vg, v g, velocity, groundspeed, vitesse, "
-        "velocidad, uog, speed og, hastighet, gps speed, abs speed, total speed"
+        "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fueg, fug, "
+        "geschwindigkeit, fart, fart over grunn, vtg sog, vg, v g, velocity, groundspeed, vitesse, velocidad, "
+        "uog, speed og, hastighet, gps speed, abs speed, total speed, vitesse fond, vitesse navire, vitesse sol, "
+        "velocidad fondo, velocidad sobre fondo, velocidad buque, vel fondo, velocita, velocita fondo, velocita "
+        "nave, snelheid, snelheid over grond, grond snelheid, vaart over grond, vog, fart over grund, fart over "
+        "bunden, fog, schiffs geschwindigkeit, grund geschwindigkeit, skips fart"
     ),
     "course": (
-        "cog, course, crs, track, course over ground, track angle, kurs ueber grund, kueg, kug, kurs, kurs "
-        "over grunn, chi, vtg cog, course og, tmg, course made good, track made good, ground course, bahn "
-        "winkel"
+        "cog, course, crs, track, course over ground, track angle, kurs ueber grund, kueg, kug, kurs, kurs over "
+        "grunn, chi, vtg cog, course og, tmg, course made good, track made good, ground course, bahn winkel, "
+        "route fond, route, route vraie, route sur fond, rumbo fondo, rumbo sobre fondo, rumbo efectivo, derrota, "
+        "rotta, rotta vera, rotta fondo, grond koers, koers over grond, kog, kurs over grund, kurs over bunden, "
+        "beholden kurs, kurs grund"
     ),
     "u": (
-        "u, surge, surge vel, surge speed, v long, long speed, long vel, speed long, vel x, v x, nu 1, speed "
-        "fwd, fwd speed, forward speed, speed forward, forward vel, ahead speed, speed ahead, laengs "
-        "geschwindigkeit, v laengs, fahrt laengs, jag hastighet, fart langs, x dot, body u, u body, v fwd, "
-        "vel long, long fart, speed x, v surge"
+        "u, surge, surge vel, surge speed, v long, long speed, long vel, speed long, vel x, v x, nu 1, speed fwd, "
+        "fwd speed, forward speed, speed forward, forward vel, ahead speed, speed ahead, laengs geschwindigkeit, "
+        "v laengs, fahrt laengs, jag hastighet, fart langs, x dot, body u, u body, v fwd, vel long, long fart, "
+        "speed x, v surge, vitesse long, vitesse avance, vitesse axiale, vitesse avant, vitesse cavalement, "
+        "cavalement, velocidad long, velocidad avance, velocita long, velocita avanzo, langs snelheid, "
+        "langsscheepse snelheid, langs hastighet, langskips hastighet, langskips fart, laengs hastighet, u vel, "
+        "vel u"
     ),
     "v": (
-        "v, sway, sway vel, sway speed, v trans, trans speed, lat speed, lateral speed, speed trans, speed "
-        "lat, vel y, v y, nu 2, speed stbd, speed starboard, transverse speed, quer geschwindigkeit, v quer, "
-        "fahrt quer, svai hastighet, fart tvers, y dot, body v, v body, v lat, vel lat, v stbd, athwart "
-        "speed, lateral vel, trans vel, tvers fart, drift speed, speed y, v sway"
+        "v, sway, sway vel, sway speed, v trans, trans speed, lat speed, lateral speed, speed trans, speed lat, "
+        "vel y, v y, nu 2, speed stbd, speed starboard, transverse speed, quer geschwindigkeit, v quer, fahrt "
+        "quer, svai hastighet, fart tvers, y dot, body v, v body, v lat, vel lat, v stbd, athwart speed, lateral "
+        "vel, trans vel, tvers fart, drift speed, speed y, v sway, vitesse trans, vitesse embardee, vitesse "
+        "laterale, velocidad trans, velocidad deriva, velocita trans, velocita deriva, velocita scarroccio, dwars "
+        "snelheid, dwarsscheepse snelheid, tverr hastighet, tverrskips hastighet, tverrskips fart, tvaers "
+        "hastighet, tvers hastighet, tverr fart, v vel, vel v"
     ),
     "velocity_north": (
-        "vn, v n, v north, vel north, vel n, north vel, north speed, speed north, geschwindigkeit nord, v "
-        "nord, hastighet nord, x dot, ned vel n, vel x, v x, speed n, enu vel y, nord fart"
+        "vn, v n, v north, vel north, vel n, north vel, north speed, speed north, geschwindigkeit nord, v nord, "
+        "hastighet nord, x dot, ned vel n, vel x, v x, speed n, enu vel y, nord fart, vitesse nord, velocidad "
+        "norte, velocita nord, snelheid noord"
     ),
     "velocity_east": (
         "ve, v e, v east, vel east, vel e, east vel, east speed, speed east, geschwindigkeit ost, v ost, "
-        "hastighet oest, v oest, y dot, ned vel e, vel y, v y, speed e, enu vel x, oest fart"
+        "hastighet oest, v oest, y dot, ned vel e, vel y, v y, speed e, enu vel x, oest fart, vitesse est, "
+        "velocidad este, velocita est, snelheid oost"
     ),
     "r": (
-        "r, rot, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro rate, w z, omega z, psi dot, nu "
-        "6, nu 3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier geschwindigkeit, gier rate, "
-        "giring hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity z, heading rate, hdg "
-        "rate, wende geschwindigkeit, d psi, gir hastighet"
+        "rotasjons hastighet, rotasjons fart, r, rot, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro "
+        "rate, w z, omega z, psi dot, nu 6, nu 3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier "
+        "geschwindigkeit, gier rate, giring hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity "
+        "z, heading rate, hdg rate, wende geschwindigkeit, d psi, gir hastighet, taux giration, vitesse giration, "
+        "vitesse lacet, taux lacet, giration, velocidad giro, velocidad guinada, razon giro, regimen giro, "
+        "velocita accostata, velocita imbardata, velocita virata, rateo accostata, rateo virata, draai snelheid, "
+        "gier snelheid, sving hastighet, dreie hastighet, dreie rate, svinge rate, drei hastighet, girings "
+        "hastighet, dreje hastighed, dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot"
     ),
-    "phi": "phi, roll, roll angle, heel, heel angle, roll winkel, kraengung, rull, krengning, eta 4",
-    "theta": "theta, pitch, pitch angle, trim, trim angle, stampf winkel, trimm, stamp, eta 5",
-    "p": "p, roll rate, nu 4, gyro x, omega x",
-    "q": "q, pitch rate, nu 5, gyro y, omega y",
+    "phi": (
+        "phi, roll, roll angle, heel, heel angle, roll winkel, kraengung, rull, krengning, eta 4, gite, angle "
+        "gite, roulis, angle roulis, escora, angulo escora, balance, sbandamento, angolo sbandamento, rollio, "
+        "slagzij, helling, helling hoek, rol hoek, slingering, krenge vinkel, krengnings vinkel, slag side, rull "
+        "vinkel, krangning, krangnings vinkel, kraengungs winkel, kraengung winkel, schlagseite, quer neigung"
+    ),
+    "theta": (
+        "theta, pitch, pitch angle, trim, trim angle, stampf winkel, trimm, stamp, eta 5, tangage, angle tangage, "
+        "assiette, cabeceo, beccheggio, assetto, angolo beccheggio, stamp hoek, stamp vinkel, trim winkel, nick "
+        "winkel, laengs neigung"
+    ),
+    "p": ("p, roll rate, nu 4, gyro x, omega x"),
+    "q": ("q, pitch rate, nu 5, gyro y, omega y"),
     "V_w": (
         "wind, wind speed, wind spd, wind vel, tws, true wind speed, v w, v wind, wind geschwindigkeit, vind "
         "hastighet, vind fart, wind force, aws, rel wind speed, app wind speed, apparent wind speed, relative "
-        "wind speed"
+        "wind speed, vent, vitesse vent, viento, velocidad viento, vento, velocita vento, wind snelheid, wind "
+        "kracht, vind, vind styrke, vind hastighed, wind staerke"
     ),
     "beta_w": (
         "wind direction, wind dir, wind angle, twd, twa, true wind direction, beta w, gamma w, wind richtung, "
-        "vind retning, wind from, awa, rel wind angle, app wind angle, apparent wind angle, relative wind "
-        "angle, rel wind dir, relative wind direction, wind winkel"
+        "vind retning, wind from, awa, rel wind angle, app wind angle, apparent wind angle, relative wind angle, "
+        "rel wind dir, relative wind direction, wind winkel, direction vent, dir vent, angle vent, direccion "
+        "viento, dir viento, angulo viento, direzione vento, dir vento, angolo vento, wind richting, wind hoek, "
+        "vind riktning, vind vinkel"
     ),
     "delta": (
         "delta, rudder, rudder angle, rudder position, rudder pos, rsa, rud, rud ang, rud angle, helm, helm "
         "angle, ruder, ruder winkel, ruder lage, ror, ror vinkel, delta r, dr, d r, rudder ang, timon, flap "
-        "angle, steering angle"
+        "angle, steering angle, barre, angle barre, position barre, gouvernail, angle gouvernail, safran, angle "
+        "safran, angulo timon, pala, angulo pala, timone, angolo timone, barra, angolo barra, roer, roer hoek, "
+        "roer stand, ror utslag, ror stilling, roder, roder vinkel, ruder ausschlag, ruder stellung, ruder stand, "
+        "steering gear angle"
     ),
     "alpha": (
-        "alpha, azimuth, azi, azimuth angle, azi angle, azi ang, azipod, azipod angle, pod angle, pod, "
-        "thruster angle, thruster azimuth, azimut, azimut winkel, gondel winkel, schottel winkel, asimut, "
-        "asimut vinkel, alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, "
-        "azi dir"
+        "alpha, azimuth, azi, azimuth angle, azi angle, azi ang, azipod, azipod angle, pod angle, pod, thruster "
+        "angle, thruster azimuth, azimut, azimut winkel, gondel winkel, schottel winkel, asimut, asimut vinkel, "
+        "alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, azi dir, angle "
+        "azimut, angle propulseur, angulo azimut, angolo azimut, ruderpropeller winkel, azimut hoek, azimuth "
+        "hoek, azimuth winkel"
     ),
     "n": (
-        "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine "
-        "rpm, me rpm, main engine rpm, engine speed, main engine speed, revs, rev, prop revs, propeller revs, "
-        "dreh zahl, propeller dreh zahl, wellen dreh zahl, motor dreh zahl, tur tall, propell tur tall, aksel "
-        "tur tall, rps, n p, n prop, thruster rpm, thruster speed, pod rpm, revolutions, shaft revolutions, n "
-        "shaft, motor speed, motor rpm, n engine, propeller, prop, engine, azi rpm, azimuth rpm, umdrehungen, "
-        "revoluciones, turns"
+        "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine rpm, "
+        "me rpm, main engine rpm, engine speed, main engine speed, revs, rev, prop revs, propeller revs, dreh "
+        "zahl, propeller dreh zahl, wellen dreh zahl, motor dreh zahl, tur tall, propell tur tall, aksel tur "
+        "tall, rps, n p, n prop, thruster rpm, thruster speed, thruster dreh zahl, thruster tur tall, thruster "
+        "toeren tal, thruster giri, thruster regime, thruster vitesse, thruster revs, thruster n, pod rpm, "
+        "revolutions, shaft revolutions, n shaft, motor speed, motor rpm, n engine, propeller, prop, engine, azi "
+        "rpm, azimuth rpm, umdrehungen, revoluciones, turns, vitesse arbre, vitesse helice, vitesse rotation, "
+        "vitesse rotation helice, regime, regime arbre, regime helice, regime moteur, tours helice, tours arbre, "
+        "tours minute, tours, helice, arbre helice, rpm eje, rpm helice, velocidad eje, velocidad helice, "
+        "revoluciones eje, revoluciones helice, revoluciones motor, vueltas, giri, giri elica, giri asse, giri "
+        "motore, velocita asse, velocita elica, elica, toeren tal, toeren, schroef toeren tal, as toeren tal, "
+        "schroef toeren, schroef, propell omdreininger, omdreininger, omdreinings tall, motor tur tall, "
+        "omdrejninger, omdrejnings tal, propel omdrejninger, varv tal, propeller varv tal, axel varv tal, "
+        "schrauben dreh zahl, schrauben welle, welle, wellen rpm, propell rpm, aksel rpm, shaft revs, shaft rev"
     ),
-    "pitch": "cpp, cpp pitch, prop pitch, propeller pitch, pitch ratio, p d",
+    "pitch": (
+        "cpp, cpp pitch, prop pitch, propeller pitch, pitch ratio, p d, pas helice, propeller steigung, steigung, "
+        "propell stigning, stigning, schroef spoed, spoed, paso helice, passo elica"
+    ),
     "thrust": (
-        "thrust, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller schub, wellen schub, "
-        "skyvekraft, poussee, empuje, thrust force"
+        "thrust, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller schub, wellen "
+        "schub, schub kraft, skyvekraft, skyve kraft, poussee, poussee helice, empuje, empuje helice, spinta, "
+        "spinta elica, stuw kracht, thrust force"
     ),
     "torque": (
-        "torque, q, q prop, shaft torque, propeller torque, prop torque, dreh moment, drehmoment, wellen drehmoment, "
-        "dreiemoment, akselmoment, couple, par motor, moment shaft"
+        "torque, q, q prop, shaft torque, propeller torque, prop torque, dreh moment, drehmoment, wellen "
+        "drehmoment, wellen moment, dreiemoment, dreie moment, akselmoment, vrid moment, couple, couple arbre, "
+        "couple helice, par motor, par eje, par helice, coppia, koppel, moment shaft"
     ),
     "normal_force": (
         "rudder force, rudder normal force, normal force, f n, fn, ruder normalkraft, ruder kraft, rorkraft"
@@ -120,64 +173,142 @@ PHRASES: dict[str, str] = {
 }
 """Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
 OTHERS = (
-    "stw, log speed, speed log, doppler log, speed through water, water speed, v log, vbw, log spd, fahrt "
-    "durchs wasser, fdw, fart gjennom vann, power, shaft power, leistung, effekt, moment, engine torque, fuel, "
-    "fuel rate, fuel flow, depth, water depth, wasser tiefe, dybde, draft, "
-    "draught, draft fwd, draft aft, draught aft, draught fwd, tiefgang, tauchung, temp, temperature, air "
-    "temp, temperatur, water temp, hdop, pdop, vdop, num sat, nsat, sats, satellites, heave, hiv, acc, acc x, "
-    "acc y, acc z, acceleration, a x, a y, a z, pressure, humidity, voltage, current, set, drift, load, wave, "
-    "wave height, height, altitude, alt, age, quality, status, mode, alarm, xte, cross track error, dist, "
-    "distance, waypoint, index, row, count, id, no, nr, bow thruster, tunnel thruster, roll acc, pitch acc, x "
-    "force, y force, variation, deviation, magnetic variation, geoid, force, mass, current speed, current "
-    "direction, z, depth m"
+    "battery voltage, sat, ukc, under keel clearance, wave probe, wave gauge, vitesse surface, vitesse eau, "
+    "vitesse loch, loch, velocidad corredera, corredera, velocidad superficie, velocita acqua, solcometro, log "
+    "snelheid, snelheid door water, vaart door water, fart gennem vand, fart genom vatten, fart gjennom vannet, "
+    "logg fart, logg, fahrt durch wasser, log geschwindigkeit, water speed, momento, puissance, potencia, "
+    "potenza, vermogen, wellen leistung, motor leistung, engine load, kw, verbrauch, kraftstoff, consommation, "
+    "carburant, consumo, combustible, carburante, brandstof, drivstoff, forbruk, fuel rack, rack, profondeur, "
+    "profundidad, sonda, profondita, diepte, vann dybde, djup, tiefe, echolot, ekkolodd, sounder, tirant eau, "
+    "tirant, calado, pescaggio, immersione, diep gang, temperatura, temperatuur, temperature eau, bow thruster, "
+    "stern thruster, elica prua, helice proa, bow thruster power, pilonnement, arfada, sussulto, tauch bewegung, "
+    "rudder pump, rudder pumps, steering pump, steering gear pump, ruder pumpe, pompe barre, bomba timon, roer "
+    "pomp, ror pumpe, rudder motor, rudder limit, rudder torque, ruder moment, pump, pumpe, pompe, drift angle, "
+    "drift winkel, derive, marker, mark, event, sample, cpu load, cpu, disk, battery, batterie, bateria, "
+    "lufttrykk, luft druck, pression, sea state, autopilot, stw, log speed, speed log, doppler log, speed through "
+    "water, v log, vbw, log spd, fahrt durchs wasser, fdw, fart gjennom vann, power, shaft power, leistung, "
+    "effekt, moment, fuel, fuel rate, fuel flow, depth, water depth, wasser tiefe, dybde, draft, draught, draft "
+    "fwd, draft aft, draught aft, draught fwd, tiefgang, tauchung, temp, temperature, air temp, temperatur, water "
+    "temp, hdop, pdop, vdop, num sat, nsat, sats, satellites, heave, hiv, acc, acc x, acc y, acc z, acceleration, "
+    "a x, a y, a z, pressure, humidity, voltage, current, set, drift, load, wave, wave height, height, altitude, "
+    "alt, age, quality, status, mode, alarm, xte, cross track error, dist, distance, waypoint, index, row, count, "
+    "id, no, nr, tunnel thruster, roll acc, pitch acc, x force, y force, variation, deviation, magnetic "
+    "variation, geoid, force, mass, current speed, current direction, z, depth m, engine torque"
 )
 """Phrases of columns that no dataset takes."""
 ORDERS = frozenset(
     (
         "befehl c cmd command commanded d demand des desired goal oensket onsket ord order ordered ordre ref "
-        "reference req request set setpoint setpunkt setting soll sp target want wanted"
+        "reference req request set setpoint setpunkt setting soll sp target want wanted vorgabe sollwert consigne "
+        "commande ordonne ordonnee demande demandee orden ordenado ordenada consigna mando comandado comando "
+        "comandato comandata ordine ordinato ordinata setpunt gewenst gewenste bevel satt bestilt kommando kommandert "
+        "kommanderet beordret oenskad boervaerde stellbefehl"
     ).split()
 )
 """Parts that say what is ordered, not what is."""
-WIND_WORDS = {"true": "true tws twd", "apparent": "aws awa app apparent rel relative"}
+WIND_WORDS = {
+    "true": "true tws twd vrai vero verdadero real reale ware wahr wahrer sann",
+    "apparent": "aws awa app apparent rel relative relatif relativo apparente aparente scheinbar scheinbarer "
+    "schijnbare relativ",
+}
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
-        "act actual ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss gpgga "
-        "gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
-        "posicion posisjon position raw rel rtk sensor ship signal sim standort t the true val value vessel "
-        "vtg wert"
+        "act actual apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss "
+        "gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
+        "posicion posisjon position raw rel rtk sensor ship signal sim standort t the true val value vessel vtg wert "
+        "gemessen istwert rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie medido "
+        "medida real efectivo misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware maalt "
+        "virkelig faktisk tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer apparente "
+        "aparente scheinbar scheinbarer schijnbare relativ de du des le la les el del della di van der den het al sul "
+        "sur"
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
-UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knots kt kts knm min mps ms nm pct rad rads rps sec").split())
+UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knm kw nm knots kt kts min mps ms pct rad rads rps sec").split())
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
-    "port": "port|ps|bb|babord|backbord|p|prt|portside|left",
-    "starboard": "starboard|stbd|sb|stb|styrbord|steuerbord|s|stb|strbd|right|star",
+    "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",
+    "starboard": "starboard|stbd|sb|tri|er|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|"
+    "estribor|dritta|dx|stuurboord|rechts|droite",
     "stern": "stern",
     "bow": "bow",
     "fore": "fore|fwd",
     "aft": "aft",
     "main": "main",
 }
+MAGNETIC = frozenset(
+    "mag magnet magnetic magnetisch magnetique magnetico magnetisk compass compas kompass aguja bussola".split()
+)
+"""Parts that say that a heading is that of a magnetic compass."""
+RUN_WORDS = frozenset(
+    (
+        "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
+        "corsa proef proefvaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre "
+        "maniobra manovra manoeuver experiment exp case rec recording sequence leg"
+    ).split()
+)
+"""Parts that say that a column holds the run."""
+RUN_NUMBERS = frozenset(
+    "no nr num number nummer numero numer id name navn naam nom nombre nome code index label".split()
+)
 _LETTERS = {"ψ": "psi", "δ": "delta", "φ": "phi", "ϕ": "phi", "θ": "theta", "χ": "chi", "α": "alpha", "ω": "omega"}
 _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "Ψ": "psi"}
 _LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
 SYNONYMS = {"velocity": "vel", "position": "pos", "pos": "pos", "longitudinal": "long", "transversal": "trans"}
+SYNONYMS |= {"longitudinale": "long", "transversale": "trans", "propulseur": "thruster"}
+SYNONYMS |= {
+    "etrave": "bow",
+    "transv": "trans",
+    "longit": "long",
+    "thr": "thruster",
+    "thrusters": "thruster",
+    "strahler": "thruster",
+    "propulsor": "thruster",
+}
 SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
+WHOLE = dict.fromkeys(
+    (
+        "bt bowthruster bowthr bugstrahler bugstrahlruder querstrahler querstrahlruder boegschroef baugpropell "
+        "baugtruster baugthruster bovpropel bovpropell bogpropeller"
+    ).split(),
+    ("bow", "thruster"),
+)
+WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
+"""Words that are cut into parts of another language."""
+SHAFT_UNITS = frozenset(("rpm", "1/min", "min-1", "u/min", "rps", "1/s", "rev/s", "tr/min"))
+_EDGE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])")
+_AFTER = re.compile(r"(?:\s+/\s*|,\s*)([^\s,]{1,9})\s*$")
 LONGEST_WORD = 80  # letters: a longer one is not cut
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
 def parts_of(name: str) -> tuple[str, ...]:
     """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
-    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", name)
-    text = unicodedata.normalize("NFKD", "".join(_LETTERS.get(letter, letter) for letter in bare))
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
+    text = unicodedata.normalize("NFKD", "".join(_spelt(bare, place) for place in range(len(bare))))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", text)
-    words = [word for word in re.split(r"[^A-Za-z0-9]+", text.lower()) if word]
+    whole = [word for word in re.split(r"[^A-Za-z0-9]+", text) if word]
+    words = [
+        part.lower()
+        for word in whole
+        for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word))
+    ]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
+
+
+def _spelt(text: str, place: int) -> str:
+    """Return a letter of a text without accent, as capitals within capitals: Ü is Ue in Über, UE in FÜG."""
+    letter = text[place]
+    spelt = _LETTERS.get(letter, letter)
+    around = text[max(0, place - 1) : place] + text[place + 1 : place + 2]
+    return spelt.upper() if letter.isupper() and any(other.isupper() for other in around) else spelt
+
+
+def units_in(name: str) -> list[str]:
+    """Return what a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
+    after = _AFTER.search(name)
+    return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
 
 
 def wind_kind(name: str) -> str:
@@ -191,13 +322,15 @@ def wind_kind(name: str) -> str:
 def _vocabulary() -> frozenset[str]:
     phrases = [*PHRASES.values(), OTHERS]
     words = {word for phrase in phrases for word in phrase.replace(",", " ").split()}
-    return frozenset(word for word in words | ORDERS | SOURCES | set(SYNONYMS) if len(word) > 2)
+    return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS | set(SYNONYMS) if len(word) > 2)
 
 
 @cache
 def _cut(word: str) -> tuple[str, ...]:
     """Cut a word that is no known one into known words, such as `ruderwinkel`; return it whole where it cannot be."""
     known = _vocabulary()
+    if word in WHOLE:
+        return WHOLE[word]
     if word in known or not 6 <= len(word) <= LONGEST_WORD:
         return (word,)
     best: dict[int, tuple[str, ...]] = {0: ()}
@@ -222,9 +355,21 @@ def is_order(name: str) -> bool:
     return len(parts) > 1 and bool(ORDERS & set(parts[1:] if len(parts[0]) == 1 else parts))
 
 
+def is_run(name: str) -> bool:
+    """Whether a name says that its column holds the run: `Run`, `test no`, `Versuch`."""
+    parts = set(parts_of(name)) - RUN_NUMBERS
+    return bool(parts) and parts <= RUN_WORDS
+
+
+def is_magnetic(name: str) -> bool:
+    """Whether a name says that a heading is that of a magnetic compass."""
+    return bool(set(parts_of(name)) & MAGNETIC)
+
+
 def side_of(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
-    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", name.lower()))
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))  # 1/s is no starboard
+    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:
             return side
@@ -256,6 +401,10 @@ def fits(name: str) -> dict[str, float]:
     for meaning, row in SIGNALS.items():
         if row.names and meaning not in meanings and not order and re.fullmatch(row.names, "_".join(parts)):
             meanings[meaning] = 0.9
+    if "thruster" in parts and {"bow", "stern"} & set(parts):  # of a tunnel: nothing that moves with the ship
+        if SHAFT_UNITS & {unit.strip().lower() for unit in units_in(name)}:
+            meanings = {"n": 1.0}
+        return {meaning: fit for meaning, fit in meanings.items() if meaning in ("", "n", "pitch")}
     return meanings
 
 

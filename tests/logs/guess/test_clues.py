@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State, names_another, si_of, unit_in_name, unit_of_another
 
 
 @pytest.mark.parametrize(
@@ -77,3 +77,26 @@ def test_findings_are_kept_in_order(state: State) -> None:
         ("clipped", None),
         ("late heading", {"kind": "break"}),
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning", "unit"),
+    [
+        ("VITESSE ARBRE [rpm]", "speed", "rpm"),
+        ("Vitesse [kn]", "speed", None),
+        ("T_prop_kN", "n", "kN"),
+        ("Roll, deg", "r", "deg"),
+        ("speed", "speed", None),
+    ],
+)
+def test_a_unit_excludes_what_it_does_not_fit(name: str, meaning: str, unit: str | None) -> None:
+    assert unit_of_another(name, meaning) == unit
+
+
+@pytest.mark.parametrize(("name", "said"), [("RULL deg", True), ("Torque", True), ("p", False), ("wz", False)])
+def test_a_word_for_another_quantity_is_no_yaw_rate(name: str, said: bool) -> None:
+    assert names_another(name, "r") == said
+
+
+def test_meanings_have_units() -> None:
+    assert [si_of(meaning) for meaning in ("psi", "x", "speed", "velocity_north", "")] == ["rad", "m", "m/s", "m/s", ""]

@@ -106,3 +106,28 @@ def test_small_rudder_angles_do_not_make_a_slow_shaft() -> None:
 def test_a_unit_is_the_one_in_the_name_or_else_the_likely_one() -> None:
     state = state_with_pose({"rudder": RUDDER, "rudder rad": RUDDER, "delta": np.radians(RUDDER)})
     assert [likely_unit(state, name, "delta") for name in state.columns] == ["deg", "rad", "rad"]
+
+
+def test_an_azimuth_that_jumps_at_a_whole_turn_is_one_about_zero() -> None:
+    state = chosen({"azimuth": -RUDDER % 360.0})
+    assert described(state) == {"thruster.alpha": ("azimuth", "deg", 1)}
+    assert state.suggestions[0].extra["wrap"]
+
+
+@pytest.mark.parametrize("name", ["n_bow", "bow thruster speed"])
+def test_the_unit_of_a_tunnel_thruster_is_that_of_the_shafts_and_asked(name: str) -> None:
+    state = chosen({"rudder": RUDDER, name: 13.0 * np.sin(T), "shaft speed": RPM})
+    assert described(state)["bow.n"] == (name, "rpm", 1)
+    assert described(state)["propeller.n"] == ("shaft speed", "rpm", 1)
+    assert [question.about for question in state.questions] == [("n",)]
+
+
+def test_an_ordered_shaft_beside_a_tunnel_thruster_is_read() -> None:
+    state = chosen({"rudder": RUDDER, "shaft rpm order": RPM, "bow thruster [rpm]": 13.0 * np.sin(T)})
+    assert set(described(state)) == {"rudder.delta", "propeller.n", "bow.n"}
+
+
+def test_a_roll_without_a_unit_has_that_of_the_heading() -> None:
+    state = state_with_pose({"roll": 0.5 * np.sin(T)})
+    state.suggest("psi", "heading", "deg", 0.9, "")
+    assert likely_unit(state, "roll", "phi") == "deg"

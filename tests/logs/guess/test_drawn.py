@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 
 from tests.logs.drawn_logs import draw, judge
+from tests.logs.judged_raw import judge_raw
+from tests.strangers_raw import raw_stranger
 
 LEAST = 0.85  # share right of the logs of a range
+RAW, RUNS = {870183: "right", 870176: "reported"}, 4  # raw folders: all that the log can decide; a frame with z upwards
 
 
 @pytest.fixture(
@@ -31,3 +34,9 @@ def test_a_log_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
     files = [sorted(file for file in (tmp_path / name).rglob("*") if file.is_file()) for name in ("a", "b")]
     assert [file.read_bytes() for file in files[0]] == [file.read_bytes() for file in files[1]]
     assert first.asks == second.asks
+
+
+@pytest.mark.parametrize("seed", RAW)
+def test_raw_folders_are_read_or_it_says_why_not(seed: int, tmp_path: Path) -> None:
+    verdict = judge_raw(raw_stranger(seed, tmp_path / "raw", RUNS))
+    assert verdict.word == RAW[seed], verdict.reasons

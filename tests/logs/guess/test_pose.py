@@ -77,6 +77,31 @@ def test_frames_signs_and_zeros(columns: dict[str, np.ndarray], kind: str) -> No
     assert_motion(state)
 
 
+COURSE = np.degrees(np.unwrap(np.angle(np.gradient(NORTH) + 1j * np.gradient(EAST)))) % 360.0
+
+
+@pytest.mark.parametrize(
+    ("columns", "signs"),
+    [
+        ({"x": EAST, "y": NORTH, "yaw": (90.0 - DEG) % 360.0, "cog": COURSE}, {"psi": -1}),
+        ({"x": NORTH, "y": -EAST, "yaw": -DEG % 360.0, "cog": COURSE}, {"psi": -1, "east": -1}),
+        ({"x": NORTH, "y": EAST, "yaw": DEG, "cog": COURSE}, {}),
+    ],
+    ids=["x is east", "z is upwards", "z is downwards"],
+)
+def test_a_course_over_ground_shows_the_frame(columns: dict[str, np.ndarray], signs: dict[str, int]) -> None:
+    state = chosen(columns)
+    assert {one.name: one.extra["sign"] for one in state.suggestions if "sign" in one.extra} == signs
+    assert ("frame by the course" in {finding.kind for finding in state.findings}) == bool(signs)
+    assert bool(state.questions) != bool(signs)
+    assert_motion(state)
+
+
+def test_a_magnetic_heading_beside_another_is_left() -> None:
+    state = chosen({"N": NORTH, "E": EAST, "heading_mag": (DEG + 4.0) % 360.0, "heading": DEG})
+    assert sources(state)["psi"] == "heading"
+
+
 def test_false_samples_across_360_are_counted_and_repaired() -> None:
     slow = np.interp(T, T[::4], DEG[::4])
     state = chosen({"N": NORTH, "E": EAST, "heading": slow})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from shipid.errors import DataError
@@ -58,3 +59,32 @@ def test_a_folder_without_a_log(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("no\n")
     with pytest.raises(DataError, match=r"no file can be read: a\.csv"):
         read_source(tmp_path)
+
+
+@pytest.mark.parametrize("column", [True, False])
+def test_files_of_several_runs_are_parted(column: bool, tmp_path: Path) -> None:
+    for day in ("one", "two"):
+        parts = [LOG.iloc[start : start + 400] for start in (240, 1000, 1800)]
+        runs = [part.assign(**({"Test no": 7 + number} if column else {})) for number, part in enumerate(parts)]
+        folder = tmp_path / "days"
+        folder.mkdir(exist_ok=True)
+        pd.concat(runs).to_csv(folder / f"{day}.csv", index=False)
+    found = guess(folder)
+    assert found.source.held == 6
+    assert found.source.parts.get("from") == ("Test no" if column else None)
+    assert "several runs in a file" in found.kinds
+    dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), folder)
+    assert dataset.runs == [
+        f"{day} {number + 7 * column}" for day in ("one", "two") for number in range(1 - column, 4 - column)
+    ]
+    assert set(dataset.frame.groupby("run", sort=False).size()) == {400}
+
+
+def test_names_of_runs_may_be_words(tmp_path: Path) -> None:
+    parts = [LOG.iloc[start : start + 400].assign(run=name) for start, name in ((240, "ZZ a"), (1200, "TC"))]
+    file = tmp_path / "all.csv"
+    pd.concat(parts).to_csv(file, index=False)
+    found = guess(file)
+    assert found.source.parts == {"from": "run"}
+    dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), file)
+    assert dataset.runs == ["all ZZ a", "all TC"]

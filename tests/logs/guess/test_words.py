@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.logs.guess.words import OTHERS, PHRASES, fits, is_order, parts_of, side_of, wind_kind
+from shipid.logs.guess.words import (
+    OTHERS,
+    PHRASES,
+    fits,
+    is_magnetic,
+    is_order,
+    is_run,
+    parts_of,
+    side_of,
+    units_in,
+    wind_kind,
+)
 from shipid.physics.signals import SIGNALS
 
 
@@ -42,6 +53,26 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
         ("WIND SPD", "V_w"),
         ("water depth", ""),
         ("STW", ""),
+        ("KRÄNGUNG", "phi"),
+        ("FÜG", "speed"),
+        ("FüG", "speed"),
+        ("Kurs über Grund", "course"),
+        ("Fahrt durchs Wasser", ""),
+        ("Vy / m/s", "v"),
+        ("Drehmoment / kNm", "torque"),
+        ("Taux de giration", "r"),
+        ("VITESSE ARBRE [rpm]", "n"),
+        ("BT_speed_[RPM]", "n"),
+        ("Bow thr. [rpm]", "n"),
+        ("Propellturtall satt", "n"),
+        ("Koers over de grond", "course"),
+        ("Toerental schroef", "n"),
+        ("Ángulo de timón", "delta"),
+        ("Velocidad sobre el fondo", "speed"),
+        ("Giri elica", "n"),
+        ("Sbandamento", "phi"),
+        ("Rudder pump 1", ""),
+        ("T_prop", "thrust"),
     ],
 )
 def test_the_best_meaning(name: str, meaning: str) -> None:
@@ -61,7 +92,8 @@ def test_an_order_of_the_rudder_is_a_command() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "side"), [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None)]
+    ("name", "side"),
+    [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None), ("n act[1/s]", None)],
 )
 def test_sides(name: str, side: str | None) -> None:
     assert side_of(name) == side
@@ -88,3 +120,32 @@ def test_a_name_that_says_nothing_fits_nothing() -> None:
 )  # fmt: skip
 def test_the_name_of_a_wind_says_which(name: str, kind: str) -> None:
     assert wind_kind(name) == kind
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Run", True),
+        ("test no", True),
+        ("Versuch Nr.", True),
+        ("essai_nr", True),
+        ("Running hours", False),
+        ("n", False),
+    ],
+)
+def test_a_name_says_that_its_column_is_the_run(name: str, said: bool) -> None:
+    assert is_run(name) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [("Schub / kN", ["kN"]), ("v, m/s", ["m/s"]), ("u [kn]", ["kn"]), ("m/s", []), ("Wind speed", [])],
+)
+def test_units_that_are_set_off(name: str, units: list[str]) -> None:
+    assert units_in(name) == units
+
+
+def test_a_magnetic_heading_is_a_second_one() -> None:
+    assert is_magnetic("heading_mag")
+    assert is_magnetic("CAP COMPAS")
+    assert not is_magnetic("Heading")
