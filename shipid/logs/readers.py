@@ -28,6 +28,7 @@ from shipid.logs.repairs import Strict
 from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
+NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day
 LOOKED_AT = 300  # lines that a guess at the format looks at
 WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
@@ -171,7 +172,7 @@ def _since_midnight(times: pd.Series[Any]) -> Array:
     numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
     since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
     since[np.isnan(numbers[:, 0])] = np.nan
-    return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY), dtype=np.float64)
+    return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -NEXT_DAY), dtype=np.float64)
 
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:

@@ -298,6 +298,13 @@ def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, p
     return "\r\n".join(lines) + "\r\n", motion
 
 
+def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
+    """Trials of three days in one file, each from eight in the morning; a minute back is an error, and stays one."""
+    hours = pd.Series(["08:00:00", "11:30:00", "08:15:00", "16:00:00", "08:05:00", "08:04:00"])
+    times = seconds(hours)
+    np.testing.assert_allclose(np.diff(times) / 3600, [3.5, 20.75, 7.75, 16 + 5 / 60, -1 / 60])
+
+
 @pytest.mark.parametrize(("time", "midnight"), [("fix", 0.0), ("fix", 86400.0 - 30.0), ("line", 0.0)])
 def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
     text, motion = bridge_log(time, midnight, turning(T))
