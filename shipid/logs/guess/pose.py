@@ -331,7 +331,8 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
     unnamed = not compass and not set(parts_of(best.heading)) & YAW
-    if not best.on_globe and clear and mirrored and unnamed:
+    lettered = all(part[:1] in ("x", "y") for name in (best.north, best.east) for part in parts_of(name)[:1])
+    if not best.on_globe and clear and mirrored and (unnamed or (lettered and not compass and not best.settled)):
         state.ask(("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?")
     if undecided and not (compass and (clear or best.on_globe)):
         state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

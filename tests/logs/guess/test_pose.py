@@ -97,6 +97,14 @@ def test_a_course_over_ground_shows_the_frame(columns: dict[str, np.ndarray], si
     assert_motion(state)
 
 
+@pytest.mark.parametrize(("north", "asked"), [("x0_m", True), ("N", False)])
+def test_letters_that_fit_a_frame_of_another_hand_are_asked(north: str, asked: bool) -> None:
+    """x and y with a yaw that counts from x to port: y is to port, or x is east; the motion is the same."""
+    east = "y0_m" if asked else "E"
+    state = chosen({north: NORTH, east: EAST, "yaw_deg": (90.0 - DEG) % 360.0})
+    assert [question.about for question in state.questions] == [("psi", "north", "east")] * asked
+
+
 def test_a_magnetic_heading_beside_another_is_left() -> None:
     state = chosen({"N": NORTH, "E": EAST, "heading_mag": (DEG + 4.0) % 360.0, "heading": DEG})
     assert sources(state)["psi"] == "heading"
