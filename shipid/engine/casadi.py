@@ -104,13 +104,17 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=32)
-def _memory_scan(model: Dynamics) -> ca.Function:
-    """(memory, commands, dt, parameters) -> memory after each of `BLOCK` steps."""
-    memory, order = ca.MX.sym("memory", len(model.memory)), ca.MX.sym("order", len(model.commands))
-    dt, parameters = ca.MX.sym("dt"), ca.MX.sym("parameters", len(model.parameters))
-    still = ca.MX.zeros(len(model.state) + len(model.hidden)), ca.MX.zeros(len(model.environment))
+def _memory_scan(model: Dynamics) -> tuple[ca.Function, tuple[int, ...]]:
+    """(memory, commands, dt, parameters) -> memory after each of `BLOCK` steps, and which parameters it takes.
+
+    All parameters at every step would cost more than the steps.
+    """
+    memory, order = ca.SX.sym("memory", len(model.memory)), ca.SX.sym("order", len(model.commands))
+    dt, parameters = ca.SX.sym("dt"), ca.SX.sym("parameters", len(model.parameters))
+    still = ca.SX(len(model.state) + len(model.hidden), 1), ca.SX(len(model.environment), 1)
     after = model.advance(still[0], memory, order, still[1], parameters, dt)
-    return ca.Function("advance", [memory, order, dt, parameters], [after]).mapaccum(BLOCK)
+    used = tuple(np.flatnonzero(ca.which_depends(after, parameters, 1, False)).tolist())
+    return ca.Function("advance", [memory, order, dt, parameters[list(used)]], [after]).mapaccum(BLOCK), used
 
 
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
@@ -126,8 +130,8 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     count = len(t) - 1
     if count == 0:
         return dict(zip(model.memory, first[:, None], strict=True))
-    scan, parts = _memory_scan(model), []
-    values = np.tile(np.array(list(vessel.parameters.values()))[:, None], (1, BLOCK))
+    (scan, used), parts = _memory_scan(model), list[Array]()
+    values = np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK))
     held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
     reached, dt = first, np.diff(t)
     with uninterrupted():
