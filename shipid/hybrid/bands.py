@@ -277,9 +277,8 @@ def nearest(points: Array, centres: Array) -> Array:
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle  # else large coordinates would cost digits
     which = ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).argmin(axis=0)
-    distances: Array = np.sqrt(
-        ((points - centres[which]) ** 2).mean(axis=1)
-    )  # anew: sums of squares leave half the digits
+    away = points - centres[which]  # anew: sums of squares leave half the digits
+    distances: Array = np.sqrt((away**2).mean(axis=1))
     return distances
 
 

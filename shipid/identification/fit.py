@@ -192,10 +192,11 @@ class _Search:
             if not self._stride():
                 crossings += 1
                 if crossings > CROSSINGS or not self._across():
-                    break
-            if self._minimise(tolerance, most) == "stopped" or self.stops():
-                return "stopped"
-        return "stopped" if self.stops() else "ok"
+                    return "stopped" if self.stops() else word
+            word = self._minimise(tolerance, most)
+            if word == "stopped":
+                return word
+        return "not converged"
 
     def _stride(self) -> bool:
         """Take the Gauss-Newton step from the best point; False where it lowers the objective by less than `LEFT`."""

@@ -152,9 +152,9 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         force -= coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
-    given = _given(terms, available, bound, value_of)
-    summed, mapped = _sum_of_terms(terms, {**available, **given}, states_of, bound, value_of)
-    shown = _shown(terms, {**available, **given}, bound, value_of)
+    available |= _gives(terms, available, bound, value_of, behind=True)
+    summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
+    shown = _gives(terms, available, bound, value_of, behind=False)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
@@ -283,49 +283,30 @@ def _sum_of_terms(
     return total, mapped
 
 
-def _commands_of(path: str, available: Mapping[str, SX]) -> dict[str, SX]:
-    """Commands of one component by signal: the values that its actuators have reached."""
-    component = path.rsplit(".", 1)[-1]
-    return {name: available[f"{component}.{name}"] for name in named("command") if f"{component}.{name}" in available}
-
-
 def _of_component(path: str, term: Term, block: Mapping[str, Any], available: Mapping[str, SX]) -> dict[str, SX]:
-    """Signals of one component: commands, and what the component that it is behind gives."""
-    return _commands_of(path, available) | {name: available[f"{block[BEHIND]}.{name}"] for name in behind(term)}
+    """Signals of one component: commands, as its actuators have reached them, and what one that it is behind gives."""
+    component = path.rsplit(".", 1)[-1]
+    mine = {name: f"{component}.{name}" for name in named("command")}
+    mine |= {name: f"{block[BEHIND]}.{name}" for name in behind(term)}
+    return {name: available[source] for name, source in mine.items() if source in available}
 
 
-def _given(
+def _gives(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
+    *,
+    behind: bool,
 ) -> dict[str, SX]:
-    """Signals from a component to the one behind it, by name: `propeller.wash`."""
-    result = {}
-    for path, key, _ in terms:
-        for name, function in TERMS[key].gives.items():
-            if name in GIVEN:
-                here = {**available, **_commands_of(path, available)}
-                result[f"{path.rsplit('.', 1)[-1]}.{name}"] = _called(
-                    TERMS[key], function, here, _values(bound[path], value_of)
-                )
-    return result
-
-
-def _shown(
-    terms: list[tuple[str, str, Mapping[str, Any]]],
-    available: Mapping[str, SX],
-    bound: Mapping[str, Binding],
-    value_of: Mapping[str, SX],
-) -> dict[str, SX]:
-    """Outputs of all components, by name: `propeller.thrust`."""
+    """What components give, by name: to the one `behind` them (`propeller.wash`), or outputs (`propeller.thrust`)."""
     result = {}
     for path, key, block in terms:
         for name, function in TERMS[key].gives.items():
-            if name not in GIVEN:
+            if (name in GIVEN) == behind:
                 here = {**available, **_of_component(path, TERMS[key], block, available)}
                 value = _called(TERMS[key], function, here, _values(bound[path], value_of))
-                if value is not None:
+                if value is not None:  # an output whose parameters the block lacks
                     result[f"{path.rsplit('.', 1)[-1]}.{name}"] = value
     return result
 
