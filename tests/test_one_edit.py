@@ -297,6 +297,9 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())
     few = instants.select(slice(4))
     expected, given = predictor.predict(few), model(predictor).inputs(few)
+    unknown = Instants({name: values for name, values in few.columns.items() if name != "depth"})
+    with pytest.raises(DataError, match="depth: the method was trained with this input; the data must hold"):
+        predictor.predict(unknown)
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "shallow.casadi")
     for i in range(4):
         path = np.array(ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"])

@@ -61,6 +61,15 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
     return table | {name: np.asarray(columns[name], dtype=float) for name in plain_inputs(columns)}
 
 
+def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
+    """Inputs (S, d) of a fitted method, by name; DataError where the table lacks one that it was trained with."""
+    missing = next((name for name in names if name not in table), None)
+    if missing is not None:
+        remedy = "measure wind (V_w, beta_w)" if missing.endswith("_rw") else "the data must hold what it is made of"
+        raise DataError(f"the method was trained with this input; {remedy}", path=missing)
+    return np.stack([table[name] for name in names], axis=1)
+
+
 OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
 
 
