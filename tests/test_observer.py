@@ -97,6 +97,20 @@ def test_it_never_looks_ahead() -> None:
     assert np.abs(one["observer.u"][25:] - other["observer.u"][25:]).max() > 0.01
 
 
+def test_an_order_and_wind_act_from_their_row_on() -> None:
+    """What is known at a row comes from those in force before it; the new ones move the ship after it."""
+    frame, vessel = calm().data.frame, load_vessel("gunnerus-28.9")
+    run = frame[frame["run"] == "M000"].iloc[:30].reset_index(drop=True)
+    one = observe(vessel, Dataset(run, calm().data.metadata)).columns
+    for change in ({"port.alpha": 0.3}, {"V_w": 5.0}):
+        changed = run.copy()
+        for name, more in change.items():
+            changed.loc[25:, name] += more
+        other = observe(vessel, Dataset(changed, calm().data.metadata)).columns
+        moved = np.any([np.abs(one[name] - other[name]) > 1e-9 for name in one], axis=0)
+        assert np.flatnonzero(moved)[0] == 26, change
+
+
 def test_runs_together_are_runs_alone() -> None:
     vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
     short = frame[(frame["run"] != "M001") | (frame["t"] < 30)]

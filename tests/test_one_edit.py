@@ -251,6 +251,13 @@ def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
     assert check_dataset(Dataset(log, {"clock": "run"})).set_index("check").loc["range depth", "ok"].all()
 
 
+def test_a_truth_takes_the_environment_in_the_unit_of_its_key(depth: Vessel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(signals.SIGNALS, "depth", replace(signals.SIGNALS["depth"], shown="km", factor=1000.0))
+    short = SHALLOWS | {"duration": 2.0}
+    log = simulate(Truth(**short, environment={"depth_km": (0.003, 0.02)}, manoeuvre=[ALIKE]), depth)
+    assert log["depth"].between(3, 20).all(), "metres in the log"
+
+
 def test_a_truth_says_what_its_environment_lacks_or_nobody_takes(depth: Vessel) -> None:
     def check(vessel: Vessel = depth, **environment: Any) -> None:
         check_truth(Truth(**SHALLOWS, environment=environment, manoeuvre=[ALIKE]), vessel)

@@ -440,7 +440,7 @@ def _brought(
     result = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
     index = after.astype(int)
     on_sample = (t == times[index]) | (t == times[index - 1])
-    return np.where((times[index] - times[index - 1] > max_gap) & ~on_sample, np.nan, result)
+    return np.where((times[index] - times[index - 1] > max_gap + clock_slack(times)) & ~on_sample, np.nan, result)
 
 
 def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
@@ -581,6 +581,7 @@ def _true_wind(rows: pd.DataFrame) -> pd.DataFrame:
 def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
     """Fill gaps of at most `max_gap` [s] between known values, remove the other rows, and break the run there."""
     t, flags = rows["t"].to_numpy(), rows["flags"].to_numpy().copy()
+    longest = np.inf if max_gap is None else max_gap + clock_slack(t)  # 0.3 s is three steps of 0.1 s, rounded or not
     removed, records, filled = np.zeros(len(t), dtype=bool), [], {}
     for name in rows.columns.drop(["t", "flags"]):
         values = rows[name].to_numpy()
@@ -592,7 +593,7 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
             raise DataError(message, file=file, path=f"row {int(np.argmax(missing)) + 1}, clock.max_gap")
         before = np.maximum.accumulate(np.where(missing, -np.inf, t))
         after = np.minimum.accumulate(np.where(missing, np.inf, t)[::-1])[::-1]
-        short = missing & (after - before <= max_gap)
+        short = missing & (after - before <= longest)
         held = pd.Series(values).ffill().to_numpy() if is_command(name) else interpolate_at(t, values, missing)
         filled[name] = np.where(short, held, values)
         flags |= np.where(short, 1 << FLAGS.index("interpolated"), 0)
@@ -602,10 +603,10 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
     kept = t[~removed] if removed.any() else t
     if len(kept) < 2:
         raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
-    if max_gap is not None and max_gap < np.median(np.diff(t)):
+    if longest < np.median(np.diff(t)):
         message = f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s"
         raise DataError(message, file=file, path="clock.max_gap")
-    broken = np.append(False, np.diff(kept) > (np.inf if max_gap is None else max_gap))
+    broken = np.append(False, np.diff(kept) > longest)
     if broken.any():
         note = f"gaps longer than {max_gap:g} s"
         records.append({"kind": BREAK, "column": "", "count": int(broken.sum()), "note": note})

@@ -231,6 +231,23 @@ def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_pat
     assert [record["count"] for record in dataset.metadata["repairs"]] == [2, 0, 2]
 
 
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_a_gap_as_long_as_max_gap_is_filled(start: float, plain_mapping: Write, tmp_path: Path) -> None:
+    """However times are rounded: the difference of two that are three steps of 0.1 s apart is 0.3 s."""
+    motion = turning(np.arange(400) / 10)
+    holes = motion.assign(u=motion["u"].where(np.arange(400) % 10 < 8))  # two rows in ten: 0.3 s between known values
+    holes = holes[~np.isin(np.arange(400) % 10, (4, 5))]  # and two rows that are not there
+    holes = holes.assign(t=start + holes["t"])[:-2]
+    mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.3'))
+    dataset = imported(holes, mapping, tmp_path)
+    assert len(dataset.frame) == len(holes)
+    assert len(list(pieces(dataset))) == 1
+    smaller = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.29'))
+    assert len(list(pieces(imported(holes, smaller, tmp_path)))) > 40
+    steady = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.1'))
+    assert len(list(pieces(imported(motion.assign(t=start + motion["t"]), steady, tmp_path)))) == 1
+
+
 def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> None:
     frame = imported(turning(T), plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
     assert np.unique(np.diff(frame["t"])).tolist() == [1.0]

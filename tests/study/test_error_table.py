@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.study.error_table import ALONE, error_table
+from shipid.study.error_table import ALONE, error_table, intervals_frame
+from shipid.study.evidence import TRAINING, WORTH
 from tests.study.byhand import grid
 
 H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
@@ -40,3 +41,21 @@ def test_physics_alone_has_no_noise_of_training(made: Any) -> None:
     trained = table.compare([[(1.0, "bad", 0), (-1.0, "good", 0)]])
     relative = [(interval.high - interval.low)[0] / interval.mean[0] for interval in (alone, trained)]
     assert relative[0] < relative[1]
+
+
+def test_intervals_are_about_the_mean_over_seeds_and_more_seeds_narrow_them(made: Any) -> None:
+    """One seed or four that are alike: what another training would give counts half with four, by its root."""
+    one, four = (
+        intervals_frame(made({(name, 10, seed): H[name][0] for name in H for seed in range(count)}, runs=8))
+        for count in (1, 4)
+    )
+    for frame in (one, four):
+        assert frame["model"].tolist() == list(H)
+        assert (frame["N_D"] == 10).all()
+        middle = (frame["low"] + frame["high"]) / 2
+        np.testing.assert_allclose(middle, [H[name][0] for name in H], rtol=0.05)
+    noise = [TRAINING, TRAINING * np.sqrt(WORTH / (WORTH + 3 * len(H)) / 4)]  # four seeds of each model do not differ
+    hard = np.linspace(0.9, 1.1, 8)
+    expected = np.hypot(hard.std(ddof=1) / np.sqrt(8), noise)
+    widths = [(frame["high"] - frame["low"]).to_numpy() for frame in (one, four)]
+    np.testing.assert_allclose(widths[1] / widths[0], expected[1] / expected[0])

@@ -91,6 +91,18 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
     assert set(table.loc[table["metric"] == "seconds", "unit"]) == {"s"}
 
 
+def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path) -> None:
+    """As where a damaged unit is computed again: else the run counts as ended, with tables that do not hold it."""
+    for name in ("results.parquet", "trials.parquet"):
+        (tmp_path / name).write_bytes(b"tables")
+    seals.write_seal(tmp_path, store.RESULTS, [tmp_path / "results.parquet", tmp_path / "trials.parquet"])
+    batch = Batch(4, 0)
+    unit = Unit(batch, (("right", "drawn"),), batch.key)
+    store.write_unit(tmp_path, unit, [store.Cell({"cell": "right+drawn-4-0"})])
+    assert store.is_finished(tmp_path, unit)
+    assert not seals.is_sealed(tmp_path, store.RESULTS)
+
+
 def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:
     windows, paths, naive = store.read_test(tiny_run)
     store.write_test(tmp_path, windows, paths, naive)
