@@ -11,7 +11,9 @@ from shipid.hybrid.ridge import (
     SOUND,
     _Best,
     _blocks,
+    _chosen_without,
     _decompose,
+    _Errors,
     _FewRows,
     _left_out,
     _LeftOut,
@@ -163,6 +165,16 @@ def test_a_run_has_no_part_in_the_choice_of_what_judges_it():
         others = sum(by_fold) - np.array(by_fold)
         search.consider({}, sum(by_fold), lambda: None, lambda o=others, e=errors: _LeftOut(o, e))
     np.testing.assert_array_equal(search.without(rows)[0, :, 0], [1.0, 1.0, 0.0, 0.0])
+
+
+def test_a_run_has_no_part_in_the_choice_of_the_ridge_that_judges_it():
+    """The first ridge is best for fold 0 and the second for fold 1, so each judges the other fold."""
+    errors = _Errors((4, 2), 2)
+    for ridge in (0, 1):
+        errors.keep(ridge, slice(0, 2), torch.tensor([[0, 1], [2, 3]]), (0, 1), torch.full((2, 2, 4), float(ridge)))
+    left_out = _chosen_without(np.array([[1.0, 5.0], [4.0, 2.0]]), errors, slice(None))
+    np.testing.assert_array_equal(left_out.others, [2.0, 1.0])
+    np.testing.assert_array_equal(left_out.errors[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
 
 def refitted(network, mirror, ridge, columns, paths, folds):

@@ -205,3 +205,13 @@ def test_without_coriolis_the_mass_does_not_turn() -> None:
     full, none = (rates(vessel, u=u, v=v, r=r) for vessel in (ship, still))
     difference = np.array([full[name] - none[name] for name in ("u", "v", "r")])
     np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)
+
+
+def test_a_body_that_moves_steadily_has_no_added_mass_in_heave() -> None:
+    """A body that turns about all axes and keeps its velocity in space: nu_dot = -omega x v in its axes."""
+    rng = np.random.default_rng(0)
+    nu, M_A = rng.normal(size=6), np.diag([0.0, 0.0, 3.0, 0.0, 0.0, 0.0])
+    M_A[2, 4] = M_A[4, 2] = 0.7
+    nu_dot = np.append(-np.cross(nu[3:], nu[:3]), np.zeros(3))
+    force = ca.evalf(module._added_mass_force(ca.SX(M_A), ca.SX(nu), ca.SX.zeros(6), (0, 1, 5)))
+    np.testing.assert_allclose(np.array(force).ravel() - M_A @ nu_dot, 0.0, atol=1e-12)
