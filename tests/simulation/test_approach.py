@@ -56,7 +56,7 @@ def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
     assert caught.value.path == "thruster"
     amidships = {"thruster.port.x": 0.0, "thruster.port.y": 0.0, "thruster.starboard.off": True}
     balanced = SHIP.with_values(amidships | {"added_mass.Y_rdot": 0.0, "added_mass.N_vdot": 0.0})
-    with pytest.raises(DocumentError, match="no command turns R/V Gunnerus"):
+    with pytest.raises(DocumentError, match="no angle command turns R/V Gunnerus"):
         Controls.of(balanced)
 
 
