@@ -363,7 +363,9 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         ]
         lines = [_difference(row, banded) for row in part.to_dict("records")]
         answer.rows("errors", errors, table(heads, lines))
-    answer.say("verdict: lower or higher where that is shown with all rows taken together; empty: the test cannot tell")
+        answer.say(
+            f"verdict: lower or higher where the test shows it, corrected for {len(part)} rows; empty: it does not"
+        )
     if banded:
         answer.say("in band: share of the test paths that lie whole in the bands of the first and of the other run")
     answer.say("\n".join(compared.notes), notes=compared.notes)

@@ -60,6 +60,7 @@ class Rule:
     places: Callable[[Any, Vessel, Any, str], Mapping[str, Any]] | None = None
     note: str = ""
 
+
 WITHOUT = (
     "a family changes numbers only; for a model without the term write a vessel that `extends` this one, with "
     "`off = true` in the block, and name it as `base`"

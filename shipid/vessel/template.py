@@ -193,7 +193,9 @@ def _check(given: Particulars) -> None:
     if given.propulsor not in PROPULSORS:
         raise ShipidError(f"propulsor {given.propulsor!r}: {choices(given.propulsor, PROPULSORS)}")
     if given.propulsor == "differential" and given.units != 2:
-        raise ShipidError("two screws steer by their difference: leave it out, or take another propulsor", path="--shafts")
+        raise ShipidError(
+            "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
+        )
     if given.ship_type not in WIND:
         raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
     for what, value, low, high in _ranges(given):

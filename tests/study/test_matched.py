@@ -134,8 +134,11 @@ def test_cells_without_a_result_do_not_match(made: Made) -> None:
 
 def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     one, other = made(grid(H, (10, 30))), made(grid(H, (5, 7)))
-    with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--pair FIRST=OTHER"):
+    with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--set grid.N_D=\[10,30\]$"):
         compare_results([placed(one, "a"), placed(other, "b")])
+    unlike = made(grid({"x": H["good"], "y": H["bad"], "none": (None, None)}))
+    with pytest.raises(ShipidError, match=r"no cell of .*; name counterparts by --pair FIRST=OTHER$"):
+        compare_results([placed(made(grid(H)), "a"), placed(unlike, "b")])
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
     with pytest.raises(ShipidError, match="named twice"):
@@ -157,6 +160,9 @@ def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     lines = [" ".join(line.split()) for line in shown.output.splitlines()]
     assert "method.drawn.units 8 9" in lines
     assert any(line.startswith("wrong drawn ~ mine 4 2 ") for line in lines)
+    assert any(line.startswith("family method N_D cells") and line.endswith("difference verdict") for line in lines)
+    rows = sum(1 for line in lines if line.startswith(("wrong ", "right ", "none ")))
+    assert f"verdict: lower or higher where the test shows it, corrected for {rows} rows; empty: it does not" in lines
     table = tmp_path / "rows.csv"
     result = CliRunner().invoke(app, ["study", "compare", *folders, "--json", "--out", str(table)])
     document: dict[str, Any] = json.loads(result.stdout)
