@@ -51,7 +51,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     if say is not None:
         say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
     return ReportContent(
-        title=results.plan.study.question,
+        title=results.plan.question,
         name=results.plan.name,
         answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
@@ -152,7 +152,7 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
     frame = methods.compared(methods.joined(cells), plan.judged)
     write_table(folder / METHODS, frame)
     content = MethodsContent(
-        title=plan.study.question,
+        title=plan.question,
         name=plan.name,
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
