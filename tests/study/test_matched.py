@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.errors import DocumentError, ResultError, ShipidError
-from shipid.study.matched import compare, compare_results
+from shipid.study.matched import _remedy, compare, compare_results
 from shipid.study.results import Results
 from tests.study.byhand import grid
 from tests.study.tiny import run_here, tiny_plan
@@ -136,9 +136,8 @@ def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     one, other = made(grid(H, (10, 30))), made(grid(H, (5, 7)))
     with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--set grid.N_D=\[10,30\]$"):
         compare_results([placed(one, "a"), placed(other, "b")])
-    unlike = made(grid({"x": H["good"], "y": H["bad"], "none": (None, None)}))
-    with pytest.raises(ShipidError, match=r"no cell of .*; name counterparts by --pair FIRST=OTHER$"):
-        compare_results([placed(made(grid(H)), "a"), placed(unlike, "b")])
+    assert _remedy(one, one, named=False) == "name counterparts by --pair FIRST=OTHER"
+    assert _remedy(one, other, named=False).startswith("name counterparts by --pair FIRST=OTHER; they have no N_D in")
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
     with pytest.raises(ShipidError, match="named twice"):
