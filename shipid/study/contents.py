@@ -17,6 +17,7 @@ from shipid.report.methods import MethodsContent
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
 from shipid.study.claims import Claims
+from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
 from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
@@ -37,6 +38,7 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "coverage_runs": bands.worst_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
+    "intervals": intervals_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
