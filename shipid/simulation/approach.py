@@ -69,9 +69,10 @@ class Controls:
     def helm(self) -> Mapping[str, float]:
         """Angle command -> sign that turns the ship to starboard."""
         if not self._effects[1]:
-            shafts = "it steers by its shafts: `turning` and `steps` order each one, such as " + self.drives[0] + "_rpm"
-            what = shafts if self.differential else "a manoeuvre needs that of a rudder or an azimuth unit"
-            message = f"no angle command turns {self.vessel.name}: {what}"
+            what = ": a manoeuvre needs that of a rudder or an azimuth unit"
+            if self.differential:
+                what = f", its shafts do: the kinds `turning` and `steps` order each one ({self.drives[0]}_rpm)"
+            message = f"no angle command turns {self.vessel.name}{what}"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._effects[1]
 
