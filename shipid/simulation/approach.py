@@ -85,6 +85,11 @@ class Controls:
     def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float], tuple[float, ...]]:
         vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
+        if not np.isfinite(idle).all():
+            weather = ", ".join(dynamics(vessel).environment)
+            zeros = f" and {weather} 0, as where nobody gives them" if weather else ""
+            message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
+            raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
