@@ -86,8 +86,8 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row |= {"cells": len(mine), "failed": len(mine) - len(good), "reference": reference}
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            own = _by_key(mine)
-            rows.append(row | _interval(own) | _difference(own, theirs))
+            errors = _by_key(mine)
+            rows.append(row | _interval(errors) | _difference(errors, theirs))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
