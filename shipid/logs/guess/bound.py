@@ -39,11 +39,11 @@ def name_commands(state: State, vessel: Vessel) -> None:
         missing = [name for name in wanted if name not in {one.name for one in named}]
         named += [stopped for name in missing for stopped in _missing(state, name, idle, vessel)]
     used = {one.source for one in named}
-    state.suggestions[:] = [
-        *(_renamed(one, components) for one in state.suggestions if not is_command(one.name)),
-        *named,
-        *(one for one in state.suggestions if is_command(one.name) and one.source not in used),
-    ]
+    kept = [one for one in state.suggestions if not is_command(one.name) or one.source not in used]
+    order = [one.source for one in state.suggestions if is_command(one.name)]
+    named.sort(key=lambda one: order.index(one.source) if one.source in order else len(order))
+    state.suggestions[:] = [_renamed(one, components) for one in kept]
+    state.suggestions += named
 
 
 def _pairs(
