@@ -32,6 +32,7 @@ from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import constant_motion, partition, path_of, window_memory
 from shipid.study.results import judged_cells, read_results
+from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
 from tests.strangers_raw import RawStranger, raw_stranger
 from tests.study.tiny import run_here
@@ -136,9 +137,11 @@ def one(seed: int, folder: Path, whole: bool = False) -> dict[str, Any]:
         outcome["failed"] = str(error)
     except Exception as error:  # of the benchmark itself; the others go on
         outcome["failed"] = f"{desk.stage}: {type(error).__name__}: {error}"
-    verdict = judge_raw(ship)
-    for reason in verdict.reasons:
-        (silent if reason.startswith("SILENT") else said).append(reason.partition(": ")[2] or reason)
+    if "draft" in desk.seconds:
+        known = {"frame": FRAMES[ship.style["frame"]]} if (folder / "answered.toml").exists() else {}
+        verdict = judge_raw(ship, vessel=load_vessel(str(folder / "ship.toml")), **known)
+        for reason in verdict.reasons:
+            (silent if reason.startswith("SILENT") else said).append(reason.partition(": ")[2] or reason)
     shown = {"stage": desk.stage, "commands": desk.commands, "seconds": desk.seconds, "questions": desk.questions}
     return outcome | shown | {"said": said, "silent": silent}
 
@@ -243,7 +246,10 @@ def true_dataset(ship: RawStranger, imported: Dataset, tests: Sequence[str]) -> 
 
 
 def _match(ship: RawStranger, rows: pd.DataFrame) -> tuple[str, float, int]:
-    """The true run of an imported one, by yaw rate and speed: its name, s after its begin, and -1 if it is mirrored."""
+    """The true run of an imported one, by yaw rate and speed: its name, s after its begin, and -1 if it is mirrored.
+
+    The heading decides about parts of a step: it is not late.
+    """
     t = (rows["t"] - rows["t"].iloc[0]).to_numpy()
     step = min(TEN, float(ship.known["length"]) / float(np.hypot(rows["u"], rows["v"]).mean()) / 10)
     grid = np.arange(0.0, t[-1], step)
@@ -264,8 +270,11 @@ def _match(ship: RawStranger, rows: pd.DataFrame) -> tuple[str, float, int]:
         for way in (1, -1)
     ]
     name, about, way = min(coarse, key=lambda one: cost(*one))
-    fine = min(about + step * np.linspace(-1, 1, 41), key=lambda shift: cost(name, shift, way))
-    return name, float(fine), way
+    true, psi = runs[name], way * np.interp(grid, t, rows["psi"])
+    heading = np.unwrap(true["psi"])
+    shifts = about + step * np.linspace(-1, 1, 41)
+    off = [float(np.std(np.interp(grid + shift, true["t"], heading) - psi)) for shift in shifts]
+    return name, float(shifts[int(np.argmin(off))]), way
 
 
 def _to_origin(frame: pd.DataFrame, truths: Sequence[pd.DataFrame]) -> None:
