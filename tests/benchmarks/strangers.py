@@ -226,8 +226,12 @@ def true_dataset(ship: RawStranger, imported: Dataset, tests: Sequence[str]) -> 
     frame = frame.drop(columns=[name for name in ("V_w", "beta_w") if name in frame])
     for name in names:
         frame[name] = 0.0
-    matched = {run: _match(ship, frame[frame["run"] == run]) for run in tests}
-    mirrored = float(np.median([way for _, _, way in matched.values()])) < 0
+    order = [run for file in sorted(ship.files, key=lambda one: Path(one.path)) for run in file.runs]
+    same = len(order) == len(imported.runs)  # or the import has cut the files in another way
+    named = dict(zip(imported.runs, order, strict=True)) if same else {}
+    found = {way: [_match(ship, frame[frame["run"] == run], way, named.get(run)) for run in tests] for way in (1, -1)}
+    mirrored = sum(one[2] for one in found[-1]) < sum(one[2] for one in found[1])
+    matched = dict(zip(tests, found[-1 if mirrored else 1], strict=True))
     if mirrored:
         frame[["east", "psi", "v", "r"]] *= -1.0
     truths = []
@@ -245,10 +249,10 @@ def true_dataset(ship: RawStranger, imported: Dataset, tests: Sequence[str]) -> 
     return replace(imported, frame=frame)
 
 
-def _match(ship: RawStranger, rows: pd.DataFrame) -> tuple[str, float, int]:
-    """The true run of an imported one, by yaw rate and speed: its name, s after its begin, and -1 if it is mirrored.
+def _match(ship: RawStranger, rows: pd.DataFrame, way: int, known: str | None) -> tuple[str, float, float]:
+    """The true run of an imported one, mirrored if `way` is -1: its name, s after its begin, and how far off it is.
 
-    The heading decides about parts of a step: it is not late.
+    Yaw rate and speed decide, about parts of a step the heading: it is not late.
     """
     t = (rows["t"] - rows["t"].iloc[0]).to_numpy()
     step = min(TEN, float(ship.known["length"]) / float(np.hypot(rows["u"], rows["v"]).mean()) / 10)
@@ -256,7 +260,7 @@ def _match(ship: RawStranger, rows: pd.DataFrame) -> tuple[str, float, int]:
     r, u = (np.interp(grid, t, rows[name]) for name in ("r", "u"))
     runs = {str(name): true for name, true in ship.record.groupby("run", sort=False)}
 
-    def cost(name: str, shift: float, way: int) -> float:
+    def cost(name: str, shift: float) -> float:
         true = runs[name]
         at = np.clip(grid + shift, 0.0, float(true["t"].iloc[-1]))
         off = np.mean((np.interp(at, true["t"], true["u"]) - u) ** 2) / np.mean(u**2)
@@ -264,17 +268,17 @@ def _match(ship: RawStranger, rows: pd.DataFrame) -> tuple[str, float, int]:
         return float(off + np.mean((turned - way * r) ** 2) / max(np.mean(r**2), 1e-12))
 
     coarse = [
-        (name, shift, way)
+        (name, shift)
         for name, true in runs.items()
+        if known in (None, name)
         for shift in np.arange(-2 * step, max(float(true["t"].iloc[-1]) - t[-1], 0.0) + 3 * step, step)
-        for way in (1, -1)
     ]
-    name, about, way = min(coarse, key=lambda one: cost(*one))
+    name, about = min(coarse, key=lambda one: cost(*one))
     true, psi = runs[name], way * np.interp(grid, t, rows["psi"])
     heading = np.unwrap(true["psi"])
     shifts = about + step * np.linspace(-1, 1, 41)
     off = [float(np.std(np.interp(grid + shift, true["t"], heading) - psi)) for shift in shifts]
-    return name, float(shifts[int(np.argmin(off))]), way
+    return name, float(shifts[int(np.argmin(off))]), cost(name, about)
 
 
 def _to_origin(frame: pd.DataFrame, truths: Sequence[pd.DataFrame]) -> None:
