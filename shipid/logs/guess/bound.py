@@ -25,8 +25,9 @@ def name_commands(state: State, vessel: Vessel) -> None:
 
     Raises DocumentError for a vessel that no command drives or turns.
     """
-    controls = Controls.of(vessel)
-    idle = {name for name in controls.commands if name not in controls.drives and name not in controls.helm}
+    controls = Controls(vessel)
+    helm = () if controls.differential else tuple(controls.helm)
+    idle = {name for name in controls.commands if name not in controls.drives and name not in helm}
     _take_tunnels(state, [name for name in controls.commands if name in idle and is_shaft(name)])
     components: dict[str, str] = {}
     named: list[Suggestion] = []

@@ -61,6 +61,11 @@ def test_an_azimuth_without_a_side_turns_both_units() -> None:
     assert set(names) == {"port.alpha", "starboard.alpha", "port.n", "starboard.n"}
 
 
+def test_a_ship_without_an_angle_takes_its_shafts() -> None:
+    _, names = drafted({"rpm port": RPM, "rpm stbd": RPM}, vessel(propulsor="differential"))
+    assert {"port.n", "starboard.n"} <= set(names)
+
+
 def test_a_tunnel_thruster_that_is_not_logged_is_stopped() -> None:
     state, names = drafted({"rudder": RUDDER, "rpm": RPM}, vessel(tunnel_thruster=True))
     assert set(names) == {"rudder.delta", "propeller.n", "bow.n"}
