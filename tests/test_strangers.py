@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.study.first_look import first_look
 from shipid.vessel.template import Particulars, first_guess
-from tests.benchmarks.strangers import one
+from tests.benchmarks.strangers import Desk, Stopped, true_dataset
 from tests.strangers import Stranger, stranger
+from tests.strangers_raw import RawStranger, raw_stranger
 
 SEED = 104  # a model with another rudder law, of which the template knows nothing
 
@@ -16,6 +21,11 @@ SEED = 104  # a model with another rudder law, of which the template knows nothi
 @pytest.fixture(scope="module")
 def ship() -> Stranger:
     return stranger(SEED, 4)
+
+
+@pytest.fixture(scope="module")
+def raw(tmp_path_factory: pytest.TempPathFactory) -> RawStranger:
+    return raw_stranger(611, tmp_path_factory.mktemp("raw"), 3)
 
 
 def test_a_seed_makes_one_ship(ship: Stranger) -> None:
@@ -42,7 +52,25 @@ def test_its_first_guess_is_judged_by_its_log(ship: Stranger) -> None:
     assert f"{view.constant:.3g} m" in view.sentence
 
 
-@pytest.mark.slow
-def test_a_stranger_is_predicted_without_an_edit() -> None:
-    """From particulars and log to a report by commands; the goal of the campaign, for one ship."""
-    assert one(SEED)["1x"]["passed"]
+@pytest.mark.parametrize("way", [1, -1], ids=["as it is", "mirrored"])
+def test_orders_of_the_truth_are_found_for_an_import(raw: RawStranger, way: int) -> None:
+    """An import of another clock, frame and sensor comes back to the rows of the truth."""
+    frame = raw.dataset.frame
+    ahead, arm = np.exp(1j * frame["psi"]), 0.3 * float(raw.known["length"])
+    place = (frame["north"] + 1j * frame["east"] + arm * ahead).to_numpy()
+    other = frame.assign(north=place.real, east=way * place.imag, psi=way * frame["psi"], r=way * frame["r"])
+    other = other.assign(v=way * (frame["v"] + arm * frame["r"]), t=frame["t"] + 1e6)
+    commands = raw.dataset.commands
+    lost = Dataset(other.drop(columns=commands), raw.dataset.metadata)
+    found = true_dataset(raw, lost, raw.dataset.runs).frame
+    pd.testing.assert_frame_equal(found[commands], frame[commands])
+    moved = ["north", "east", "psi", "v", "r"]
+    np.testing.assert_allclose(found[moved], frame[moved], atol=1e-6 * float(np.abs(place).max()))
+
+
+def test_a_command_that_fails_stops_the_desk(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    with pytest.raises(Stopped, match=r"import: error: .*none\.toml"):
+        desk.type("import", "data", "import", "none.toml", "raw")
+    assert desk.commands == ["data import none.toml raw"]
+    assert desk.stage == ""

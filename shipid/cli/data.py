@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,6 +12,9 @@ from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
+
+if TYPE_CHECKING:
+    from shipid.logs.guess.pose import Frame
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 
@@ -45,14 +48,29 @@ def data_import(
         typer.Option(help="draft a mapping of this log, folder of logs or glob in quotes, instead of importing it"),
     ] = None,
     names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
+    vessel: Annotated[
+        str | None,
+        typer.Option(
+            help="with --guess: vessel whose names the commands take", autocompletion=bundled_or_file("models")
+        ),
+    ] = None,
+    frame: Annotated[
+        Literal["ned", "enu", "zup", "ros"] | None,
+        typer.Option(
+            help="with --guess: ned (x north, y east, heading clockwise), enu (x east, y north, heading clockwise), "
+            "zup (y and heading to port of x), ros (x east, y north, heading counter-clockwise from east)"
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    if guess is None and (vessel or frame):
+        raise ShipidError("is for drafts: give it with --guess LOG", path="--vessel" if vessel else "--frame")
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
         with answering(as_json) as answer:
-            _draft(guess, tuple(filter(None, names.split(","))), out, answer)
+            _draft(guess, tuple(filter(None, names.split(","))), vessel, frame, out, answer)
         return
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
@@ -77,13 +95,16 @@ def data_import(
         answer.say(f"{counts['rows']} rows in {counts['runs']} runs -> {file}", file=file, **counts)
 
 
-def _draft(log: Path, names: tuple[str, ...], out: Path | None, answer: Answer) -> None:
+def _draft(
+    log: Path, names: tuple[str, ...], vessel: str | None, frame: Frame | None, out: Path | None, answer: Answer
+) -> None:
     from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import draft_mapping
     from shipid.schemas import with_schema
+    from shipid.vessel.load import load_vessel
 
-    guessed = guess(log, names)
+    guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
     file = out or Path(f"{guessed.file.resolve().stem}.toml")
     check_new(file, "mapping")
     write_new(with_schema(draft_mapping(guessed), file, "mapping"), file)

@@ -223,7 +223,8 @@ def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> No
     if missing:
         commands = sorted(name for name in columns if "." in name)
         raise DataError(
-            f"{vessel.name} needs this command; the data have {', '.join(commands) or 'no commands'}",
+            f"{vessel.name} needs this command; the data have {', '.join(commands) or 'no commands'}. "
+            f"`shipid data import --guess LOG --vessel VESSEL` drafts a mapping with the names of the vessel",
             file=file,
             path=missing[0],
         )

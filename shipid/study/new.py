@@ -44,7 +44,7 @@ LENGTHS_AHEAD = (
 )
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
-STEPS, LONGEST_STEP = 15, 2.0  # steps ahead at least; s
+STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
 LEAST_SENSE = 0.1  # correlation of an angle with the change of r
 SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
 GROWING = 1.2  # times as far apart after twice the time: less is jitter
@@ -134,8 +134,12 @@ def proposed_horizon(vessel: Vessel, dataset: Dataset) -> tuple[float, float]:
 
 
 def step_of(horizon: float, log_step: float) -> float:
-    """Step of the predictor [s]: a round number, a fifteenth of the horizon at most, but no shorter than the log's."""
-    most = min(horizon / STEPS, LONGEST_STEP)
+    """Step of the predictor [s]: a round number, no shorter than the log's; without a log, 0, orders are constant.
+
+    At most a thirtieth of the horizon, a twelfth of the time in which the ship runs her length: recorded orders change
+    within it.
+    """
+    most = min(horizon / (LOGGED_STEPS if log_step else STEPS), LONGEST_STEP)
     return min(max(_round_down(most), log_step), horizon / 2)
 
 

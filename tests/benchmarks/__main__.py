@@ -55,6 +55,8 @@ def main() -> int:
     parser.add_argument("--replicates", type=int, default=200, help="of the groups coverage, bands and verdicts")
     parser.add_argument("--logs", type=int, default=400, help="of the group guess")
     parser.add_argument("--folders", type=int, default=0, help="raw folders of the group guess")
+    parser.add_argument("--first", type=int, help="seed of the first ship of strangers")
+    parser.add_argument("--whole", action="store_true", help="run the studies of strangers as written, too")
     asked = parser.parse_args()
     unknown = [name for name in asked.groups if name not in GROUPS]
     if unknown:
@@ -65,6 +67,7 @@ def main() -> int:
         "bands": {"replicates": asked.replicates},
         "verdicts": {"tables": asked.replicates},
         "guess": {"logs": asked.logs, "folders": asked.folders},
+        "strangers": {"whole": asked.whole} | ({} if asked.first is None else {"first": asked.first}),
     }
     figures = {name: measure(name, **options.get(name, {})) for name in asked.groups or THREADS}
     again = {ratio.group for ratio in compare(figures, recorded) if ratio.regressed and not asked.record}

@@ -44,6 +44,10 @@ def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "draft -> trial.toml" in text
     assert "positive turns the ship to starboard" in text
     output_of("data", "import", "trial.toml", "trial.csv")
+    named = output_of(
+        *("data", "import", "--guess", "trial.csv", "--vessel", "mariner", "--frame", "ned", "--out", "mariner.toml")
+    )
+    assert "draft -> mariner.toml" in named
     assert "7 segments -> trial-segments.toml" in output_of("data", "segment", "trial.toml", "trial.csv")
     assert "checks passed" in output_of("data", "check", "trial.parquet", "--html", "deep/page.html")
     assert "plotly" in Path("deep/page.html").read_text(encoding="utf-8")
@@ -51,6 +55,7 @@ def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("import", "--guess", "trial.csv"): "not written over",
         ("import", "trial.toml", "--guess", "trial.csv"): "give neither mapping nor repairs",
         ("import",): "draft one with --guess",
+        ("import", "trial.toml", "trial.csv", "--vessel", "mariner"): "is for drafts: give it with --guess",
         ("check", "trial.parquet", "--html", "page.pdf"): "end in .html",
     }.items():
         assert remedy in str(CliRunner().invoke(app, ["data", *arguments]).exception)

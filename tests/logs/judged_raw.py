@@ -21,10 +21,10 @@ FIXED = {"latitude": "lat", "longitude": "lon", "u": "u", "v": "v", "r": "r", "s
 MIRRORED = {"east", "psi", "r", "v"}  # change sign where a frame is taken for its mirror image
 
 
-def judge_raw(stranger: RawStranger) -> Verdict:
-    """Guess, import as drafted, compare every column and the runs with the truth."""
+def judge_raw(stranger: RawStranger, **known: Any) -> Verdict:
+    """Guess with what people know, import as drafted, compare every column and the runs with the truth."""
     try:
-        guessed = guess(stranger.folder)
+        guessed = guess(stranger.folder, **known)
     except ShipidError as error:
         return Verdict("reported", (f"refused: {error.message}",))
     file = stranger.folder.parent / f"{stranger.folder.name}-draft.toml"

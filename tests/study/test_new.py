@@ -113,6 +113,10 @@ def test_step_is_no_finer_than_the_log_and_leaves_two(horizon: float, log_step: 
     assert step >= min(log_step, horizon / 2)
 
 
+def test_recorded_orders_need_finer_steps_than_constant_ones() -> None:
+    assert (step_of(30.0, 0.2), step_of(30.0, 0.0), step_of(300.0, 0.2)) == (1.0, 2.0, 2.0)
+
+
 def test_test_run_is_typical_and_sound() -> None:
     """Neither the slowest nor the fastest, nor the longest, nor one that fails its checks."""
     speeds = {"slow": 1.0, "usual": 4.0, "usual too": 4.1, "longest": 4.05, "faulty": 4.05, "fast": 7.0}

@@ -177,6 +177,12 @@ def test_the_engines_rpm_is_refused(propulsor: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_units_of_another_pitch_are_not_refused() -> None:
+    """Less than a third of the usual thrust at the given shaft speed: of another unit, not the speed of an engine."""
+    given = replace(MARINER, rpm=170, propeller_diameter=3.6, propulsor="azimuth")
+    assert 0.1 < first_guess(given, "m", "m.toml").vessel.parameters["thruster.port.k_T"] < 0.3
+
+
 def test_given_areas_and_type_are_taken() -> None:
     given = replace(MARINER, ship_type="ferry", frontal_area=300.0, lateral_area=1800.0)
     parameters = first_guess(given, "f", "f.toml").vessel.parameters

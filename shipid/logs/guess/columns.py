@@ -16,17 +16,19 @@ import numpy as np
 
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
+from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
 from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
-from shipid.logs.guess.pose import choose_pose
+from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.words import parts_of, wind_kind
 from shipid.physics.signals import named
+from shipid.vessel.load import Vessel
 
 LIKELY = 0.6
 
@@ -65,17 +67,20 @@ class Guess:
         return {finding.kind for finding in self.findings}
 
 
-def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
+def guess(
+    path: str | Path, names: tuple[str, ...] = (), vessel: Vessel | None = None, frame: Frame | None = None
+) -> Guess:
     """Guess the mapping of a log.
 
     Parameters
     ----------
     path : text, Parquet, MATLAB or NMEA 0183; a folder or a glob of such files, one run each.
     names : of the columns of a text log that has no header.
+    vessel : whose names the commands take. frame : of x, y and the heading, where a person knows it.
 
     Raises
     ------
-    DataError : if the log cannot be read, or has no clock, no heading or no position.
+    DataError : if the log cannot be read, has no clock, no heading or no position, or does not move as in that frame.
     """
     source = read_source(Path(path), names)
     sniffed = source.sniffed
@@ -90,7 +95,7 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
     outputs = reserve_outputs(state)
-    choose_pose(state, source.path)
+    choose_pose(state, source.path, frame)
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
         choose_yaw_rate(state, 0.05)
     choose_velocities(state)
@@ -98,6 +103,8 @@ def guess(path: str | Path, names: tuple[str, ...] = ()) -> Guess:
         choose_yaw_rate(state)
     choose_commands(state)
     suggest_outputs(state, outputs)
+    if vessel is not None:
+        name_commands(state, vessel)
     _others(state)
     defects_of_rows(state, sniffed)
     defects_of_motion(state)

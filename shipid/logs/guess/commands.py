@@ -69,8 +69,8 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
                 sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
         component = side_of(name) or SIGNALS[signal].component
-        if not azimuth and signal == "delta" and side_of(name):
-            component = f"rudder_{side_of(name)}" if state.called("n") == [] else str(side_of(name))
+        if signal == "delta" and side_of(name):
+            component = f"{side_of(name)}_rudder"
         state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from pymap3d import geodetic2ned
@@ -27,14 +27,17 @@ TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 SEARCHED = 24  # columns at most, where no name helps
 EARTH = 111_000.0  # m in a degree of latitude
 
+Frame = Literal["ned", "enu", "zup", "ros"]
+"""Where x, y point and from where the heading counts; see `in_frame`."""
+
 
 @dataclass(frozen=True)
 class Pose:
     """A hypothesis: columns of position and heading, and how course and heading agree.
 
     same, mirrored : mean of exp(i (course - psi)) and of exp(i (course + psi)). cost : misfit, less for fitting names.
-    settled : column of a course over ground that shows the frame; empty where none does. east_sign : -1 where the
-    second axis is to the west.
+    settled : what shows the frame, a column of a course over ground or a person; empty where nothing does.
+    east_sign : -1 where the second axis is to the west. counts : sign of the heading that a person gave, else 0.
     """
 
     north: str
@@ -47,6 +50,7 @@ class Pose:
     cost: float
     settled: str = ""
     east_sign: int = 1
+    counts: int = 0
 
     @property
     def misfit(self) -> float:
@@ -54,11 +58,11 @@ class Pose:
         return 1.0 - max(abs(self.same), abs(self.mirrored))
 
 
-def choose_pose(state: State, file: Path) -> None:
-    """Choose position and heading.
+def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
+    """Choose position and heading, in the frame of the log where it is known.
 
     Names that fit are tried first; where they fit badly or are not there, all columns are. Raises DataError if no
-    column can be a position or a heading.
+    column can be a position or a heading, or if the ship does not move as in that frame.
     """
     pairs = list(_named_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name)]
@@ -85,7 +89,34 @@ def choose_pose(state: State, file: Path) -> None:
             f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the "
             f"position and {best.heading!r} the heading?",
         )
-    _take(state, best if best.on_globe or best.misfit > POOR else _by_course(state, best), sure)
+    if frame is not None:
+        best = in_frame(best, frame, file)
+    elif not best.on_globe and best.misfit <= POOR:
+        best = _by_course(state, best)
+    _take(state, best, sure)
+
+
+def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
+    """Return a hypothesis in the frame that a person gives.
+
+    ned : x north, y east, heading clockwise from north. enu : x east, y north, heading clockwise from north.
+    zup : z upwards: y and the heading count to port of x. ros : x east, y north, heading counter-clockwise from east.
+    Raises DataError where positions are on the globe, or where the ship does not move as in that frame.
+    """
+    if best.on_globe:
+        raise DataError("latitude and longitude have no other frame: leave it out", file=file, path="--frame")
+    clockwise, mirror_like = frame in ("ned", "enu"), abs(best.mirrored) > abs(best.same)
+    if mirror_like != (frame == "enu"):
+        others = ["enu"] if mirror_like else [name for name in get_args(Frame) if name != "enu"]
+        words = f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
+        raise DataError(f"{words} {' or '.join(others)}", file=file, path="--frame")
+    given = replace(best, settled=f"--frame {frame}", counts=1 if clockwise else -1)
+    if frame == "ned":
+        return given
+    same, mirrored = np.conj(best.mirrored), np.conj(best.same)
+    if frame == "zup":
+        return replace(given, east_sign=-1, same=same, mirrored=mirrored)
+    return replace(given, north=best.east, east=best.north, same=1j * same, mirrored=1j * mirrored)
 
 
 def _by_course(state: State, best: Pose) -> Pose:
@@ -250,6 +281,8 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     undecided = spread < STRAIGHT or max(misfits) < MIRROR * max(min(misfits), 1e-9)
     if undecided and not mirrored and misfits[1] < misfits[0] and spread >= STRAIGHT:
         mirrored = True
+    if best.counts:
+        mirrored, undecided = best.counts < 0, False
     clear = best.on_globe or all(
         fits(name).get(meaning, 0.0) > 0.9 for name, meaning in ((north, "north"), (east, "east"))
     )
@@ -292,7 +325,7 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     for name, source, way in zip(names, (north, east), (1, best.east_sign), strict=True):
         more = {"sign": -1} if way < 0 else {}
         state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why, **more)
-    if best.settled and (best.east_sign < 0 or sign < 0):
+    if best.settled in state.columns and (best.east_sign < 0 or sign < 0):
         sentence = (
             f"{best.settled!r} counts clockwise from north, and agrees with the track only with {north!r} as north"
         )
@@ -327,12 +360,20 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
         state.ask(
             ("psi", "north", "east"),
             f"is {best.north!r} north and does {best.heading!r} count to starboard, or does it count to port, with z "
-            f"upwards, or with {best.north!r} east? Motion is the same in both; port and starboard change places",
+            f"upwards, or with {best.north!r} east? Motion is the same in both; port and starboard change places: "
+            "answer with --frame ned, enu, zup or ros",
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
     unnamed = not compass and not set(parts_of(best.heading)) & YAW
     lettered = all(part[:1] in ("x", "y") for name in (best.north, best.east) for part in parts_of(name)[:1])
-    if not best.on_globe and clear and mirrored and (unnamed or (lettered and not compass and not best.settled)):
-        state.ask(("psi", "north", "east"), f"are {best.north!r} and {best.east!r} north and east, or the other way?")
+    if (
+        not best.on_globe
+        and clear
+        and mirrored
+        and not best.counts
+        and (unnamed or (lettered and not compass and not best.settled))
+    ):
+        words = f"are {best.north!r} and {best.east!r} north and east, or the other way? Answer with --frame ned or enu"
+        state.ask(("psi", "north", "east"), words)
     if undecided and not (compass and (clear or best.on_globe)):
         state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

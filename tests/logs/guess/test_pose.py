@@ -9,7 +9,7 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.pose import choose_pose, plane
+from shipid.logs.guess.pose import Frame, choose_pose, plane
 from tests.logs.simulated import si_log, state_of
 
 LOG = si_log()
@@ -103,6 +103,29 @@ def test_letters_that_fit_a_frame_of_another_hand_are_asked(north: str, asked: b
     east = "y0_m" if asked else "E"
     state = chosen({north: NORTH, east: EAST, "yaw_deg": (90.0 - DEG) % 360.0})
     assert [question.about for question in state.questions] == [("psi", "north", "east")] * asked
+
+
+@pytest.mark.parametrize(
+    ("frame", "x", "y", "yaw"),
+    [
+        ("ned", NORTH, EAST, DEG),
+        ("enu", EAST, NORTH, DEG),
+        ("zup", NORTH, -EAST, -DEG),
+        ("ros", EAST, NORTH, 90.0 - DEG),
+    ],
+)
+def test_a_frame_that_is_known_is_taken(frame: Frame, x: np.ndarray, y: np.ndarray, yaw: np.ndarray) -> None:
+    state = state_of({"x": x, "y": y, "yaw": yaw % 360.0}, T)
+    choose_pose(state, FILE, frame)
+    assert_motion(state)
+    assert state.questions == []
+
+
+@pytest.mark.parametrize(("frame", "x", "y"), [("enu", "x", "y"), ("ned", "lat", "lon")])
+def test_a_frame_in_which_the_ship_does_not_move_is_refused(frame: Frame, x: str, y: str) -> None:
+    size = 1e5 if x == "lat" else 1.0
+    with pytest.raises(DataError, match=r"--frame: .*(fit ned or zup or ros|no other frame)"):
+        choose_pose(state_of({x: NORTH / size, y: EAST / size, "yaw": DEG}, T), FILE, frame)
 
 
 def test_a_magnetic_heading_beside_another_is_left() -> None:
