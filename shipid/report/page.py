@@ -110,7 +110,7 @@ def page(
             for item in _figures(parts)
             if item.windows and windows
         },
-        sketches=_first_sketch(_figures(parts)),
+        sketches=_first_sketches(_figures(parts)),
         windows=packed(_json(windows)) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
@@ -164,12 +164,11 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:
-    """Sketch of the first figure, by its id; nothing where it has several panels or cannot be sketched."""
+def _first_sketches(figures: Sequence[Figure]) -> dict[str, list[Markup]]:
+    """Sketch of each panel of the first figure, by its id; empty where the page draws it from its windows."""
     for figure in figures[:1]:
         panels = figure.views.get("-".join(str(control.start) for control in figure.controls), ())
-        if len(panels) == 1:
-            return {figure.id: sketch(panels[0].figure, figure.height)}
+        return {figure.id: [sketch(panel.figure, figure.height) for panel in panels]}
     return {}
 
 
