@@ -95,6 +95,8 @@ def page(
     parts = drawn(sections, content, say)
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
+    titles = {"findings": "Findings", "provenance": "Provenance"}
+    titles |= {item.id: item.title for section in parts for item in section.items}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
     template = environment.from_string(_resource("template.html.j2"))
@@ -103,6 +105,7 @@ def page(
         kicker=kicker,
         sections=parts,
         anchors=anchors,
+        titles=titles,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
         views={item.id: packed(_json(_views(item))) for item in _figures(parts)},
         fixed={
@@ -115,7 +118,7 @@ def page(
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=_plotly(),
+        plotly=_plotly() if any(_figures(parts)) else None,
     )
 
 

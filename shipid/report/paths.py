@@ -101,7 +101,8 @@ def snapshots(content: ReportContent) -> Figure | None:
         mine = runs[names[run]]
         instants = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
         windows = [FixedWindow(f"{names[run]}, t = {mine[i].t:g} s", run, i, 0) for i in instants]
-        title, chosen = "Three instants of a test run", "Instants at one, three and five sixths of the run."
+        title = "Instants of a test run"
+        chosen = "Instants at one, three and five sixths of the run." if len(instants) == 3 else ""
         takeaway = _takeaway_row(content, [mine[i] for i in instants], counts * len(instants))
     return Figure(
         id="snapshots",
@@ -332,7 +333,7 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
         means.append(_mean_end_error([window], keys))
     if not np.isfinite(means).any():
         return "No compensated path was recorded for these windows."
-    return f"In this order, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."
+    return f"From panel to panel, the compensated paths end {listed([number(m) for m in means])} m from the true place."
 
 
 def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:

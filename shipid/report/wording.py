@@ -55,8 +55,10 @@ def listed(names: Sequence[str], limit: int = 4) -> str:
 
 
 def bound(text: str) -> str:
-    """Keep a number and its unit, or a symbol and its number, on one line: their spaces do not break."""
-    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm|%)\b)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
+    """Write a sentence as a page sets it: signs, a space before %, and none that breaks before a unit."""
+    text = text.replace("+-", "±")
+    text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
+    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 
 
 def counted(count: int, noun: str) -> str:
