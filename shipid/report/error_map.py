@@ -31,7 +31,7 @@ from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
 from shipid.report.selection import data_driven, left_out, overview, spread, trained
-from shipid.report.wording import counted, metres, number
+from shipid.report.wording import counted, metres, number, shortened
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
 MARGIN = {"l": 52, "r": 12, "t": 12, "b": 44}
@@ -259,7 +259,7 @@ def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
     heights = apart(known.y[shown].tolist(), LINE / high * top, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [
-        {**place, "y": height, "text": label(_shortened(name)), "font": {"size": 11, "color": INK}}
+        {**place, "y": height, "text": label(shortened(name, SHORT)), "font": {"size": 11, "color": INK}}
         for height, name in zip(heights, known.model[shown], strict=True)
     ]
 
@@ -274,15 +274,11 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
     strips = rows[rows.A.isna()]
     only = (strips.family == DATA_DRIVEN).sum() == 1
     named = ["no model" if only and row.family == DATA_DRIVEN else str(row.model) for row in strips.itertuples()]
-    names = [_shortened(name) for name in named]
+    names = [shortened(name, SHORT) for name in named]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
     }
-
-
-def _shortened(name: str) -> str:
-    return name if len(name) <= SHORT else name[: SHORT - 1] + "…"
 
 
 def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[Trace], list[dict[str, Any]]]:

@@ -16,7 +16,7 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, apar
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
-from shipid.report.wording import counted, listed, metres
+from shipid.report.wording import counted, listed, metres, shortened
 
 BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
@@ -193,7 +193,7 @@ def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, An
     notes = []
     for height, (end, place, trace) in zip(heights, ends, strict=True):
         short = trace["name"].removesuffix(", compensated")
-        short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
+        short = shortened(short, LONGEST)
         colour = trace["line"]["color"]
         text = {"text": short, "xanchor": "left", "align": "left", "font": {"size": 11, "color": colour}}
         leader = {"axref": "x", "ayref": "y", "ax": 1.04 * place, "ay": height, "arrowhead": 0, "arrowwidth": 1}

@@ -26,7 +26,7 @@ from shipid.report.figure import (
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
 from shipid.report.selection import data_driven, left_out, overview, trained
-from shipid.report.wording import counted, listed, metres
+from shipid.report.wording import counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
 LONGEST = 28  # characters of a name that fit beside its numbers on a phone
@@ -227,7 +227,7 @@ def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
     numbers = " → ".join(metres(value) for value in (old, new) if np.isfinite(value))
     if not np.isfinite(new):
         numbers += " → no result"
-    short = name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"
+    short = shortened(name, LONGEST)
     return {
         "bgcolor": "var(--page)",
         "x": 0,

@@ -193,10 +193,8 @@ def _marks(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
     if "lines" in trace.mode:
         if trace.line.shape == "hv":
             points = np.column_stack([np.repeat(points[:, 0], 2)[1:], np.repeat(points[:, 1], 2)[:-1]])
-        if np.isfinite(points).all() and len(points) > 2:
-            points = points[thinned(points, 1.0)]
         filled = {"fill": trace.fillcolor} if trace.fill == "toself" else {}
-        yield _path(_joined(points), trace.line.color, trace.line.width, trace.line.dash, **filled, **shade)
+        yield _path(_joined(_thinned(points)), trace.line.color, trace.line.width, trace.line.dash, **filled, **shade)
     if "markers" in trace.mode:
         yield from _points(trace, points[np.isfinite(points).all(axis=1)], shade)
 
@@ -222,6 +220,15 @@ def _points(trace: Any, points: Floats, shade: dict[str, float]) -> Iterable[str
     yield _path(places, colour, size, **cap)
     if symbol.endswith("open"):
         yield _path(places, "var(--page)", size - 2 * (marker.line.width or 1), **cap)
+
+
+def _thinned(points: Floats) -> Floats:
+    """Points (n, 2) without those that no eye misses, piece by piece between what is no number."""
+    known = np.isfinite(points).all(axis=1)
+    result = []
+    for piece in np.split(points, np.flatnonzero(np.diff(known)) + 1):
+        result.append(piece[thinned(piece, 1.0)] if np.isfinite(piece[0]).all() else piece[:1])
+    return np.concatenate(result)
 
 
 def _joined(points: Floats) -> str:

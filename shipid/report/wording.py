@@ -38,6 +38,11 @@ def scientific(value: float, digits: int = 4) -> str:
     return f"{front} × 10{raised.translate(RAISED)}" if raised else text
 
 
+def shortened(name: str, most: int) -> str:
+    """Name of at most so many characters, its middle left out: names that differ mostly do so at an end."""
+    return name if len(name) <= most else f"{name[: most // 2 - 1]}…{name[most // 2 - most :]}"
+
+
 def metres(value: float) -> str:
     """Write a length with its unit."""
     return f"{number(value)} m"

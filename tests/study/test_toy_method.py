@@ -38,7 +38,7 @@ def test_a_new_method_goes_through_a_whole_study(
     # four foundations with `drawn`, two with `toy`, three with `bare`: `alone` does not meet `none`
     assert plan.cells == 4 + 2 + 3
     assert plan.judged == "toy"
-    assert plan.label("right", "toy") == "right + toy"
+    assert plan.label("right", "toy") == "right"
     folder = tmp_path / "run"
     run_here(plan, folder)
     rows = store.read_rows(folder).set_index("cell")
