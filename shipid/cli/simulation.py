@@ -79,7 +79,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)
-    ranges = envelope_table(rows_of_sets, plan.study.published)
+    ranges = envelope_table(rows_of_sets, plan.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
         [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]

@@ -198,7 +198,7 @@ def study_rotate(
     plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.turns(plan, dataset, tests)
-    cells = len(wanted) * len(plan.pairs) * len(set(plan.study.grid.seeds))
+    cells = len(wanted) * len(plan.pairs) * len(plan.seeds)
     import pandas as pd
 
     kept = rotate.kept_folder(file, plan, dataset, device)
@@ -214,7 +214,7 @@ def study_rotate(
         name = plan.label(row["foundation"], row["method"])
         inside = "-" if row["coverage"] != row["coverage"] else f"{row['coverage']:.0%}"
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {plan.study.bands.level:.0%}"
+    band = f"in band of {plan.level:.0%}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
@@ -393,7 +393,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     answer.rows("errors", errors, table(columns, wide.reset_index().to_numpy().tolist()))
     if len(bands):
-        level = worlds[0].plan.study.bands.level
+        level = worlds[0].plan.level
         answer.say(
             f"bands of {level:.0%}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
         )

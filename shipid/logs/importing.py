@@ -204,9 +204,11 @@ def _columns(
     here = {column.source for column in mapping.columns.values() if not column.file}
     here |= {mapping.clock.date} if mapping.clock.date is not None else set()
     here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
-    log = read_table(file, mapping.format, mapping.clock.source, here, progress)
+    drop = mapping.clock.repeated == "drop"
+    whole_rows = drop and mapping.clock.every is not None  # compared in all columns
+    log = read_table(file, mapping.format, mapping.clock.source, () if whole_rows else here, progress)
     records = _passed_over(log)
-    if mapping.clock.repeated == "drop":
+    if drop:
         log, more = _once(log, mapping.clock, mapping.format, file)
         records += more
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
@@ -261,11 +263,11 @@ def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path)
         column = column.astype("int64")
     texts = column.astype(str).str.strip().to_numpy(dtype=object)
     new |= np.append(True, texts[1:] != texts[:-1])
-    found: Begins = []
+    begins: Begins = []
     for row in np.flatnonzero(new):
-        same = sum(name.rpartition(" (")[0] == texts[row] or name == texts[row] for _, name in found)
-        found.append((float(t[row]), f"{texts[row]} ({same + 1})" if same else str(texts[row])))
-    return found
+        same = sum(name.rpartition(" (")[0] == texts[row] or name == texts[row] for _, name in begins)
+        begins.append((float(t[row]), f"{texts[row]} ({same + 1})" if same else str(texts[row])))
+    return begins
 
 
 def _passed_over(table: pd.DataFrame) -> Records:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +46,7 @@ WIDE, ASIDE, BACK = (
     0.11,
 )  # of the oblique bars: half a width; how far aside and up (of the highest) an N_D is
 SHADE = "rgba(0,0,0,0.28)"
+Pieces = list[tuple[float, Floats]]  # of lines of equal value: level and points (k, 2)
 
 
 class Spot(NamedTuple):
@@ -68,10 +69,13 @@ def error_map(content: ReportContent) -> Figure | None:
         return None
     spots = _spots(content, means, rows)
     span = (float(means.H.min()), float(means.H.max()))
-    pieces = _pieces(rows, counts, spots)
+    pieces, bounds = _pieces(rows, counts, spots, content.frames.get("intervals"))
     lined = " Lines of equal error follow H averaged over neighbouring models and N_D (where there are six or more of "
     lined += "them), and none is drawn beside a cell without a result; pieces shorter than the distance of two N_D are "
     lined += "left out."
+    if bounds:
+        lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
+        lined += "two dotted lines of a level the data do not say on which side of the level H lies."
     return Figure(
         id="map",
         title="Physics and data: the map",
@@ -85,9 +89,13 @@ def error_map(content: ReportContent) -> Figure | None:
         alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
         "the table of cells.",
         height=HEIGHT,
-        views={"0": [Panel(_flat(rows, counts, spots, span, pieces))], "1": [Panel(_bars(rows, counts, spots, span))]},
+        views={
+            "0": [Panel(_flat(rows, counts, spots, span, pieces, bounds))],
+            "1": [Panel(_bars(rows, counts, spots, span))],
+        },
         controls=[Control("View", ["map", "bars"])],
-        chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [],
+        chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [])
+        + ([Chip("bounds", "their 95 % bands", INK, "dot", 1.5)] if bounds else []),
         scale=Scale("position error, mean, H [m]", *span, "--heat"),
     )
 
@@ -111,7 +119,7 @@ def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: s
         how=how,
         alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
         height=HEIGHT,
-        views={"": [Panel(_flat(rows, counts, spots, span, []))]},
+        views={"": [Panel(_flat(rows, counts, spots, span, [], []))]},
         scale=Scale(scale, *span, "--heat"),
     )
 
@@ -179,23 +187,40 @@ def _reaches(y: Floats, most: float) -> tuple[Floats, Floats]:
     return np.insert(half, 0, ends[0]), np.append(half, ends[1])
 
 
-def _pieces(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot]) -> list[tuple[float, Floats]]:
-    """Lines of equal H through the physics models: level [m] and points (N_D, y)."""
+def _pieces(
+    rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], intervals: pd.DataFrame | None
+) -> tuple[Pieces, Pieces]:
+    """Lines of equal H through the physics models, level [m] and points (N_D, y); those of the ends of its interval."""
     physics = rows[rows.A.notna() & rows.family.ne(DATA_DRIVEN)]
-    values = np.full((len(rows), len(counts)), np.nan)
-    for spot in spots:
-        values[spot.row, list(counts).index(spot.size)] = spot.H
-    mean = smoothed(values[physics.index.to_numpy()], NEIGHBOURS)
     x, y = np.asarray(counts, dtype=float), physics.y.to_numpy(dtype=float)
-    return [
-        (height, piece)
-        for height in nice_levels(mean, MOST_LINES)
-        for piece in contour(x, y, mean, height)
-        if np.ptp(piece[:, 0]) >= np.diff(x).min()
-    ]
+    errors = {(spot.model, spot.size): spot.H for spot in spots}
+
+    def over(known: Mapping[tuple[str, int], float]) -> Floats:
+        values = np.array([[known.get((str(name), size), math.nan) for size in counts] for name in physics.model])
+        return smoothed(values, NEIGHBOURS)
+
+    mean = over(errors)
+    levels = nice_levels(mean, MOST_LINES)
+
+    def lines(heights: Floats) -> Pieces:
+        every = [(height, piece) for height in levels for piece in contour(x, y, heights, height)]
+        return [(height, piece) for height, piece in every if np.ptp(piece[:, 0]) >= np.diff(x).min()]
+
+    if intervals is None:
+        return lines(mean), []
+    keys = [(str(model), int(size)) for model, size in zip(intervals.model, intervals.N_D, strict=True)]
+    ends = [over(dict(zip(keys, intervals[side], strict=True))) for side in ("low", "high")]
+    return lines(mean), [*lines(ends[0]), *lines(ends[1])]
 
 
-def _flat(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float], pieces: Any) -> Plot:
+def _flat(
+    rows: pd.DataFrame,
+    counts: Sequence[int],
+    spots: list[Spot],
+    span: tuple[float, float],
+    pieces: Pieces,
+    bounds: Pieces,
+) -> Plot:
     top, widths = float(rows.y.max()) * 1.04, _widths(counts)
     most = THICK / 2 * top / (HEIGHT - MARGIN["t"] - MARGIN["b"])
     y = rows.y.to_numpy(dtype=float)
@@ -238,6 +263,8 @@ def _flat(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tu
         hovertemplate="%{customdata}<extra></extra>",
     )
     lines, names = _isolines(pieces)
+    dots = {"color": INK, "width": 1.2, "dash": "dot"}
+    lines += [silent(line(metres(height), piece[:, 0], piece[:, 1], ["bounds"], line=dots)) for height, piece in bounds]
     names += _row_names(rows, top)
     ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
     x = axis("manoeuvres, N_D [1]", tickvals=list(counts), range=ends, showgrid=False)
@@ -281,7 +308,7 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
     }
 
 
-def _isolines(pieces: list[tuple[float, Floats]]) -> tuple[list[Trace], list[dict[str, Any]]]:
+def _isolines(pieces: Pieces) -> tuple[list[Trace], list[dict[str, Any]]]:
     """Ink lines on a pale rim, and the level written once, on the longest piece."""
     traces, names = [], []
     longest: dict[float, Floats] = {}

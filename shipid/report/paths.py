@@ -22,7 +22,8 @@ from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, 
 from shipid.report.wording import counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_WINDOWS = 600  # in all: with six models at three N_D this is about 3 MB of the page
+MOST_WINDOWS = 600  # in all
+MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 PIXELS = 1000  # a window is drawn about half as large
 HOW = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
@@ -31,11 +32,14 @@ HOW = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
-    """Sort windows by test run and time and thin them: `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` in all."""
+    """Sort windows by test run and time; thin them: `FEW_RUNS`, `MOST_INSTANTS` each, in all `MOST_WINDOWS`, `MOST_PATHS`."""
     by_run: dict[str, list[Snapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
-    result, most = {}, min(MOST_INSTANTS, MOST_WINDOWS // max(1, min(FEW_RUNS, len(by_run))))
+    shown = set(exemplars(content))
+    paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
+    windows = min(MOST_WINDOWS, MOST_PATHS // max(1, paths))
+    result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
     for run in spread(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
         chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), most)).round().astype(int)

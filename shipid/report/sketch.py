@@ -225,10 +225,8 @@ def _points(trace: Any, points: Floats, shade: dict[str, float]) -> Iterable[str
 def _thinned(points: Floats) -> Floats:
     """Points (n, 2) without those that no eye misses, piece by piece between what is no number."""
     known = np.isfinite(points).all(axis=1)
-    result = []
-    for piece in np.split(points, np.flatnonzero(np.diff(known)) + 1):
-        result.append(piece[thinned(piece, 1.0)] if np.isfinite(piece[0]).all() else piece[:1])
-    return np.concatenate(result)
+    pieces = np.split(points, np.flatnonzero(np.diff(known)) + 1)
+    return np.concatenate([piece[thinned(piece, 1.0)] if np.isfinite(piece[0]).all() else piece for piece in pieces])
 
 
 def _joined(points: Floats) -> str:

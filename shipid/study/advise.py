@@ -20,8 +20,6 @@ from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few, words
 from shipid.study.worth import Estimate, break_even, runs_without_physics
 
-FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds whose orders react to the ship
-
 
 def by_model(results: Results) -> pd.DataFrame:
     """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D.
@@ -130,7 +128,7 @@ class Case:
 
 def answer(results: Results) -> list[tuple[str, str]]:
     """A few sentences built from the results, each with the anchor of the figure that carries it."""
-    claims, every_model = results.plan.study.claims, by_model(results)
+    claims, every_model = results.plan.claims, by_model(results)
     rows = every_model[~every_model["family"].isin(results.plan.aside)]
     sentences = [(text, "cells") for text in _caveats(results)]
     learning = results.plan.learning
@@ -414,7 +412,7 @@ def _how_to_read(case: Case) -> list[str]:
             "Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
         )
-    if plan.study.prediction.commands == "known" and _may_react(case.results):
+    if plan.known and plan.reacting:
         sentences.append(
             "The orders of the next seconds were known. In a zigzag they reveal when the heading will reach its limit, "
             "so these errors show at best what knowing the plan can give: an upper bound of its worth."
@@ -429,9 +427,3 @@ def _how_to_read(case: Case) -> list[str]:
             "their length (Holm)."
         )
     return sentences
-
-
-def _may_react(results: Results) -> bool:
-    """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by her heading."""
-    truth = results.plan.study.truth
-    return truth is None or any(getattr(one, "kind", "") in FEEDBACK for one in truth.manoeuvre)

@@ -69,7 +69,7 @@ def regions(
 
 def _largest(results: Results) -> Iterator[tuple[Mapping[str, Any], Region, Array]]:
     """Row, region at the level of the study and errors (T, S, 2) [m] of the cells of the largest N_D and first seed."""
-    level, cells = results.plan.study.bands.level, results.cells
+    level, cells = results.plan.level, results.cells
     largest, seed = cells["N_D"].max(), cells["seed"].min()
     rows = [row for row in results.rows if row["N_D"] == largest and row["seed"] == seed]
     for row, by_level, errors in regions(results, [level], rows):
@@ -84,7 +84,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
     length, rows = ship_length(results), []
-    levels = sorted({*SHOWN, results.plan.study.bands.level})
+    levels = sorted({*SHOWN, results.plan.level})
     held: dict[float, dict[tuple[str, str, int], list[Array]]] = {level: {} for level in levels}
     sizes: dict[tuple[float, str, str, int], list[tuple[float, float]]] = {}
     for row, by_level, errors in regions(results, levels):
@@ -113,7 +113,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
-    level, test, rows = results.plan.study.bands.level, results.test, []
+    level, test, rows = results.plan.level, results.test, []
     kinds = kinds_of_runs(results.dataset)
     kind = np.array([kinds.get(str(run), "other") for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
@@ -151,7 +151,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
 
     Means over the models at the largest N_D that has bands.
     """
-    level, frame = results.plan.study.bands.level, coverage_frame(results)
+    level, frame = results.plan.level, coverage_frame(results)
     mine = frame[frame["level"].eq(level)]
     if mine.empty:
         reasons = refused_frame(results)["reason"].unique()
@@ -190,7 +190,7 @@ def worst_frame(results: Results) -> pd.DataFrame:
 
 def refused_frame(results: Results) -> pd.DataFrame:
     """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
-    level, rows = results.plan.study.bands.level, []
+    level, rows = results.plan.level, []
     for row in results.rows:
         bands = results.bands.get(row["cell"])
         if row["status"] == "ok" and (bands is None or not bands.promises(level)):

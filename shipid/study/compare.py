@@ -23,7 +23,7 @@ def are_worlds(folders: Sequence[Path]) -> bool:
     """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
     plans = [stored_plan(folder) for folder in folders]
     same = len({plan.digest_in_any_world for plan in plans}) == 1
-    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
+    return same and len(plans) > 1 and len({plan.seed for plan in plans}) == len(plans)
 
 
 def read_worlds(folders: Sequence[Path]) -> list[Results]:
@@ -35,7 +35,7 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
     for folder, plan in plans.items():
         if plan.digest_in_any_world != first.digest_in_any_world:
             raise ResultError(f"holds another study than {folders[0]}: only `seed` may differ", file=folder)
-        seed = plan.study.seed
+        seed = plan.seed
         if seed in known:
             raise ResultError(f"has seed = {seed}, as {known[seed]} has: nothing is repeated", file=folder, path="seed")
         known[seed] = folder

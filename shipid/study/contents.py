@@ -17,6 +17,7 @@ from shipid.report.methods import MethodsContent
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
 from shipid.study.claims import Claims
+from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
 from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
@@ -37,6 +38,7 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "coverage_runs": bands.worst_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
+    "intervals": intervals_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
@@ -51,7 +53,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     if say is not None:
         say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
     return ReportContent(
-        title=results.plan.study.question,
+        title=results.plan.question,
         name=results.plan.name,
         answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
@@ -152,7 +154,7 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
     frame = methods.compared(methods.joined(cells), plan.judged)
     write_table(folder / METHODS, frame)
     content = MethodsContent(
-        title=plan.study.question,
+        title=plan.question,
         name=plan.name,
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},

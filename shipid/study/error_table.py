@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.metrics import position_error
@@ -106,3 +107,32 @@ def error_table(results: Results, models: Sequence[str], metric: Metric = "H") -
         if name in models and name != NO_MODEL and np.isfinite(path).all()
     }
     return ErrorTable(tuple(int(N) for N in amounts), counts.astype(float), alone, H)
+
+
+def intervals_frame(results: Results) -> pd.DataFrame:
+    """95 % interval of H over test manoeuvres, of every model at every amount of data.
+
+    Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
+    another training would give is in the interval.
+    """
+    _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
+    cells = results.cells[results.cells["cell"].map(results.paths.__contains__)]
+    parts = []
+    for N_D, mine in cells.groupby("N_D", sort=True):
+        errors = {
+            str(model): np.stack([_by_run(results, str(cell), place) for cell in same["cell"]])  # (seeds, R)
+            for model, same in mine.groupby("model", sort=False)
+        }
+        means = np.stack([each.mean(axis=0) for each in errors.values()])
+        noise = training_noise([each @ (counts / counts.sum()) for each in errors.values()])
+        seeds = np.array([len(each) for each in errors.values()])
+        judged = contrasts(means, counts.astype(float), noise * (means @ (counts / counts.sum())) / np.sqrt(seeds))
+        parts.append(pd.DataFrame({"model": list(errors), "N_D": N_D, "low": judged.low, "high": judged.high}))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])
+
+
+def _by_run(results: Results, cell: str, place: NDArray[np.int64]) -> Array:
+    """(R,) mean error [m] of a cell in each test manoeuvre; place : (S,) manoeuvre of each window."""
+    error = position_error(results.paths[cell], results.test.future).mean(axis=0)
+    mean: Array = np.bincount(place, error) / np.bincount(place)
+    return mean

@@ -64,7 +64,7 @@ class Rivals:
 
 def findings(results: Results) -> list[Finding]:
     """Verdicts on what the study claims: R1-R4 (method, section 5), S1-S7 (section 4), both or none; then B1-B2."""
-    claims = results.plan.study.claims
+    claims = results.plan.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
     verdicts = _full_scale(results, claims) if claims.accurate is not None else []

@@ -61,7 +61,7 @@ def band_findings(results: Results, physics: Sequence[str]) -> list[Finding]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band."""
     if not results.complete:
         return undecided(CLAIMS, results.missing)
-    level, run = results.plan.study.bands.level, results.test.run
+    level, run = results.plan.level, results.test.run
     bands = {
         str(row["cell"]): (by_level[level].radius.mean(axis=0), by_level[level].holds(errors))
         for row, by_level, errors in regions(results, [level])

@@ -115,7 +115,7 @@ def judged(H: Grid, H_90: Grid) -> list[Finding]:
 
 def read_grid(results: Results, metric: Metric) -> Grid | str:
     """H or H_90 of a finished study as a grid, or the reason why there is none."""
-    claims, cells = results.plan.study.claims, judged_cells(results)
+    claims, cells = results.plan.claims, judged_cells(results)
     assert claims is not None
     if not results.complete:
         return results.missing
@@ -394,7 +394,7 @@ def _S7(results: Results, grid: Grid) -> Finding:
     if results.test.horizon < 3:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
     judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
-    if smooth_by_construction(judged, results.plan.study.prediction.horizon):
+    if smooth_by_construction(judged, results.test.horizon):
         evidence = (
             "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
         )

@@ -170,7 +170,7 @@ def _cells(results: Results) -> pd.DataFrame:
         columns=["cell", "foundation", *KEYS, "H", "coverage"]
     )
     learning = {way.name for way in results.plan.methods if way.method.compensates}
-    good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed, trained=good["method"].isin(learning))
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.seed, trained=good["method"].isin(learning))
     every = results.cells.drop_duplicates("foundation")
     known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
     alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
@@ -234,9 +234,7 @@ def _same_recording(one: Windows, two: Windows, here: Index, there: Index) -> bo
 
 def _same_draws(one: Plan, two: Plan) -> bool:
     """Whether two simulated truths draw the same manoeuvres: then runs of one name are pairs, whatever the ship."""
-    truths = [plan.study.truth for plan in (one, two)]
-    drawn = [truth.model_dump(include={"seed", "manoeuvre", "wind_speed", "waves"}) for truth in truths if truth]
-    return len(drawn) == 2 and drawn[0] == drawn[1]
+    return one.draws is not None and one.draws == two.draws
 
 
 @dataclass(frozen=True)

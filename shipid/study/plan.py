@@ -37,6 +37,7 @@ NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
+FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
 
@@ -416,6 +417,76 @@ class Plan:
         return [way.name for way in self.methods if way.method.compensates and way.name != self.plain]
 
     @property
+    def question(self) -> str:
+        """The question that the study answers."""
+        return self.study.question
+
+    @property
+    def claims(self) -> Claims | None:
+        """What findings compare, if the study names it."""
+        return self.study.claims
+
+    @property
+    def published(self) -> Published | None:
+        """A published envelope of inputs to compare with, if there is one."""
+        return self.study.published
+
+    @property
+    def seed(self) -> int:
+        """Seed of the world."""
+        return self.study.seed
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Seeds of the grid, those of its world, each once, the least first."""
+        return tuple(sorted(set(self.study.grid.seeds)))
+
+    @property
+    def level(self) -> float:
+        """Nominal coverage of the bands."""
+        return self.study.bands.level
+
+    @property
+    def refits(self) -> int:
+        """Number of fits without some runs that calibrate a band."""
+        return self.study.bands.refits
+
+    @property
+    def commands(self) -> Commands:
+        """Whether the commands of the horizon are `held` or `known`."""
+        return self.study.prediction.commands
+
+    @property
+    def known(self) -> bool:
+        """Whether the commands of the horizon are known."""
+        return self.commands == "known"
+
+    @property
+    def reacting(self) -> bool:
+        """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by her heading."""
+        truth = self.study.truth
+        return truth is None or any(getattr(one, "kind", "") in FEEDBACK for one in truth.manoeuvre)
+
+    @property
+    def draws(self) -> dict[str, Any] | None:
+        """What decides orders and weather of simulated runs, whatever the ship; None for recorded runs."""
+        truth = self.study.truth
+        return truth.model_dump(include={"seed", "manoeuvre", "wind_speed", "waves"}) if truth else None
+
+    @property
+    def obtaining(self) -> str:
+        """What is done to obtain the runs, in words."""
+        if self.study.truth is not None:
+            return "simulating the truth"
+        made = self.study.data is not None and self.study.data.dataset is not None
+        return "reading the dataset" if made else "importing the log"
+
+    @cached_property
+    def families(self) -> tuple[Family, ...]:
+        """The families of the study, those that extend another written out."""
+        return tuple(resolve(self.study.family, self.file))
+
+    @property
     def causal(self) -> tuple[str, ...]:
         """Columns whose inputs hold the last fix."""
         return tuple(self.study.data.causal) if self.study.data else ()
@@ -447,6 +518,13 @@ class Plan:
             for batch in self.batches
             for group in groups
         )
+
+    def turn(self, test: str, amount: int) -> Plan:
+        """Return the study with one test run and one amount of data, every seed of the grid."""
+        split = self.study.split.model_copy(update={"test": [test]})
+        grid = self.study.grid.model_copy(update={"N_D": [amount]})
+        study = self.study.model_copy(update={"split": split, "grid": grid})
+        return replace(self, study=study, batches=tuple(Batch(amount, seed) for seed in self.seeds))
 
     def whole(self, batch: Batch) -> Unit:
         """All cells of a batch as one unit."""

@@ -34,7 +34,7 @@ from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, draw, resolve
+from shipid.vessel.perturb import Family, draw
 
 Array = np.ndarray
 MOST_REDRAWS = 100
@@ -214,7 +214,7 @@ def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:
 
 def runs_by_amount(plan: Plan, pool: Windows) -> dict[int, tuple[str, ...]]:
     """Return the training and validation runs of each amount of data, fewest first, for the first seed."""
-    seed = min(plan.study.grid.seeds)
+    seed = plan.seeds[0]
     return {batch.N_D: nested(plan, pool, batch) for batch in reversed(plan.batches) if batch.seed == seed}
 
 
@@ -253,7 +253,7 @@ def _roll_out(
     estimates: dict[str, Estimates],
 ) -> tuple[tuple[Foundation, ...], dict[str, Pair]]:
     """Paths of every foundation on (pool, test), members that diverge on the pool redrawn; fills in the estimates."""
-    families = {family.name: family for family in resolve(plan.study.family, plan.file)}
+    families = {family.name: family for family in plan.families}
     finished: dict[str, tuple[Foundation, Pair]] = {}
     waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
     while waiting:
@@ -326,7 +326,7 @@ def instants_of(
 ) -> Instants:
     """Instants of a study at each window, with the states of the actuators and of the observer."""
     hidden = None if vessel is None else window_memory(vessel, dataset, windows)
-    known = plan.study.prediction.commands == "known"
+    known = plan.known
     return windows.instants(known=known, hidden=hidden, estimates=at_instants(dataset, windows, estimates))
 
 

@@ -195,7 +195,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         if band is not None:
             bands[cell] = band
         try:
-            checked_bands(band, reason, plan.study.bands.level)
+            checked_bands(band, reason, plan.level)
         except DataError as error:
             no_band[cell] = error.message
     return Results(
@@ -372,7 +372,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
     seed, test = int(results.cells["seed"].min()), results.test
     rows, naive, cells = [], constant_motion(test), _shown_cells(results)
-    level, edges = results.plan.study.bands.level, {}
+    level, edges = results.plan.level, {}
     for row in cells:
         bands_of_cell = results.bands.get(row["cell"])
         if bands_of_cell is not None and bands_of_cell.promises(level):
@@ -449,7 +449,7 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.study.published)
+    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:
@@ -518,24 +518,24 @@ def judged_cells(results: Results) -> pd.DataFrame:
 
 def provenance_words(results: Results) -> dict[str, str]:
     """What the results are based on, as label -> text."""
-    record, study = results.provenance, results.plan.study
+    record, plan = results.provenance, results.plan
     machine = record.get("machine", {})
     words = {
         "study": f"{results.plan.name}, digest {record['digest']}",
         "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in results.plan.used_vessels})),
         "data": _source_words(results.dataset.metadata.get("source", "")),
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
-        "seeds": ", ".join(map(str, study.grid.seeds)),
+        "seeds": ", ".join(map(str, plan.seeds)),
         "methods": "; ".join(_method_words(way) for way in results.plan.methods),
         "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
         f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
         "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s",
     }
-    if study.seed:
-        words["world"] = f"seed {study.seed}"
-    if study.published is not None:
-        words["published envelope"] = study.published.source
+    if plan.seed:
+        words["world"] = f"seed {plan.seed}"
+    if plan.published is not None:
+        words["published envelope"] = plan.published.source
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -64,19 +63,13 @@ def rotate(
     """
     with nullcontext() if kept is None else _sharing(kept) as claims:
         for test in tests:
-            split = plan.study.split.model_copy(update={"test": [test]})
-            few = plan.study.grid.model_copy(update={"N_D": [2]})
-            least = plan.study.model_copy(update={"split": split, "grid": few})
-            rest, _, _ = partition(replace(plan, study=least, batches=()), dataset)
-            amount = len(rest.spans)
-            study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
-            batches = tuple(Batch(amount, seed) for seed in sorted(set(study.grid.seeds)))
-            turn = replace(plan, study=study, batches=batches)
-            done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in batches}
-            if any(done.get(batch) is None for batch in batches):
+            rest, _, _ = partition(plan.turn(test, 2), dataset)
+            turn = plan.turn(test, len(rest.spans))
+            done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in turn.batches}
+            if any(done.get(batch) is None for batch in turn.batches):
                 yield _computed(turn, dataset, test, device, kept, claims)
             else:
-                yield pd.concat([done[batch] for batch in batches])
+                yield pd.concat([done[batch] for batch in turn.batches])
 
 
 @contextmanager
@@ -174,7 +167,7 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Nothing without
     `accurate` and `inaccurate`, or where fewer than two turns have what they need.
     """
-    claims = plan.study.claims
+    claims = plan.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
     mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(plan.aside)]

@@ -106,9 +106,7 @@ def run_study(
         for words in _other_session(folder, claims, device):
             yield Event("note", words)
         if not seals.is_sealed(folder, DATA):
-            made = plan.study.data is not None and plan.study.data.dataset is not None
-            doing = "reading the dataset" if made else "importing the log"
-            yield Event("note", "simulating the truth" if plan.study.truth else doing)
+            yield Event("note", plan.obtaining)
             claims.once(DATA, partial(seals.is_sealed, folder, DATA), partial(_write_data, plan, folder))
         dataset = read_dataset(folder / store.DATASET)
         yield Event("note", "rolling out the foundations")
@@ -341,7 +339,7 @@ def refitted(
         and fitted[way.name][name].corrector is not None
         and (name in identified or fitted[way.name][name].left_out is None)
     ]
-    refits = plan.study.bands.refits
+    refits = plan.refits
     if not refits or not pairs:
         return {}
     left_out = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
@@ -393,7 +391,7 @@ def _fitted(
         windows=windows,
         folds=prepared.folds(plan, batch, windows, way.method.validation) if way.method.compensates else (),
         commands=prepared.commands,
-        known=plan.study.prediction.commands == "known",
+        known=plan.known,
         seed=batch.seed,
         hidden={
             name: window_memory(case.physics.vessel, prepared.data, windows)
@@ -449,7 +447,7 @@ def _judged(
 
 def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:
     """Share of whole test paths inside the band of the study's level, and its mean radius [m]; NaN without a band."""
-    level = plan.study.bands.level
+    level = plan.level
     if predictor.bands is None or not predictor.bands.promises(level):
         return {"coverage": np.nan, "width": np.nan}
     region = predictor.band(paths, instants, level)
@@ -488,7 +486,7 @@ def _predictor(
         method=way.kind,
         corrector=corrector,
         limits=limits_of(windows, prepared.commands),
-        commands=plan.study.prediction.commands,
+        commands=plan.commands,
         causal=plan.causal,
         provenance={
             "study": plan.name,

@@ -20,7 +20,7 @@ from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, Variant, members, resolve
+from shipid.vessel.perturb import Family, Variant, members
 
 Array = np.ndarray
 MEMBERS = 64  # of a block
@@ -31,12 +31,12 @@ FIXED = ("family", "member", "A", "A_90", "diverged")
 
 def families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [family for family in resolve(plan.study.family, plan.file) if any(block.drawn for block in family.perturb)]
+    drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
     if name is None and not drawn:
         raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
-        known = name in [family.name for family in plan.study.family]
+        known = name in [family.name for family in plan.families]
         fault = "draws no factor from a range" if known else "is no family"
         hint = choices(str(name), [family.name for family in drawn])
         raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")

@@ -10,6 +10,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
 from shipid.errors import DataError
+from shipid.logs import readers
 from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of
 from tests.logs.conftest import as_log, turning
 
@@ -299,3 +300,47 @@ def test_an_azimuth_about_360_is_one_about_0(plain_mapping: Write, tmp_path: Pat
     more = '\n[columns."port.alpha"]\nfrom = "azimuth"\nunit = "deg"\nwrap = true\n'
     alpha = import_log(read_mapping(plain_mapping(more)), log).frame["port.alpha"]
     np.testing.assert_allclose(np.degrees(alpha), np.linspace(-5.0, 40.0, len(T)), atol=1e-3)
+
+
+def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mapping: Write, tmp_path: Path) -> None:
+    motion = turning(T)
+    twice = motion.iloc[np.sort(np.append(np.arange(len(T)), [7, 50, 51]))]
+    log = as_log(twice, tmp_path / "log.csv")
+    with pytest.raises(DataError, match=r"row 9: time 3\.5 s appears twice: .* repeated = 'drop'"):
+        import_log(read_mapping(plain_mapping()), log)
+    dataset = import_log(read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"'))), log)
+    assert counts(dataset)["repeated"] == 3
+    np.testing.assert_allclose(dataset.frame["north"], motion["north"], atol=1e-6)
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_rows_of_a_ship_at_rest_are_not_repeated_rows(
+    large: bool, plain_mapping: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rounded clock gives rows of one time: those are repeated that agree in all columns, also in those not used."""
+    t = np.arange(0.0, 30.0, 0.1)
+    rest = pd.DataFrame({"t": np.floor(t + 1e-9), **dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)})
+    log = as_log(rest.assign(**{"port.n": 0.0}), tmp_path / "log.csv")
+    rows = pd.read_csv(log).assign(counter=np.arange(len(t)))
+    pd.concat([rows.iloc[:100], rows.iloc[99:]]).to_csv(log, index=False)
+    if large:
+        monkeypatch.setattr(readers, "LARGE", 1)
+    mapping = plain_mapping("", ('from = "time"', 'from = "time"\nevery = 0.1\nrepeated = "drop"'))
+    dataset = import_log(read_mapping(mapping), log)
+    assert counts(dataset)["repeated"] == 1
+    np.testing.assert_allclose(dataset.frame["t"], t, atol=1.0)
+    np.testing.assert_allclose(np.diff(dataset.frame["t"]), 0.1, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_rounded_clock_keeps_time_where_rows_were_lost(seed: int) -> None:
+    """Times err by less than a rounding against each other; rows are whole steps apart, and none goes back."""
+    random = np.random.default_rng(seed)
+    step = float(random.choice([0.05, 0.1, 0.2]))
+    kept = np.sort(random.choice(2000, 1900, replace=False))
+    t = 5.0 + step * kept
+    even, _ = even_clock(np.floor(t + 1e-9), step)
+    assert np.ptp(even - t) <= 1.0 + 1e-9
+    apart = np.diff(even) / step
+    np.testing.assert_allclose(apart, np.round(apart), atol=1e-6)
+    assert apart.min() > 0.5

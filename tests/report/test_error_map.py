@@ -151,3 +151,29 @@ def test_a_model_without_accuracy_has_a_separate_strip(simulation):
     figure = flat(replace(simulation, models=simulation.models.assign(A=lost), cells=cells))
     assert set(figure.layout.yaxis.ticktext) >= {"no model", "high-2"}
     assert len(figure.data[0].x) == 21
+
+
+def test_bands_of_lines_of_equal_error_hold_the_lines(simulation):
+    """An interval about H moves every line towards both sides; without intervals there is no band."""
+    means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
+    wide = means.assign(low=0.8 * means.H, high=1.25 * means.H)
+    plain, banded = (flat(replace(simulation, frames=frames)) for frames in ({}, {"intervals": wide}))
+    assert not [trace for trace in plain.data if trace.meta == ("bounds",)]
+    lines = [trace for trace in banded.data if trace.meta == ("iso",)]
+    bounds = [trace for trace in banded.data if trace.meta == ("bounds",)]
+    assert bounds
+    for level in {trace.name for trace in lines}:
+        at = np.concatenate([trace.y for trace in lines if trace.name == level])
+        sides = [np.nanmean(trace.y) for trace in bounds if trace.name == level]
+        if len(sides) == 2:
+            assert min(sides) < np.nanmean(at) < max(sides)
+    narrow = flat(replace(simulation, frames={"intervals": means.assign(low=means.H, high=means.H)}))
+    same = [trace for trace in narrow.data if trace.meta == ("bounds",)]
+    assert len(same) == 2 * len([trace for trace in lines]) // 2
+
+
+def test_too_few_test_manoeuvres_give_no_band(simulation):
+    means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
+    blank = replace(simulation, frames={"intervals": means.assign(low=np.nan, high=np.nan)})
+    assert not [trace for trace in flat(blank).data if trace.meta == ("bounds",)]
+    assert "95 % interval" not in error_map(blank).how

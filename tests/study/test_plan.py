@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -19,6 +20,7 @@ from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 
 ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "shipid"
 
 
 @pytest.mark.parametrize(
@@ -314,3 +316,19 @@ def test_an_identification_is_in_one_unit(tmp_path: Path) -> None:
     every = [pair for unit in plan.units for pair in unit.pairs]
     assert sorted(every) == sorted((name, way.name) for name, way in plan.pairs)
     assert len({unit.key for unit in plan.units}) == len(plan.units) > 5
+
+
+def test_the_plan_and_the_preparation_alone_read_the_study_document() -> None:
+    """Everyone else asks the plan in its words, so that a changed key of the document is one edit."""
+    readers = {
+        file.relative_to(PACKAGE).as_posix()
+        for file in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Attribute) and node.attr == "study" and not _imported(node)
+    }
+    assert readers == {"study/plan.py", "study/prepare.py"}
+
+
+def _imported(node: ast.Attribute) -> bool:
+    """Whether `x.study` names the package `shipid.study` or its commands."""
+    return isinstance(node.value, ast.Name) and node.value.id in ("shipid", "cli")
