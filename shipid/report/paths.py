@@ -32,7 +32,7 @@ HOW = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
-    """Sort windows by test run and time; thin them: `FEW_RUNS`, `MOST_INSTANTS` each, in all `MOST_WINDOWS`, `MOST_PATHS`."""
+    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` and `MOST_PATHS`."""
     by_run: dict[str, list[Snapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
