@@ -49,6 +49,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.study.contents import write_pages as write_pages
     from shipid.study.matched import Comparison as Comparison
     from shipid.study.matched import compare as compare
+    from shipid.study.methods import compare_methods as compare_methods
     from shipid.study.plan import Plan as Plan
     from shipid.study.plan import read_plan as read_plan
     from shipid.study.results import Results as Results
@@ -93,6 +94,7 @@ _PUBLIC = {
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
     "compare": "shipid.study.matched",
+    "compare_methods": "shipid.study.methods",
     "cut_windows": "shipid.data.windows",
     "draw": "shipid.vessel.perturb",
     "events": "shipid.study.start",

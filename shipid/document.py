@@ -263,7 +263,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         if first["type"] == "extra_forbidden":
             message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
-            message = "missing"
+            message = "missing" + _note(model, first["loc"])
         elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
             path, message = _of_no_kind(path, first)
         else:
@@ -296,8 +296,21 @@ def _place(data: Any, location: tuple[int | str, ...]) -> Iterator[str]:
         yield str(part)
 
 
+def _note(model: Any, location: tuple[int | str, ...]) -> str:
+    """What a key is, in parentheses, as its declaration says; empty where it says nothing."""
+    fields = (kind.model_fields.get(str(location[-1])) for kind in _models(model, location[:-1]))
+    notes = (field.description for field in fields if field is not None)
+    return next((f" ({note})" for note in notes if note and note != "-"), "")
+
+
 def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
     """Keys that a pydantic model allows at a place inside it, over all members of a union."""
+    models = _models(model, location)
+    return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
+
+
+def _models(model: Any, location: tuple[int | str, ...]) -> list[Any]:
+    """The pydantic models at a place inside a model, over all members of a union."""
     kinds = [model]
     for part in location:
         inner: list[Any] = []
@@ -308,8 +321,7 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
             elif get_args(kind):
                 inner += _alternatives(get_args(kind)[-1])
         kinds = inner or _of_kind(kinds, part) or kinds  # the name of a union member is no key
-    models = [kind for kind in kinds if hasattr(kind, "model_fields")]
-    return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
+    return [kind for kind in kinds if hasattr(kind, "model_fields")]
 
 
 def _of_kind(models: list[Any], tag: int | str) -> list[Any]:

@@ -22,6 +22,7 @@ from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.observer import Observer
+from shipid.physics.signals import SIGNALS, measurable
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
@@ -389,8 +390,8 @@ def refit_folds(windows: Windows, refits: int, seed: int) -> list[tuple[Index, I
 
 
 def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of u, v, r, the commands and the wind speed over windows, by column."""
-    names = ["u", "v", "r", *commands, *(name for name in ("V_w",) if name in windows.columns)]
+    """Least and greatest value of u, v, r, the commands, wind speed and other environment over windows, by column."""
+    names = ["u", "v", "r", *commands, *(name for name in measurable(windows.columns) if not SIGNALS[name].angle)]
     return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 

@@ -186,7 +186,8 @@ def test_what_has_no_end_is_no_document() -> None:
 @pytest.mark.parametrize(
     ("model", "data", "path", "message"),
     [
-        (Truth, {"vessel": "mariner"}, "truth.manoeuvres", "missing"),
+        (Truth, {"vessel": "mariner", "manoeuvres": 2}, "truth.duration", "missing (s"),
+        (Truth, {"vessel": "mariner", "duration": 9.0}, "truth.manoeuvres", "missing"),
         (
             Truth,
             {"vessel": "mariner", "manoeuvres": 1, "duration": 9.0},

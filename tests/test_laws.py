@@ -380,10 +380,11 @@ def test_drag_takes_energy(key: str, data: st.DataObject) -> None:
 
 
 def _powers(unit: str) -> tuple[float, float, float]:
-    """Exponents of mass, length and time in a unit; angles and pure numbers have none."""
+    """Exponents of mass, length and time in a unit, such as `kg m^-1` or `m/s`; angles and pure numbers have none."""
     base = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2)}
     total = np.zeros(3)
-    for token in unit.split():
+    over, _, under = unit.partition("/")
+    for token in (*over.split(), *(f"{part}^-1" for part in under.split())):
         symbol, power = re.fullmatch(r"([a-zA-Z-]+)(?:\^(-?\d+))?", token).groups()  # type: ignore[union-attr]
         total += np.array(base.get(symbol, (0, 0, 0))) * int(power or 1)
     return tuple(total)
@@ -400,8 +401,8 @@ def test_froude_scaling(key: str, seed: int) -> None:
 
     values = case.values * [factor(*_powers(unit)) for unit in case.units]
     motion = np.array([scale**0.5] * 3 + [scale**-0.5] * 3)
-    signal = {"n": scale**-0.5, "V_w": scale**0.5, "V_c": scale**0.5, "nu": motion, "nu_r": motion}
-    signal |= {"wash": np.array([scale**0.5, scale**0.5, scale])}
+    signal = {name: factor(*_powers(row.unit)) for name, row in SIGNALS.items()}
+    signal |= {"nu": motion, "nu_r": motion, "wash": np.array([scale**0.5, scale**0.5, scale])}
     signal |= {"eta": scale ** np.array([1, 1, 1, 0, 0, 0]), "state": scale ** np.array(SCALE_OF_STATES.get(key, 0.0))}
     drawn = random_signals(case, seed)
     for name in VECTORS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,17 +14,25 @@ import pytest
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset
-from shipid.data.windows import cut_windows
+from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.features import choose_features
+from shipid.export.correctors import taken
+from shipid.export.model import model
+from shipid.export.write import export_predictor
+from shipid.hybrid.features import choose_features, group_of
+from shipid.hybrid.one_step import OneStep
+from shipid.hybrid.physics import Physics
 from shipid.hybrid.ridge import _reflection
+from shipid.hybrid.stepping import Stepper, free
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
 from shipid.physics import TERMS, Term, signals
 from shipid.physics.frames import force_at
 from shipid.physics.signals import Signal
+from shipid.predictor import fit
+from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import Published, build_plan
 from shipid.units import DEGREE
@@ -188,6 +197,113 @@ def test_a_guess_proposes_the_component_of_the_row_beside_azimuth_units(tmp_path
     assert names["throttle"] == "jet.throttle"
     assert names["azimuth"] == "thruster.alpha"
     assert names["shaft rpm"] == "thruster.n"
+
+
+def shallow_drag(
+    nu_r: Any, depth: Any, *, c: Annotated[Any, "-"], L_pp: Annotated[Any, "m"], T: Annotated[Any, "m"],
+    rho: Annotated[Any, "kg m^-3"],
+) -> Any:  # fmt: skip
+    """X = -c 1/2 rho L_pp T (T / depth)^2 u|u|: none where the depth is not given."""
+    near = (T / ca.if_else(depth > 0, depth, 1e6)) ** 2
+    return ca.vertcat(-c * 0.5 * rho * L_pp * T * near * nu_r[0] * ca.fabs(nu_r[0]), ca.SX(5, 1))
+
+
+SHALLOWS = {"vessel": "shallow", "manoeuvres": 3, "duration": 40.0, "step": 0.2, "wind_speed": (0.0, 0.0), "seed": 2}
+ALIKE = {"kind": "turning", "n_rpm": 120.0, "alpha_deg": 5.0, "start_speed": 4.0}
+
+
+@pytest.fixture
+def depth(monkeypatch: pytest.MonkeyPatch) -> Iterator[Vessel]:
+    """The depth of docs/extending.md with a term that takes it, and a ship that feels it."""
+    row = eval("{" + code("A signal")[1] + "}", {"Signal": Signal})["depth"]
+    monkeypatch.setitem(signals.SIGNALS, "depth", row)
+    monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow_drag))
+    monkeypatch.setitem(test_laws.RANGES, "depth", row.reach)
+    monkeypatch.setitem(test_laws.MIRROR, "depth", row.mirror)
+    for cached in CACHES:
+        cached.cache_clear()
+    document = load_vessel("gunnerus-28.9").document
+    block = {"c": 0.1, "T": 2.65, "L_pp": 28.9}
+    yield check_vessel({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
+    for cached in CACHES:
+        cached.cache_clear()
+
+
+@pytest.mark.usefixtures("depth")
+def test_the_depth_obeys_the_laws() -> None:
+    test_laws.test_mirror_port_starboard("hull.shallow", 0)
+    test_laws.test_zero_at_rest("hull.shallow")
+    test_laws.test_finite_at_rest("hull.shallow")
+    test_laws.test_derivative_is_finite_difference("hull.shallow", 0)
+    test_laws.test_froude_scaling("hull.shallow", 0)
+    test_laws.test_lowered_equals_casadi("hull.shallow")
+
+
+def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
+    """And a shallower run is slower: all else is equal but the course."""
+    log = simulate(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
+    runs = log.groupby("run")
+    assert (runs["depth"].nunique() == 1).all()
+    ends = pd.DataFrame({"depth": runs["depth"].last(), "u": runs["u"].last()}).sort_values("depth")
+    assert ends["depth"].between(3, 20).all()
+    assert ends["u"].is_monotonic_increasing
+    assert ends["u"].iloc[0] < 0.98 * ends["u"].iloc[-1]
+    assert check_dataset(Dataset(log, {"clock": "run"})).set_index("check").loc["range depth", "ok"].all()
+
+
+def test_a_truth_says_what_its_environment_lacks_or_nobody_takes(depth: Vessel) -> None:
+    def check(vessel: Vessel = depth, **environment: Any) -> None:
+        check_truth(Truth(**SHALLOWS, environment=environment, manoeuvre=[ALIKE]), vessel)
+
+    with pytest.raises(DocumentError, match=r"truth.environment.depth: missing: .* give depth = \[low, high\]"):
+        check()
+    with pytest.raises(DocumentError, match=r"truth.environment.dept: .* did you mean 'depth'"):
+        check(dept=4.0)
+    with pytest.raises(DocumentError, match=r"truth.environment.V_w: .* another key of \[truth\] gives it"):
+        check(V_w=4.0, depth=4.0)
+    with pytest.raises(DocumentError, match=r"truth.environment.depth: no term .* remove it"):
+        check(load_vessel("gunnerus-28.9"), depth=4.0)
+    with pytest.raises(ValueError, match=r"environment.depth has low > high"):
+        check(depth=(5.0, 4.0))
+
+
+@pytest.mark.usefixtures("depth")
+def test_a_guess_and_the_importer_take_the_depth(tmp_path: Path) -> None:
+    as_bridge(si_log()).assign(**{"Water depth [m]": 12.5}).to_csv(tmp_path / "log.csv", index=False)
+    proposal = guess(tmp_path / "log.csv").column("depth")
+    assert proposal is not None
+    assert (proposal.source, proposal.unit) == ("Water depth [m]", "m")
+    log = as_log(turning(T), tmp_path / "plain.csv")
+    pd.read_csv(log).assign(d=1250.0).to_csv(log, index=False)
+    (tmp_path / "mapping.toml").write_text(PLAIN.read_text() + '[columns.depth]\nfrom = "d"\nunit = "cm"\n')
+    assert (import_log(read_mapping(tmp_path / "mapping.toml"), log).frame["depth"] == 12.5).all()
+
+
+def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Path) -> None:
+    """Also where a method goes step by step, and in what is exported."""
+    log = simulate(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
+    windows = cut_windows(Dataset(log, {"clock": "run"}), horizon=5)
+    physics, instants = Physics(depth, horizon=5, step=1.0, integrator="rk4"), windows.instants()
+    deep = Instants({name: values for name, values in instants.columns.items() if name != "depth"})
+    far, near = (np.abs(physics.paths(one) - windows.future).max() for one in (deep, instants))
+    assert near < 0.05 * far
+    motion = {name: instants.columns[name] for name in ("u", "v", "r", "psi")}
+    stepped = free(physics, Stepper(physics, instants).at(0, motion))
+    np.testing.assert_allclose(stepped, free(physics, instants), atol=1e-12)
+    assert np.abs(stepped - free(physics, deep)).max() > 1e-3
+    assert group_of("depth") == "wind"
+    predictor = fit(OneStep(trials=2, units=8), replace(physics, vessel=load_vessel("gunnerus-28.9")), windows)
+    assert "depth" in taken(predictor.corrector).environment
+    assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())
+    few = instants.select(slice(4))
+    expected, given = predictor.predict(few), model(predictor).inputs(few)
+    unknown = Instants({name: values for name, values in few.columns.items() if name != "depth"})
+    with pytest.raises(DataError, match="depth: the method was trained with this input; the data must hold"):
+        predictor.predict(unknown)
+    file, *_ = export_predictor(predictor, "casadi", tmp_path / "shallow.casadi")
+    for i in range(4):
+        path = np.array(ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"])
+        np.testing.assert_allclose(path.T, expected[:, i], atol=1e-9)
 
 
 def read_toy(file: Path, _: readers.Format, __: str) -> pd.DataFrame:

@@ -104,13 +104,18 @@ def test_every_setting_of_a_method_is_listed_with_its_default(kind: str) -> None
     inherited = METHODS[parent].model_fields if parent else {}
     fields = METHODS[kind].model_fields
     of_all = {"budget"} & named(section(page("reference-study-document"), "[method"))  # a row for all methods at once
-    assert set(listed) == {name for name in fields if name not in inherited} - of_all
+    wanted_names = {name for name in fields if name not in inherited} - of_all
+    remedy = f"docs/reference-study-document.md needs a table `| field | `{kind}` | |` with a row for each setting"
+    assert set(listed) == wanted_names, remedy
     for name, text in listed.items():
         default = fields[name].default
         wanted = Memory() if text == "nothing" else tomllib.loads(f"value = {text}")["value"]
         assert (list(default) if isinstance(default, tuple) else default) == wanted, name
-    assert f"`{kind}`" in section(page("reference-study-document"), "[[method]]")
-    assert f"`{kind}`" in page("methods")
+    kinds = re.search(r"^\| `kind` \|.*$", section(page("reference-study-document"), "[[method]]"), re.MULTILINE)
+    assert kinds, "docs/reference-study-document.md, [[method]], has no row `kind`"
+    assert f"`{kind}`" in kinds[0], f"docs/reference-study-document.md, [[method]], row `kind`: {kind} is missing"
+    row = re.search(rf"^\| `{kind}` \|", page("methods"), re.MULTILINE)
+    assert row, f"docs/methods.md: the table at its beginning has no row for {kind}"
 
 
 @pytest.mark.parametrize("kind", KINDS)

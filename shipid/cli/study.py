@@ -110,6 +110,7 @@ def study_variants(
             "A": scores.get(model.name),
             "identified": model.identify is not None,
             "factors": model.variant.factors if model.variant and model.identify is None else {},
+            "from_zero": model.variant.from_zero if model.variant and model.identify is None else {},
         }
         for model in models
     ]
@@ -126,9 +127,14 @@ def _factors(row: dict[str, Any]) -> list[str]:
     """A foundation as words: its accuracy, how many numbers are changed, and by which factors."""
     if row["identified"]:
         return [row["foundation"], "-", "-", "identified from the runs of each cell, so A differs by cell"]
-    changed = ((path.rsplit(".", 1)[-1], factor) for path, factor in row["factors"].items())
-    shown = ", ".join(f"{name} x{factor:.2f}" if factor else f"{name} removed" for name, factor in changed)
-    return [row["foundation"], "-" if row["A"] is None else f"{row['A']:.2f}", str(len(row["factors"])), shown]
+    from shipid.identification.collinearity import short as short_names
+
+    words = [f"x{factor:.2f}" if abs(factor) >= 0.01 else f"x{factor:.2g}" for factor in row["factors"].values()]
+    words = [word if factor else "removed" for word, factor in zip(words, row["factors"].values(), strict=True)]
+    words += [f"{value:g} in place of 0" for value in row["from_zero"].values()]
+    names = short_names([*row["factors"], *row["from_zero"]])
+    shown = ", ".join(f"{name} {word}" for name, word in zip(names, words, strict=True))
+    return [row["foundation"], "-" if row["A"] is None else f"{row['A']:.2f}", str(len(names)), shown]
 
 
 @app.command("screen")
@@ -342,20 +348,26 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         answer.say(f"and {len(rows) - MOST_DIFFERENCES} more: --json shows all")
     banded = bool(errors[["coverage_first", "coverage_other"]].notna().any(axis=None))
     for name, part in errors.groupby("folder", sort=False):
-        answer.say(f"H [m] of {compared.names[0]}, of {name}, and the difference with its 95 % interval:")
+        first = compared.names[0]
+        answer.say(f"H [m] of {first}, of {name}, and the difference, {name} less {first}, with its 95 % interval:")
         heads = [
             "family",
             "method",
             "N_D",
             "cells",
-            compared.names[0],
+            first,
             str(name),
             "difference",
             *["in band"] * banded,
-            "",
+            "verdict",
         ]
         lines = [_difference(row, banded) for row in part.to_dict("records")]
         answer.rows("errors", errors, table(heads, lines))
+        answer.say(
+            f"verdict: lower or higher where the test shows it, corrected for {len(part)} rows; empty: it does not"
+        )
+    if banded:
+        answer.say("in band: share of the test paths that lie whole in the bands of the first and of the other run")
     answer.say("\n".join(compared.notes), notes=compared.notes)
     return errors
 
@@ -364,14 +376,13 @@ def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     """One row of a comparison as words."""
     interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if row["low"] == row["low"] else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
-    inside = " ".join(
-        "-" if share != share else f"{share:.0%}" for share in (row["coverage_first"], row["coverage_other"])
-    )
+    shares = row["coverage_first"], row["coverage_other"]
+    inside = ", ".join("-" if share != share else f"{share:.0%}" for share in shares)
     return [
         *(row["family"], row["method"], amount, str(row["cells"])),
         *(f"{row[side]:.3f}" for side in ("first", "other")),
         f"{row['difference']:+.3f}{interval}",
-        *[inside] * banded,
+        *["" if inside == "-, -" else inside] * banded,
         row["verdict"],
     ]
 

@@ -72,8 +72,10 @@ def vessel_new(
     out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
     speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
     rpm: Annotated[float | None, typer.Option(help="of the screw at that speed; default: a guess")] = None,
-    propulsor: Annotated[str, typer.Option(help="propeller-rudder or azimuth")] = "propeller-rudder",
-    shafts: Annotated[int | None, typer.Option(help="1 or 2; default: 1, of azimuth units 2")] = None,
+    propulsor: Annotated[
+        str, typer.Option(help="propeller-rudder, azimuth, or differential: two screws")
+    ] = "propeller-rudder",
+    shafts: Annotated[int | None, typer.Option(help="1 or 2; default: 1 with a rudder, else 2")] = None,
     propeller_diameter: Annotated[float | None, typer.Option(help="m; default: a guess")] = None,
     rudder_area: Annotated[float | None, typer.Option(help="m^2, of each rudder; default: a guess")] = None,
     rudder_span: Annotated[float | None, typer.Option(help="m, its height; default: a guess")] = None,
@@ -119,7 +121,7 @@ def vessel_new(
             answer.say(f"course-UNSTABLE by these formulae: {grows}", growth=guessed.growth)
         judged, notes = trials(guessed.vessel, given.service)
         answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
-        answer.rows("criteria", judged, criterion_table(judged, []))
+        answer.rows("criteria", judged, criterion_table(judged, []) if judged else None)
         answer.say("\n".join(notes), notes=notes)
 
 

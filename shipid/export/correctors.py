@@ -27,6 +27,7 @@ from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
 from shipid.hybrid.stepping import LIMIT
 from shipid.hybrid.units import Units
+from shipid.physics.signals import measurable, plain_inputs
 
 Array = np.ndarray
 
@@ -39,9 +40,10 @@ class Taken:
     names: tuple[str, ...]
 
     @property
-    def wind(self) -> bool:
-        """Whether it takes the relative wind."""
-        return any(name.endswith("_rw") for name in self.names)
+    def environment(self) -> tuple[str, ...]:
+        """Channels of the environment that it takes: those of the relative wind, and others as they are."""
+        wind = ("V_w", "beta_w") if any(name.endswith("_rw") for name in self.names) else ()
+        return (*wind, *plain_inputs(self.names))
 
 
 def z_score(normaliser: Normaliser) -> Formula:
@@ -231,7 +233,7 @@ def stepped(
     every, rows = names.commands, names.horizon
     commands = known.rows("planned", every, 0, rows) if names.planned else graph.pack(*[known.of("now", every)] * rows)
     each = [commands, _reached(known, known.values["reached"], None)]
-    weather = [name for name in names.now if name in ("V_w", "beta_w")]
+    weather = measurable(names.now)
     fixed = [known.of("now", weather), known.of("now", ["psi"]), known.values["parameters"]]
     records = graph.scan(body, graph.pack(*start), each, fixed, rows)
     size = body.size
@@ -259,7 +261,7 @@ def one_more_step(
     carry = graph.input("carry", 6 + num_kept)
     commands = graph.input("commands", len(names.commands))
     reached = graph.input("reached", len(names.reached))
-    weather = graph.input("weather", sum(name in ("V_w", "beta_w") for name in names.now))
+    weather = graph.input("weather", len(measurable(names.now)))
     first = graph.input("psi0", 1)
     parameters = graph.input("parameters", len(names.parameters))
     at = {"carry": carry, "commands": commands, "reached": reached, "weather": weather, "parameters": parameters}
@@ -318,7 +320,7 @@ def _free(
 
     state = graph.pack(*(entry(name) for name in (*model.state, *model.hidden)))
     memory = [at["reached"][names.reached.index(name)] for name in model.memory]
-    weather = [name for name in names.now if name in ("V_w", "beta_w")]
+    weather = measurable(names.now)
     environment = [
         at["weather"][weather.index(name)] if name in weather else entry("none") for name in model.environment
     ]
@@ -349,7 +351,7 @@ def _features(graph: Graph, known: Known, at: Mapping[str, Value], commands: tup
               more: Mapping[str, SX] | None = None, kept: tuple[SX, Value] | None = None) -> Value:  # fmt: skip
     """Inputs of a method at the start of a step; `more` are expressions of what is kept."""
     names = known.names
-    weather = [name for name in names.now if name in ("V_w", "beta_w")]
+    weather = measurable(names.now)
     carry, orders = SX.sym("carry", 6), SX.sym("commands", len(names.commands))
     wind = SX.sym("weather", len(weather))
     now = dict(zip((*MOTIONS, "psi"), ca.vertsplit(carry)[:4], strict=True))
@@ -498,7 +500,7 @@ def _missed_before(known: Known, first: int, delays: int) -> Value:
         "carry": carry,
         "commands": body.input("commands", len(names.commands)),
         "reached": body.input("reached", len(model.memory)),
-        "weather": body.input("weather", sum(name in ("V_w", "beta_w") for name in names.now)),
+        "weather": body.input("weather", len(measurable(names.now))),
     }
     parameters = body.input("parameters", len(names.parameters))
     alone_, _ = _free(body, known, known.equations, parameters, at)
@@ -512,7 +514,7 @@ def _missed_before(known: Known, first: int, delays: int) -> Value:
         known.rows("past", names.commands, first, delays),
         reached,
     ]
-    weather = [name for name in names.now if name in ("V_w", "beta_w")]
+    weather = measurable(names.now)
     return graph.map(body, each, [known.of("past", weather, first), known.values["parameters"]], delays)
 
 

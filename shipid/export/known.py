@@ -15,6 +15,7 @@ from shipid.export.equations import Equations, rollout
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, LOW, bank
+from shipid.physics.signals import plain_inputs
 
 SX_of = Mapping[str, SX]
 
@@ -57,13 +58,13 @@ def layout(
     num_past: int,
     *,
     known: bool,
-    wind: bool,
+    environment: Sequence[str],
     limited: Sequence[str] = (),
 ) -> Layout:
     """Inputs that a predictor takes.
 
-    physics : with all terms, also those of a method. commands : that a method takes. wind : whether it takes the
-    relative wind. limited : columns that the alarm looks at.
+    physics : with all terms, also those of a method. commands : that a method takes. environment : channels that
+    it takes. limited : columns that the alarm looks at.
     """
     vessel = physics.vessel
     states: list[str] = []
@@ -76,10 +77,10 @@ def layout(
         memory, taken, weather = tuple(model.memory), model.commands, model.environment
     place = ("north", "east") if physics.observer is not None and physics.path == "position" else ()
     every = tuple(dict.fromkeys((*taken, *commands)))
-    environment = tuple(dict.fromkeys((*weather, *(("V_w", "beta_w") if wind else ()))))
+    channels = tuple(dict.fromkeys((*weather, *environment)))
     others = dict.fromkeys(limited)
-    environment += tuple(name for name in others if name not in (*MOTIONS, *every, *environment))
-    now = (*place, "psi", *MOTIONS, *states, *every, *environment)
+    channels += tuple(name for name in others if name not in (*MOTIONS, *every, *channels))
+    now = (*place, "psi", *MOTIONS, *states, *every, *channels)
     past = tuple(name for name in now if name not in place)
     return Layout(
         now=now,
@@ -367,13 +368,13 @@ def _at_instant(names: Layout, groups: SX_of, inputs: Inputs) -> dict[str, SX]:
 
 
 def feature_table(now: SX_of, commands: Sequence[str]) -> dict[str, SX]:
-    """u, v, r, commands and relative wind, as `shipid.hybrid.features.feature_table`."""
+    """u, v, r, commands, relative wind and other environment, as `shipid.hybrid.features.feature_table`."""
     table = {name: now[name] for name in (*MOTIONS, *commands)}
     if "V_w" in now and "beta_w" in now:
         angle = now["beta_w"] - now["psi"]
         table["u_rw"] = now["u"] - now["V_w"] * ca.cos(angle)
         table["v_rw"] = now["v"] - now["V_w"] * ca.sin(angle)
-    return table
+    return table | {name: now[name] for name in plain_inputs(now)}
 
 
 def _history(names: Layout, groups: SX_of, inputs: Inputs, step: float) -> dict[str, SX]:

@@ -161,7 +161,7 @@ def model(predictor: Exportable) -> Model:
         taken_.commands or _orders(predictor),
         predictor.past,
         known=predictor.commands == "known",
-        wind=taken_.wind,
+        environment=taken_.environment,
         limited=(*predictor.limits, *(() if predictor.bands is None else predictor.bands.names)),
     )
     return Model(predictor, physics, names)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError
-from shipid.hybrid.features import Inputs
+from shipid.errors import ResultError
+from shipid.hybrid.features import Inputs, rows_of
 from shipid.hybrid.physics import Physics
 
 Array = NDArray[np.float64]
@@ -44,8 +44,8 @@ class Normaliser:
         return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
 
     def apply(self, table: Mapping[str, Array]) -> Array:
-        """Return normalised inputs (S, d) of features (S,), selected by name."""
-        return (np.stack([table[name] for name in self.names], axis=1) - self.mean) / self.std
+        """Return normalised inputs (S, d) of features (S,), selected by name; DataError where one is missing."""
+        return (rows_of(table, self.names) - self.mean) / self.std
 
 
 @dataclass(frozen=True)
@@ -100,12 +100,6 @@ class Compensator:
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11) of the instant, from inputs (S,) by name."""
-        for network in self.networks:
-            for name in network.normaliser.names:
-                if name not in table:
-                    raise DataError(
-                        "the compensator was trained with this input; measure wind (V_w, beta_w)", path=name
-                    )
         total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
         return np.asarray(total / len(self.networks))
 

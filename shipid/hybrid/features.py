@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, fie
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
+from shipid.physics.signals import measurable, plain_inputs
 
 Array = NDArray[np.float64]
 MOTIONS = ("u", "v", "r")
@@ -36,7 +37,7 @@ def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) ->
 
 
 def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict[str, Array]:
-    """Return the inputs at the instant: u, v, r, the commands and, where wind was measured, the relative wind.
+    """Return the inputs at the instant: u, v, r, the commands and, where measured, relative wind and other environment.
 
     u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7). What is not measured is no input.
 
@@ -57,7 +58,16 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
         angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
         table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
         table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
-    return table
+    return table | {name: np.asarray(columns[name], dtype=float) for name in plain_inputs(columns)}
+
+
+def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
+    """Inputs (S, d) of a fitted method, by name; DataError where the table lacks one that it was trained with."""
+    missing = next((name for name in names if name not in table), None)
+    if missing is not None:
+        remedy = "measure wind (V_w, beta_w)" if missing.endswith("_rw") else "the data must hold what it is made of"
+        raise DataError(f"the method was trained with this input; {remedy}", path=missing)
+    return np.stack([table[name] for name in names], axis=1)
 
 
 OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
@@ -164,11 +174,11 @@ class Inputs:
 def group_of(name: str) -> str:
     """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.
 
-    A plan is a command; `physics` is a trajectory over the horizon.
+    A plan is a command; `physics` is a trajectory over the horizon, `wind` also other environment.
     """
     if name in MOTIONS:
         return "motion"
-    if name.endswith("_rw"):
+    if name.endswith("_rw") or measurable([name]):
         return "wind"
     kind = re.match(r"(?:.*\.)?(past|turned|error|observer|physics)-", name)
     if kind is None:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError, ShipidError
+from shipid.errors import ResultError, ShipidError
 from shipid.hybrid.compensator import unflatten
-from shipid.hybrid.features import Inputs, Memory, choose_features
+from shipid.hybrid.features import Inputs, Memory, choose_features, rows_of
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
@@ -103,10 +103,7 @@ class ForestCorrector:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         table = self.inputs.table(physics, instants)
-        missing = next((name for name in self.names if name not in table), None)
-        if missing is not None:
-            raise DataError("the method was trained with this input; measure wind (V_w, beta_w)", path=missing)
-        weights = self.trees.predict(np.stack([table[name] for name in self.names], axis=1))
+        weights = self.trees.predict(rows_of(table, self.names))
         return np.asarray(paths + np.tensordot(self.basis, unflatten(weights), 1))
 
     def header(self) -> dict[str, Any]:

@@ -36,10 +36,8 @@ METHODS: dict[str, type[Method]] = {
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
-        hint = choices(kind, METHODS)
-        if "did you mean" not in hint:
-            hint += "; a method that you wrote needs the script that puts it into METHODS"
-        raise DocumentError(f"no such kind of method: {hint}", path=f"{path}.kind")
+        hint = f"{choices(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
+        raise DocumentError(f"{kind!r} is no kind of method: {hint}", path=f"{path}.kind")
     method: Method = parse(METHODS[kind], dict(settings), None, path)
     return method
 

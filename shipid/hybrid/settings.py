@@ -31,7 +31,8 @@ class Span:
 class Searched(Method):
     """A method that tries sets of hyperparameters and keeps the best by validation.
 
-    SEARCHED : names of the settings that may be ranges. COUNTS : whole numbers. LINEAR : not by their logarithm.
+    SEARCHED : names of the settings that may be ranges, searched by their logarithm. LINEAR : those of them that are
+        not, such as a share from 0 to 1. COUNTS : those that are whole numbers.
 
     Parameters
     ----------

@@ -20,10 +20,10 @@ from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
+from shipid.physics.signals import measurable
 
 Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
-KEPT = ("psi", "V_w", "beta_w")  # columns that a step needs beside u, v, r and the commands
 WORTH_COMPILING = 2000  # steps of single samples: below it compiling C costs more than it saves
 LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
@@ -45,7 +45,8 @@ class Stepper:
         if physics.observer is not None:
             raise DataError("steps start from measured states: physics with an observer cannot be corrected by step")
         self.instants = instants
-        self.columns = {name: values for name, values in instants.columns.items() if name in KEPT or "." in name}
+        kept = {"psi", *measurable(instants.columns)}  # what a step needs beside u, v, r and the commands
+        self.columns = {name: values for name, values in instants.columns.items() if name in kept or "." in name}
         self.reached = physics.reached(instants)
 
     def at(self, k: int, motion: Mapping[str, Array]) -> Instants:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from math import exp, log
+from math import ceil, exp, floor, log
 from typing import Any
 
 import numpy as np
@@ -18,17 +18,26 @@ Array = NDArray[np.float64]
 
 
 def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
-    """The trials of a method: a value of everything searched but what is `idle`, evenly spread by the logarithm.
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
-    They never end where a budget says how many are made; there is one where nothing is searched.
+    A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
+    a budget says how many are made; there is one where nothing is searched.
     """
     ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
     most = None if method.budget else method.trials
     for shares in spread(max(len(ranges), 1), most if ranges else 1):
-        logs = {name: (log(low), log(high)) for name, (low, high) in ranges.items()}
-        point = {n: exp(a + s * (b - a)) for s, (n, (a, b)) in zip(shares[: len(ranges)], logs.items(), strict=True)}
+        point = {name: _within(method, name, share) for share, name in zip(shares, ranges, strict=False)}
         yield {**fixed, **point}
+
+
+def _within(method: Searched, name: str, share: float) -> float:
+    """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
+    low, high = method.ranges()[name]
+    if name in method.LINEAR:
+        return low + share * (high - low)
+    value = exp(log(low) + share * (log(high) - log(low)))
+    return float(min(max(round(value), ceil(low)), floor(high))) if name in method.COUNTS else value
 
 
 def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:

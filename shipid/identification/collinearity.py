@@ -53,8 +53,12 @@ class Combination:
 
 
 def short(paths: Sequence[str]) -> tuple[str, ...]:
-    """Short names: the last part of each dotted path where that is unique, else the whole path."""
-    last = [path.rsplit(".", 1)[-1] for path in paths]
+    """Short names: the last part of each dotted path, with the one before it where it is one letter (`K_T.J`).
+
+    Where that is not unique it is the whole path.
+    """
+    parts = [path.split(".") for path in paths]
+    last = [".".join(part[-1 if len(part[-1]) > 1 else -2 :]) for part in parts]
     return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
 

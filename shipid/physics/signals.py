@@ -286,6 +286,17 @@ def named(role: Role) -> dict[str, Signal]:
     return {name: row for name, row in SIGNALS.items() if row.role == role}
 
 
+def measurable(names: Iterable[str]) -> list[str]:
+    """Signals of the environment among some names that a dataset may hold: wind, but no current."""
+    rows = ((name, SIGNALS.get(name)) for name in names)
+    return [name for name, row in rows if row is not None and row.role == "environment" and row.column != "none"]
+
+
+def plain_inputs(names: Iterable[str]) -> list[str]:
+    """Those of them that are an input of a method as they are: no direction, and not the wind, which is relative."""
+    return [name for name in measurable(names) if not SIGNALS[name].angle and name != "V_w"]
+
+
 def is_command(name: str) -> bool:
     """Whether a name is that of a command, `<component>.<signal>`."""
     return _is_of_component(name, "command")

@@ -115,17 +115,20 @@ def first_order_advance(
     dt: SX,
     *,
     T: Annotated[SX, "s", POSITIVE],
-    rate: Annotated[SX, "1/s of the command", POSITIVE],
+    rate: Annotated[SX | float, "1/s of the command", POSITIVE] = UNLIMITED,
     low: Annotated[SX | float, "of the command"] = -UNLIMITED,
     high: Annotated[SX | float, "of the command"] = UNLIMITED,
 ) -> SX:
     """First-order lag over dt [s], solved exactly: a+ = c + (a - c) exp(-dt / T), the change limited to rate x dt.
 
-    T [s] time constant, rate in the command's unit per second. Exact for a held command while the limit does not
-    bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the state a are kept within low and high.
+    T [s] time constant, rate in the command's unit per second; without it the lag alone slows the actuator. Exact for a
+    held command while the limit does not bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the
+    state a are kept within low and high.
     """
     reached = bounded(state, low, high)
     change = (bounded(command, low, high) - reached) * (1 - ca.exp(-dt / T))
+    if not given(rate, UNLIMITED):
+        return reached + change
     return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
 
 

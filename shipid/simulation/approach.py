@@ -40,10 +40,10 @@ WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 class Controls:
     """The effect of a vessel's commands; computed from the equations at first use.
 
-    drives : shaft speed commands that push the vessel ahead.
-    helm : angle command -> +1 or -1, the sign that turns the ship to starboard; angles without effect are left out.
-
-    Both raise DocumentError for a vessel without a command that drives it ahead or turns it.
+    drives : shaft speed commands that push the vessel ahead; DocumentError where there is none.
+    helm : angle command -> +1 or -1, the sign that turns the ship to starboard; angles without effect are left out;
+        DocumentError where no angle turns the vessel.
+    differential : whether no angle turns the vessel, but the difference of shafts that drive it does.
     """
 
     vessel: Vessel
@@ -68,12 +68,28 @@ class Controls:
     @property
     def helm(self) -> Mapping[str, float]:
         """Angle command -> sign that turns the ship to starboard."""
+        if not self._effects[1]:
+            what = ": a manoeuvre needs that of a rudder or an azimuth unit"
+            if self.differential:
+                what = f", its shafts do: the kinds `turning` and `steps` order each one ({self.drives[0]}_rpm)"
+            message = f"no angle command turns {self.vessel.name}{what}"
+            raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._effects[1]
 
+    @property
+    def differential(self) -> bool:
+        """Whether no angle turns the vessel, but the difference of two shafts that drive it ahead does."""
+        return not self._effects[1] and {1.0, -1.0} <= set(self._effects[2])
+
     @cached_property
-    def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float]]:
+    def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float], tuple[float, ...]]:
         vessel, commands = self.vessel, self.commands
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
+        if not np.isfinite(idle).all():
+            weather = ", ".join(dynamics(vessel).environment)
+            zeros = f" and {weather} 0, as where nobody gives them" if weather else ""
+            message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
+            raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
@@ -84,10 +100,15 @@ class Controls:
             if steers(name)
         }
         helm = {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
-        if not drives or not helm:
-            message = f"no command {'turns' if drives else 'drives'} {vessel.name}: a manoeuvre needs `n` and an angle"
+        if not drives:
+            message = f"no command drives {vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
             raise DocumentError(message, file=vessel.file, path="thruster")
-        return drives, helm
+        yaw = [ahead[name][2] - idle[2] for name in drives]
+        return drives, helm, tuple(float(np.sign(change)) for change in yaw if abs(change) > NOTHING)
+
+    def ahead(self, n: float) -> dict[str, float]:
+        """Every command on a straight course: the shafts that drive her at n [rev/s], all else neutral."""
+        return {name: n if name in self.drives else neutral(name) for name in self.commands}
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""

@@ -62,7 +62,7 @@ class Draw(BaseModel):
             if key in fields and key != "orders":
                 given[key] = value if takes_many(fields[key]) else _drawn(key, value, at)
             elif level is not None and key not in SHARED:
-                orders[key] = _range(key, value) if takes_many(level) else _drawn(key, value, at)
+                orders[key] = limits(key, value) if takes_many(level) else _drawn(key, value, at)
             else:
                 remedy = "[truth] gives it for all runs" if key in SHARED else choices(key, fields)
                 raise ValueError(f"{key}: no key of {self.kind}: {remedy}")
@@ -106,7 +106,7 @@ def _drawn(key: str, value: Any, at: At) -> Any:
         return value
     if value and all(isinstance(one, str) for one in value):
         return value[min(int(at(key) * len(value)), len(value) - 1)]
-    low, high = _range(key, value)
+    low, high = limits(key, value)
     return _between(low, high, at("psi" if key == COURSE else _quantity(key)))
 
 
@@ -119,7 +119,7 @@ def _between(low: float, high: float, place: float) -> float:
     return low + (high - low) * place
 
 
-def _range(key: str, value: Any) -> tuple[float, float]:
+def limits(key: str, value: Any) -> tuple[float, float]:
     """(low, high) of a pair; (x, x) of a number x; ValueError for anything else."""
     pair = value if isinstance(value, list | tuple) else [value, value]
     if len(pair) != 2 or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair):

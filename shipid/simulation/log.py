@@ -9,9 +9,6 @@ import numpy as np
 
 from shipid.engine.rollout import Trajectories
 
-ON_BOARD = ("V_w", "beta_w")
-"""Environment channels that are logged; current and waves are not."""
-
 
 def logged(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Log columns of the first variant, column -> (R, S); u, v [m/s] and r [rad/s] in the horizontal plane."""

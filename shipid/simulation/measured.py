@@ -123,16 +123,16 @@ def approached(chosen: Standard) -> str:
 def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
     """Criteria of IMO MSC.137(76) for a turn at 35 deg of helm and zigzags 10/10 and 20/20, one dict for each.
 
-    Also a sentence for each manoeuvre that this vessel cannot perform. `speed` [m/s] is that of the approach.
+    Also why this vessel cannot perform some of them, one sentence a reason. `speed` [m/s] is that of the approach.
     """
     rows: list[dict[str, Any]] = []
-    notes = []
+    refused: dict[str, list[str]] = {}
     for name, angles in TRIALS:
         try:
             rows += measure_standard(vessel, name, angles, speed=speed).criteria
         except ShipidError as error:
-            notes.append(f"{name} {'/'.join(f'{angle:g}' for angle in angles)}: {error.message}")
-    return rows, notes
+            refused.setdefault(error.message, []).append(f"{name} {'/'.join(f'{angle:g}' for angle in angles)}")
+    return rows, [f"{', '.join(names)}: {message}" for message, names in refused.items()]
 
 
 def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:

@@ -15,8 +15,9 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
+from shipid.physics.signals import measurable
 from shipid.simulation.approach import Controls, steady
-from shipid.simulation.log import ON_BOARD, logged, run_names
+from shipid.simulation.log import logged, run_names
 from shipid.simulation.manoeuvre import Approached, Manoeuvre
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
@@ -166,7 +167,7 @@ def _together(
         log |= {name: shown[name] for name in outputs}
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}
-    return log | {name: values for name, values in felt.items() if name in ON_BOARD}
+    return log | {name: felt[name] for name in measurable(felt)}
 
 
 def _held(commands: Mapping[str, Array]) -> dict[str, Array]:

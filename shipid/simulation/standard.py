@@ -134,8 +134,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
         raise ShipidError(f"{speed:g} m/s: the speed of the approach must be positive", path="--speed")
 
     def surplus(n: float) -> float:
-        orders = controls.orders(np.full(1, n), np.zeros(1))
-        return float(acceleration(controls.vessel, speed, {key: float(value[0]) for key, value in orders.items()})[0])
+        return float(acceleration(controls.vessel, speed, controls.ahead(n))[0])
 
     low, high = 0.0, 1.0
     while surplus(high) < 0:

@@ -11,13 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.document import Checked
 from shipid.errors import DocumentError, ShipidError, choices
-from shipid.physics.signals import is_output
+from shipid.physics.signals import is_output, measurable
 from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
-from shipid.simulation.draw import Draw
+from shipid.simulation.draw import Draw, limits
 from shipid.simulation.gusts import Gusts
-from shipid.simulation.log import ON_BOARD, column_of
-from shipid.simulation.manoeuvre import Manoeuvre
+from shipid.simulation.log import column_of
+from shipid.simulation.manoeuvre import Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform
 from shipid.simulation.sea import Sea, draw_components, share_outside, table_range, wave_loads
 from shipid.simulation.sensors import Sensor, measure
@@ -29,6 +29,7 @@ from shipid.vessel.perturb import uniform
 Array = np.ndarray
 NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
+WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 MOVED = ("n_rpm", "alpha_deg", "start_speed", "actuators_at")  # keys of a manoeuvre
 
 
@@ -53,6 +54,10 @@ class Truth(Checked, BaseModel):
     gusts: Gusts | None = None
     waves: Sea | None = None
     current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
+    environment: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(
+        default={},
+        description="other signals of the environment: signal with its unit -> value or [low, high]",
+    )
     sensors: dict[str, Sensor] = Field(
         default={}, description="logged column -> sensor model; an output (propeller.thrust) is logged where it has one"
     )
@@ -75,6 +80,8 @@ class Truth(Checked, BaseModel):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"{name} has low > high: give [low, high], not [{low:g}, {high:g}]")
+        for name, value in self.environment.items():
+            limits(f"environment.{name}", value)
         return self
 
     @property
@@ -99,8 +106,9 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
         raise DocumentError(f"{truth.vessel} has no [current]: set it, or no current", path="truth.current_speed")
     if truth.gusts is not None and "V_w" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
+    _check_environment(truth, vessel)
     columns = [column_of(name) for name in model.state]
-    columns += [*model.commands, *(name for name in ON_BOARD if name in model.environment), *model.outputs]
+    columns += [*model.commands, *measurable(model.environment), *model.outputs]
     unknown = next((name for name in truth.sensors if name not in columns), None)
     controls = Controls(vessel)
     for place, block in enumerate(truth.manoeuvre):
@@ -110,6 +118,25 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
             raise DocumentError(error.message, path=_in_block(error.path, place)) from None
     if unknown is not None:
         raise DocumentError(f"no logged column: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
+
+
+def _further(vessel: Vessel) -> dict[str, str]:
+    """Signal -> key in `[truth.environment]`, of what a vessel feels and no other key of the block gives."""
+    return {name: order_keys(name)[1] for name in dynamics(vessel).environment if name not in WEATHER}
+
+
+def _check_environment(truth: Truth, vessel: Vessel) -> None:
+    """Raise DocumentError for a key that the vessel does not feel, or a signal that it feels without a key."""
+    keys, path = _further(vessel), "truth.environment"
+    unknown = next((key for key in truth.environment if key not in keys.values()), None)
+    if unknown is not None:
+        remedy = choices(unknown, keys.values()) if keys else "remove it"
+        message = f"no term of {truth.vessel} takes it, or another key of [truth] gives it: {remedy}"
+        raise DocumentError(message, path=f"{path}.{unknown}")
+    missing = next((name for name, key in keys.items() if key not in truth.environment), None)
+    if missing is not None:
+        message = f"missing: {truth.vessel} takes {missing}, give {keys[missing]} = [low, high]"
+        raise DocumentError(message, path=f"{path}.{keys[missing]}")
 
 
 def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
@@ -138,7 +165,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     diverges.
     """
     check_truth(truth, vessel)
-    environment, chi = _weather(truth, dynamics(vessel).environment)
+    environment, chi = _weather(truth, vessel)
     keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]
     if truth.gusts is not None and "V_w" in environment:
         instants = np.arange(round(truth.length / truth.step) + 1, dtype=float)
@@ -176,8 +203,8 @@ def draw_manoeuvres(truth: Truth) -> list[Manoeuvre]:
     return result
 
 
-def _weather(truth: Truth, names: tuple[str, ...]) -> tuple[dict[str, Array], Array]:
-    """Channel -> (manoeuvres,) [SI] for the channels `names`, and the wave directions (manoeuvres,) [rad, towards]."""
+def _weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array]:
+    """What the vessel feels, channel -> (manoeuvres,) [SI], and the wave directions (manoeuvres,) [rad, towards]."""
 
     def between(quantity: str, limits: tuple[float, float], unit: float = 1.0) -> Array:
         low, high = limits
@@ -185,10 +212,14 @@ def _weather(truth: Truth, names: tuple[str, ...]) -> tuple[dict[str, Array], Ar
         return np.asarray((low + (high - low) * np.array(draws)) * unit)
 
     around = (0.0, 360.0)
-    weather = {
+    further = {
+        name: between(name, limits(key, truth.environment[key]), order_unit(name))
+        for name, key in _further(vessel).items()
+    }
+    weather = further | {
         "V_w": between("V_w", truth.wind_speed),
         "beta_w": between("beta_w", around, DEGREE),
         "V_c": between("V_c", truth.current_speed),
         "beta_c": between("beta_c", around, DEGREE),
     }
-    return {name: weather[name] for name in names}, between("chi", around, DEGREE)
+    return {name: weather[name] for name in dynamics(vessel).environment}, between("chi", around, DEGREE)

@@ -31,6 +31,7 @@ ALONE = "alone"
 """Method of the rows of A, which no data improve; their N_D is 0."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
 GROUP = ["family", "method", "N_D"]
+GRID = {"N_D": "grid.N_D", "seed": "grid.seeds"}  # what two runs must share: key -> where the study says it
 MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 
 
@@ -130,9 +131,10 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
         )
     both = mine.merge(theirs, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
     if not (both["N_D"] > 0).any():
+        remedy = _remedy(first, other, bool((theirs["N_D"] > 0).any()))
         raise ShipidError(
             f"no cell of {other.folder} matches one of {first.folder}: {_spans(first)}; there: {_spans(other)}; "
-            "name counterparts by --pair FIRST=OTHER",
+            f"{remedy}"
         )
     here, there, paired, words = _windows(first, other)
     notes += words
@@ -192,6 +194,18 @@ def _counterparts(here: pd.Series, there: pd.Series, pairs: Mapping[str, str]) -
     lonely = [f"{what} {', '.join(names)}" for what, names in (("only the first has", left), ("only this has", over))
               if names]  # fmt: skip
     return matched, ["; ".join(lonely)] if lonely else []
+
+
+def _remedy(first: Results, other: Results, named: bool) -> str:
+    """What would make cells of two runs match; `named`: whether families and methods have their counterparts."""
+    remedies = [] if named else ["name counterparts by --pair FIRST=OTHER"]
+    for key, path in GRID.items():
+        cells = [_cells(results) for results in (first, other)]
+        wanted, there = (set(map(int, each.loc[each["N_D"] > 0, key])) for each in cells)
+        if not wanted & there:
+            values = ",".join(map(str, sorted(wanted)))
+            remedies.append(f"they have no {key} in common, run the other study with --set {path}=[{values}]")
+    return "; ".join(remedies) or "name counterparts by --pair FIRST=OTHER"
 
 
 def _spans(results: Results) -> str:

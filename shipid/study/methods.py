@@ -10,6 +10,7 @@ import pandas as pd
 from scipy import stats
 
 from shipid.metrics import over_time, position_error
+from shipid.study.evidence import contrasts
 from shipid.study.memory import paired_interval
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
@@ -18,17 +19,27 @@ EVERY = "with physics"  # all families but pure data-driven
 CONFIDENCE = 0.95
 LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
-    *("condition", "family", "N_D", "method", "cells", "failed", "H", "H_90", "end", "seconds", "trials"),
+    *("condition", "family", "N_D", "method", "cells", "failed"),
+    *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
 ]
+
+
+def compare_methods(results: Results) -> pd.DataFrame:
+    """Compare the methods of a run: a row per family, N_D and method, in the columns of `compared`.
+
+    The family `with physics` is the mean over all families but `none`. The difference is that to the method by which
+    the study judges. To choose the lowest H of a test chooses by the test: the interval does not count that.
+    """
+    return compared(method_cells(results), results.plan.judged)
 
 
 def methods_frame(results: Results) -> pd.DataFrame:
     """Compare the methods of one run, see `compared`; no rows where fewer than two learn from data."""
     if sum(way.method.compensates for way in results.plan.methods) < 2:
         return pd.DataFrame(columns=COLUMNS)
-    return compared(method_cells(results), results.plan.judged)
+    return compare_methods(results)
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
@@ -57,11 +68,12 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others. `difference` is H less that of the method `reference` over the `pairs` of cells in which both have one,
-    with a 95 % interval `low`, `high` by a bootstrap over test runs: all windows and cells of a run, in its world, are
-    drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
-    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family `with physics` is all of
-    them but `none`.
+    the others. `H_low`, `H_high`: 95 % interval of H over test runs, without what another training would give; not a
+    number with fewer than five. `difference` is H less that of the method `reference` over the `pairs` of cells in
+    which both have one, with a 95 % interval `low`, `high` by a bootstrap over test runs: all windows and cells of a
+    run, in its world, are drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the
+    difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family
+    `with physics` is all of them but `none`.
     """
     frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -74,7 +86,8 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row |= {"cells": len(mine), "failed": len(mine) - len(good), "reference": reference}
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            rows.append(row | _difference(_by_key(mine), theirs))
+            errors = _by_key(mine)
+            rows.append(row | _interval(errors) | _difference(errors, theirs))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -83,16 +96,35 @@ def _by_key(cells: pd.DataFrame) -> dict[tuple[str, str, int], Mapping[str, Any]
     return {(row["world"], row["foundation"], row["seed"]): {str(k): v for k, v in row.items()} for row in good}
 
 
+def _interval(mine: Mapping[Any, Mapping[str, Any]]) -> dict[str, float]:
+    """95 % interval of the mean error over test runs, each drawn with all its windows and cells."""
+    if not mine:
+        return {"H_low": np.nan, "H_high": np.nan}
+    sums, counts = _by_run({key: (cell["sums"], cell["counts"]) for key, cell in mine.items()})
+    values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
+    judged = contrasts((values / weights)[None, :], weights)
+    return {"H_low": float(judged.low[0]), "H_high": float(judged.high[0])}
+
+
+def _by_run(
+    cells: Mapping[tuple[str, str, int], tuple[Mapping[str, float], Mapping[str, int]]],
+) -> tuple[dict[tuple[str, str], float], dict[tuple[str, str], int]]:
+    """Sums and counts of cells added up: (world, test run) -> sum [m], and -> number of windows."""
+    sums: dict[tuple[str, str], float] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for (world, *_), (added, windows) in cells.items():
+        for run, count in windows.items():
+            place = world, run
+            sums[place] = sums.get(place, 0.0) + added[run]
+            counts[place] = counts.get(place, 0) + count
+    return sums, counts
+
+
 def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapping[str, Any]]) -> dict[str, Any]:
     """Difference of H over the cells that both have, its intervals, over test runs and over worlds."""
     keys = [key for key in mine if key in theirs]
-    sums: dict[tuple[str, str], float] = {}
-    counts: dict[tuple[str, str], int] = {}
-    for key in keys:
-        for run, count in mine[key]["counts"].items():
-            place = key[0], run
-            sums[place] = sums.get(place, 0.0) + mine[key]["sums"][run] - theirs[key]["sums"][run]
-            counts[place] = counts.get(place, 0) + count
+    less = {key: {run: mine[key]["sums"][run] - theirs[key]["sums"][run] for run in mine[key]["sums"]} for key in keys}
+    sums, counts = _by_run({key: (less[key], mine[key]["counts"]) for key in keys})
     blank = dict.fromkeys(("difference", "low", "high", "least", "greatest", "world_low", "world_high"), np.nan)
     row = {**blank, "pairs": len(keys), "runs": len(sums), "better": 0, "worlds": 0}
     if not keys:

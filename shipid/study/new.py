@@ -428,7 +428,10 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     if length is None:
         raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
     service = service_speed(vessel)
-    rpm = shaft_speed(Controls.of(vessel), service) / RPM
+    controls = Controls(vessel)
+    if not controls.differential:
+        _ = controls.helm  # DocumentError where nothing turns the ship
+    rpm = shaft_speed(controls, service) / RPM
     speed = 0.75 * service
     horizon, why = horizon_of(length, speed, [np.inf])
     step = step_of(horizon, 0.0)
@@ -443,7 +446,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
             f"{round(horizon / step) * step:g} s?",
         ),
         Choice("description", f"simulated: {vessel.name} as it is makes the truth, and degraded models predict it"),
-        *_truth(named, vessel, service, rpm, horizon, step, past),
+        *_truth(named, controls, service, rpm, horizon, step, past),
         Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
     ]
@@ -486,11 +489,11 @@ def _method(length: float | None, step: float, spare: float) -> Choice:
 
 
 def _truth(
-    named: str, vessel: Vessel, service: float, rpm: float, horizon: float, step: float, past: float
+    named: str, controls: Controls, service: float, rpm: float, horizon: float, step: float, past: float
 ) -> Iterator[Choice]:
+    vessel = controls.vessel
     length = length_of(vessel) or 0.0
     fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
-    low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
     yield Choice("truth.vessel", named)
     yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")
     if past:
@@ -501,15 +504,26 @@ def _truth(
     weather = dynamics(vessel).environment
     if "V_w" in weather:
         yield Choice("truth.wind_speed", [0.0, 6.0], "m/s, from anywhere: up to a moderate breeze")
+    yield _turning(controls, service, rpm)
+
+
+def _turning(controls: Controls, service: float, rpm: float) -> Choice:
+    """Turns with constant orders; shafts that steer by their difference are ordered apart."""
+    low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
     orders = {}
-    for name in dynamics(vessel).commands:
+    for name in controls.commands:
         row = SIGNALS[signal_of(name)]
         usual = [value / row.factor for value in row.usual]
         limits = [low, high] if is_shaft(name) else [-HELM_DEG, HELM_DEG] if steers(name) else usual
-        orders[order_keys(name)[1]] = limits
+        single, common = order_keys(name)
+        if controls.differential and name in controls.drives:
+            orders[single] = [0.0, high]
+        else:
+            orders[common] = limits
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
-    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, and hard over either way"
-    yield Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
+    turned = "each shaft apart: their difference turns her" if controls.differential else "and hard over either way"
+    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, {turned}"
+    return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
 
 def _degraded(named: str, vessel: Vessel) -> list[Any]:

@@ -16,7 +16,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tomlkit
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PrivateAttr,
+    create_model,
+    model_validator,
+)
 
 from shipid import document as documents
 from shipid.errors import DocumentError, choices
@@ -52,6 +61,12 @@ class Rule:
     note: str = ""
 
 
+WITHOUT = (
+    "a family changes numbers only; for a model without the term write a vessel that `extends` this one, with "
+    "`off = true` in the block, and name it as `base`"
+)
+
+
 def _removed(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
     return dict.fromkeys(select(patterns, base.parameters, file, where))
 
@@ -59,7 +74,9 @@ def _removed(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[s
 def _set(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
     unknown = next((path for path in values if path not in base.parameters), None)
     if unknown is not None:
-        message = f"{base.key} has no parameter {unknown!r}: {choices(unknown, base.parameters)}"
+        switch = unknown.rpartition(".")[2] in ("off", "kind")
+        hint = WITHOUT if switch else choices(unknown, base.parameters)
+        message = f"{base.key} has no parameter {unknown!r}: {hint}"
         raise DocumentError(message, file=file, path=where)
     return values
 
@@ -178,6 +195,7 @@ class Family(documents.Checked, BaseModel):
     identify: dict[str, Any] | None = Field(
         default=None, description="numbers identified from the training runs of each batch: an [identify] block"
     )
+    _inherited: int = PrivateAttr(default=0)  # how many blocks of `perturb` come from the family that it extends
 
 
 @dataclass(frozen=True)
@@ -203,6 +221,11 @@ class Variant:
     def parameters(self) -> list[float]:
         """Values of all parameters in the order of the base vessel's."""
         return [self.values.get(path, value) for path, value in self.base_parameters.items()]
+
+    @property
+    def from_zero(self) -> dict[str, float]:
+        """Dotted path -> new value of what was 0 on the base, and so has no factor."""
+        return {path: value for path, value in self.values.items() if path not in self.factors and value != 0}
 
     def document(self) -> str:
         """The patch as TOML: `load_vessel` on it rebuilds the variant exactly."""
@@ -240,18 +263,21 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
         base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
+        inherited = 0
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = choices(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
-            base, perturb = base or parent.base, [*parent.perturb, *perturb]
+            base, perturb, inherited = base or parent.base, [*parent.perturb, *perturb], len(parent.perturb)
             identify = parent.identify if identify is None else identify
             observer = parent.observer if observer is None else observer
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
         changes = {"base": base, "perturb": perturb, "identify": identify, "observer": observer, "extends": None}
-        return family.model_copy(update=changes)
+        resolved = family.model_copy(update=changes)
+        resolved._inherited = inherited
+        return resolved
 
     return [written_out(family, ()) for family in families]
 
@@ -288,8 +314,9 @@ class _Change:
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
     original, times, result = base.parameters, dict[str, int](), []
-    for index, block in enumerate(family.perturb):
-        where = f"family.{family.name}.perturb.{index}"
+    for index, block in enumerate(family.perturb, start=-family._inherited):
+        place = f"perturb.{index}" if index >= 0 else f"extends.perturb.{index + family._inherited}"
+        where = f"family.{family.name}.{place}"
         for key, argument in block.given.items():
             rule = RULES[key]
             if rule.places is not None:
@@ -329,6 +356,8 @@ def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float
         base.with_values(values)
     except DocumentError as error:
         message = f"member {member + 1} would not be a valid vessel: {error.path}: {error.message}"
+        if values.get(error.path or "") == 0:
+            message = f"{message}: {WITHOUT}"
         raise DocumentError(message, file=file, path=f"family.{family.name}") from None
 
 

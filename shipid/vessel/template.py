@@ -35,7 +35,7 @@ from shipid.vessel.regressions import (
 RHO_SEA, RHO_FRESH, RHO_AIR, G = 1025.0, 1000.0, 1.225, 9.81  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
 LEAST_YAW = 0.005  # of Clarke's N_rdot: a tenth of what ships have
-PROPULSORS = ("propeller-rudder", "azimuth")
+PROPULSORS = ("propeller-rudder", "azimuth", "differential")
 MODEL, TYPICAL = 10.0, 160.0  # m: a shorter ship is taken for a model of one as long as the second number
 STEERING = 65 / 28  # deg/s: 35 deg on one side to 30 on the other in 28 s, SOLAS II-1/29
 AZIMUTHING = 12.0  # deg/s: two turns a minute
@@ -65,7 +65,8 @@ class Particulars:
 
     length, beam, draught : [m], length between perpendiculars. block : block coefficient [-].
     speed : service speed [m/s]. rpm : shaft speed of the screw at that speed [rpm].
-    propulsor : `propeller-rudder` or `azimuth`. shafts : 1 or 2 of them; default 1, of azimuth units 2.
+    propulsor : `propeller-rudder`, `azimuth` or `differential`, two screws without a rudder.
+    shafts : 1 or 2 of them; default 1 with a rudder, else 2.
     propeller_diameter : [m]. rudder_area, rudder_span : of each rudder [m^2, m].
     rudder_rate : of the steering gear, of azimuth units how fast they turn [deg/s].
     tunnel_thruster : whether a tunnel thruster is at the bow.
@@ -106,7 +107,7 @@ class Particulars:
     @property
     def units(self) -> int:
         """Number of screws."""
-        return self.shafts or (2 if self.propulsor == "azimuth" else 1)
+        return self.shafts or (1 if self.propulsor == "propeller-rudder" else 2)
 
     @property
     def reduction(self) -> float:
@@ -191,6 +192,10 @@ def _check(given: Particulars) -> None:
     """ShipidError for particulars outside the range of the formulae."""
     if given.propulsor not in PROPULSORS:
         raise ShipidError(f"propulsor {given.propulsor!r}: {choices(given.propulsor, PROPULSORS)}")
+    if given.propulsor == "differential" and given.units != 2:
+        raise ShipidError(
+            "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
+        )
     if given.ship_type not in WIND:
         raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
     for what, value, low, high in _ranges(given):
@@ -597,6 +602,8 @@ def _thrusters(given: Particulars) -> Iterator[str]:
             continue
         behind = name or "propeller"
         yield from _block(f"thruster.{behind}", propeller(given, side), kind="propeller")
+        if given.propulsor == "differential":
+            continue
         words = {"kind": "rudder", "behind": behind, f"actuator.{steered}.kind": "first_order"}
         yield from _block(f"thruster.{name and f'{name}_'}rudder", rudder(given, side), **words)
 

@@ -31,6 +31,12 @@ def test_studies_and_variants(study: Path) -> None:
     assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
     text = output_of("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
     assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
+    moved = [
+        "--set",
+        'family.0.perturb=[{set={"inertia.x_G"=2.5}},{parameters=["wind.A_FW","inertia.m"],factor=0.9},{parameters=["wind.A_FW"],factor=0.01}]',
+    ]
+    text = output_of("study", "variants", study, "--no-accuracy", "--set", 'unusual=["*"]', *moved)
+    assert re.search(r"^ *right +- +3 +inertia.m x0.90, A_FW x0.009, x_G 2.5 in place of 0", text, re.MULTILINE), text
 
 
 def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:

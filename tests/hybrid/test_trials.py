@@ -1,14 +1,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from pydantic import PositiveInt
 
 from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.journal import distributions, frozen
 from shipid.hybrid.method import Fitted
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
+from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.trials import (
     diverged,
     fit_each,
@@ -31,6 +35,35 @@ def task(**options):
     rng = np.random.default_rng(4)
     targets = {name: rng.normal(size=(5, 12, 2)) for name in ("one", "other")}
     return task_of(RUNS, (), targets, FOLDS, 0, **options)
+
+
+class Counting(Searched):
+    """Whole numbers, shares, and a number by its logarithm."""
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("neighbours", "share", "width")
+    COUNTS: ClassVar[tuple[str, ...]] = ("neighbours",)
+    LINEAR: ClassVar[tuple[str, ...]] = ("share",)
+
+    trials: PositiveInt = 64
+    neighbours: Scale = (1.5, 20.0)
+    share: tuple[float, float] = (0.0, 1.0)
+    width: Scale = (1.0, 100.0)
+
+    def fit(self, task):
+        raise NotImplementedError
+
+
+def test_counts_are_whole_and_linear_settings_evenly_spread():
+    """And the journal takes every trial."""
+    method = Counting()
+    points = list(points_of(method))
+    neighbours = {point["neighbours"] for point in points}
+    assert {2.0, 3.0} <= neighbours <= {float(number) for number in range(2, 21)}
+    for name, middle in (("share", 0.5), ("width", 10.0)):
+        assert np.mean([point[name] < middle for point in points]) == pytest.approx(0.5, abs=0.05)
+    for number, point in enumerate(points):
+        row = row_of(number, point, 1.0, 0.0)
+        assert frozen(row, distributions(method.space())).params == pytest.approx(point)
 
 
 def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():

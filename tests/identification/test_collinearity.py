@@ -66,6 +66,7 @@ def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> No
 
 
 def test_names_are_as_short_as_is_clear() -> None:
+    assert short(["inertia.m", "thruster.port.K_T.J", "hull.mmg.R_0"]) == ("inertia.m", "K_T.J", "R_0")
     assert short(["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]) == ("Y_v", "port.D_p", "starboard.D_p")
     assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
     (pair,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])

@@ -114,7 +114,7 @@ def test_tunnel_at_200_rpm_is_the_published_polynomial() -> None:
     np.testing.assert_allclose(numbers(thruster.tunnel(ca.SX(-200 / 60), **values)), -wrench)
 
 
-def advance(command: float, state: float, dt: float, T: float, rate: float) -> float:
+def advance(command: float, state: float, dt: float, T: float, rate: float = thruster.UNLIMITED) -> float:
     return float(thruster.first_order_advance(ca.SX(command), ca.SX(state), ca.SX(dt), T=T, rate=rate))
 
 
@@ -126,6 +126,12 @@ def test_lag_is_the_analytic_solution() -> None:
     for _ in range(10):
         state = advance(2.0, state, 0.1, 0.5, 100.0)
     assert state == pytest.approx(exact, rel=1e-13)
+
+
+def test_a_lag_without_a_rate_is_one_whose_rate_never_binds() -> None:
+    draws = np.random.default_rng(4).uniform(0.1, 3.0, (20, 4))
+    for command, state, dt, T in draws:
+        assert advance(command, state, dt, T) == advance(command, state, dt, T, 1e6)
 
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])

@@ -169,7 +169,7 @@ def test_bands_of_lines_of_equal_error_hold_the_lines(simulation):
             assert min(sides) < np.nanmean(at) < max(sides)
     narrow = flat(replace(simulation, frames={"intervals": means.assign(low=means.H, high=means.H)}))
     same = [trace for trace in narrow.data if trace.meta == ("bounds",)]
-    assert len(same) == 2 * len([trace for trace in lines]) // 2
+    assert len(same) == 2 * len(lines) // 2
 
 
 def test_too_few_test_manoeuvres_give_no_band(simulation):

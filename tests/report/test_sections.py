@@ -1,11 +1,12 @@
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipid.report import ReportContent, checks, identification, manoeuvre
-from shipid.report.section import OF_EVERY_PAGE, drawn
+from shipid.report.page import render
+from shipid.report.section import OF_EVERY_PAGE, Section, drawn
 from shipid.report.sections import SECTIONS
 from shipid.study.contents import FRAMES
 from tests.documented import module
@@ -37,7 +38,8 @@ def test_no_id_is_declared_twice(page):
     """Of sections and items together, drawn or not: a link leads to one place."""
     sections = PAGES[page][0]
     ids = [*sections, *(anchor for section in sections.values() for anchor in section.anchors), *OF_EVERY_PAGE]
-    assert len(ids) == len(set(ids))
+    twice = {one for one in ids if ids.count(one) > 1}
+    assert not twice, f"give the section and each of its figures and tables another id than {', '.join(sorted(twice))}"
 
 
 def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
@@ -52,6 +54,11 @@ def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
     cells = [{"cell": "a", "model": "one", "N_D": 5}, {"cell": "failed", "model": "two", "N_D": 5}]
     results = SimpleNamespace(rows=cells, paths={"a": future - off}, test=SimpleNamespace(future=future))
     assert frame(results).to_dict("records") == [{"model": "one", "N_D": 5, "ahead": 2.0, "starboard": -1.0}]
+    bias = module("A section of the report", "bias_figure_of_the_page", monkeypatch, number=3).bias
+    signed = Section("Bias", draw=lambda content: (bias(content),), needs=("bias",), anchors=("bias",))
+    monkeypatch.setitem(SECTIONS, "signed", signed)
+    shown = render(replace(simulation, frames={"bias": frame(results)}))
+    assert 'id="bias"' in shown
 
 
 def test_a_full_study_draws_every_declared_item(simulation_drawn):

@@ -56,8 +56,20 @@ def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
     assert caught.value.path == "thruster"
     amidships = {"thruster.port.x": 0.0, "thruster.port.y": 0.0, "thruster.starboard.off": True}
     balanced = SHIP.with_values(amidships | {"added_mass.Y_rdot": 0.0, "added_mass.N_vdot": 0.0})
-    with pytest.raises(DocumentError, match="no command turns R/V Gunnerus"):
+    with pytest.raises(DocumentError, match="no angle command turns R/V Gunnerus"):
         Controls.of(balanced)
+
+
+def test_two_screws_steer_by_their_difference() -> None:
+    """Any two to either side of the middle; not one, nor two in line, nor those of a ship with a helm."""
+    otter = Controls(load_vessel("otter"))
+    assert otter.differential
+    with pytest.raises(DocumentError, match=r"no angle command turns .* its shafts do: .* each one .port.n_rpm"):
+        _ = otter.helm
+    assert otter.ahead(2.0) == {"port.n": 2.0, "starboard.n": 2.0}
+    inline = otter.vessel.with_values({"thruster.port.y": 0.0, "thruster.starboard.y": 0.0})
+    one = otter.vessel.with_values({"thruster.port.off": True})
+    assert not any(Controls(ship).differential for ship in (inline, one, SHIP, load_vessel("kvlcc2-l7")))
 
 
 def test_no_approach_depends_on_its_company() -> None:

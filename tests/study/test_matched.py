@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.errors import DocumentError, ResultError, ShipidError
-from shipid.study.matched import compare, compare_results
+from shipid.study.matched import _remedy, compare, compare_results
 from shipid.study.results import Results
 from tests.study.byhand import grid
 from tests.study.tiny import run_here, tiny_plan
@@ -134,8 +134,10 @@ def test_cells_without_a_result_do_not_match(made: Made) -> None:
 
 def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     one, other = made(grid(H, (10, 30))), made(grid(H, (5, 7)))
-    with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--pair FIRST=OTHER"):
+    with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--set grid.N_D=\[10,30\]$"):
         compare_results([placed(one, "a"), placed(other, "b")])
+    assert _remedy(one, one, named=False) == "name counterparts by --pair FIRST=OTHER"
+    assert _remedy(one, other, named=False).startswith("name counterparts by --pair FIRST=OTHER; they have no N_D in")
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
     with pytest.raises(ShipidError, match="named twice"):
@@ -157,6 +159,9 @@ def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     lines = [" ".join(line.split()) for line in shown.output.splitlines()]
     assert "method.drawn.units 8 9" in lines
     assert any(line.startswith("wrong drawn ~ mine 4 2 ") for line in lines)
+    assert any(line.startswith("family method N_D cells") and line.endswith("difference verdict") for line in lines)
+    rows = sum(1 for line in lines if line.startswith(("wrong ", "right ", "none ")))
+    assert f"verdict: lower or higher where the test shows it, corrected for {rows} rows; empty: it does not" in lines
     table = tmp_path / "rows.csv"
     result = CliRunner().invoke(app, ["study", "compare", *folders, "--json", "--out", str(table)])
     document: dict[str, Any] = json.loads(result.stdout)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import shipid
 from shipid.study.methods import COLUMNS, EVERY, compared
 
 
@@ -52,6 +54,22 @@ def test_the_difference_is_that_of_the_means() -> None:
     assert row(table).least <= row(table).difference <= row(table).greatest
     assert np.isnan(row(table).world_low)
     assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
+
+
+def test_the_interval_of_H_holds_H_and_needs_five_runs() -> None:
+    rng = np.random.default_rng(5)
+    table = compared(cells(rng, 0.5), "drawn")
+    assert ((table.H_low < table.H) & (table.H_high > table.H)).all()
+    assert compared(cells(rng, 0.5, worlds=1, runs=4), "drawn")[["H_low", "H_high"]].isna().all(axis=None)
+
+
+def test_methods_of_a_run_on_the_disk(tiny_run: Path) -> None:
+    results = shipid.read_results(tiny_run)
+    table = shipid.compare_methods(results)
+    for family, part in results.cells.groupby("family"):
+        mean = part.groupby("N_D")["H"].mean()
+        pd.testing.assert_series_equal(table[table.family == family].set_index("N_D")["H"], mean, check_names=False)
+    assert (table.difference.abs() == 0).all(), "one method, the one that the study judges by"
 
 
 @pytest.mark.slow

@@ -18,9 +18,10 @@ from shipid.data.dataset import Dataset, cumulative_integral, write_dataset
 from shipid.errors import ShipidError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.simulation.approach import Controls
 from shipid.study import new
 from shipid.study.first_look import GROUPS, Change, Look
-from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, _ahead, draft_study, horizon_of, ladder, step_of
+from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, _ahead, _turning, draft_study, horizon_of, ladder, step_of
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
@@ -240,7 +241,7 @@ def test_a_template_vessel_is_studied(tmp_path: Path, template: Path) -> None:
     read_plan(tmp_path / "study.toml")
 
 
-@pytest.mark.parametrize("vessel", ["kvlcc2-l7", "mariner"])
+@pytest.mark.parametrize("vessel", ["kvlcc2-l7", "mariner", pytest.param("otter", marks=pytest.mark.slow)])
 def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> None:
     out = tmp_path / "study.toml"
     draft = draft_study([vessel], None, out)
@@ -252,6 +253,14 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
+
+
+def test_a_ship_without_helm_gets_an_order_for_each_screw() -> None:
+    for name, helm in (("otter", False), ("kvlcc2-l7", True)):
+        order = _turning(Controls(load_vessel(name)), 1.5, 300.0).value[0]
+        keys = {"n_rpm", "delta_deg"} if helm else {"port.n_rpm", "starboard.n_rpm"}
+        assert keys == set(order) - {"kind", "start_speed"}
+        assert all(high in (300.0, 35.0) for _, high in (order[key] for key in keys))
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def test_a_new_method_goes_through_a_whole_study(
     assert frame["cooperative_north"].notna().all()
     content = report_content(read_results(folder))
     assert "right+toy-N0004-s0" in set(content.trials["cell"])
-    assert {"right + toy", "right + drawn"} <= set(content.cells["model"])
+    assert {"right", "right + drawn"} <= set(content.cells["model"])
     # without a ridge what is left over the windows that train is orthogonal to every input: least squares
     prepared = prepare(plan, read_dataset(folder / store.DATASET))
     batch = plan.batches[0]

@@ -204,6 +204,33 @@ def test_setting_an_unknown_path_is_refused(base: Vessel) -> None:
         draw(family({"set": {"inertia.M": 1.0}}), 0, base)
 
 
+@pytest.mark.parametrize("block", [{"set": {"wind.off": 1.0}}, {"remove": ["wind.*"]}])
+def test_who_would_leave_out_a_term_reads_how(base: Vessel, block: dict[str, Any]) -> None:
+    with pytest.raises(DocumentError, match=r"a vessel that `extends` this one, with `off = true`"):
+        draw(family(block), 0, base)
+
+
+def test_a_complaint_counts_the_blocks_that_the_family_has_in_the_document(base: Vessel) -> None:
+    wrong = {"set": {"inertia.M": 1.0}}
+    for parent, child, path in (
+        ([HULL, MASS], [PROPELLERS, wrong], "family.high.perturb.1.set"),
+        ([HULL, wrong], [MASS], "family.high.extends.perturb.1.set"),
+    ):
+        low = family(*parent, name="low")
+        high = resolve([low, family(*child, base=None, extends="low")])[1]
+        with pytest.raises(DocumentError) as caught:
+            draw(high, 0, base)
+        assert caught.value.path == path
+
+
+def test_what_was_0_has_a_new_value_and_no_factor(base: Vessel) -> None:
+    variant = draw(family({"set": {"inertia.x_G": 2.5}}, MASS), 0, base)
+    assert base.parameters["inertia.x_G"] == 0
+    assert variant.from_zero == {"inertia.x_G": 2.5}
+    assert set(variant.factors) == {"inertia.m"}
+    assert draw(family({"set": {"inertia.x_G": 0.0}}), 0, base).from_zero == {}
+
+
 @pytest.mark.parametrize("block", [{"remove": ["inertia.m"]}, {"parameters": ["inertia.I_z"], "factor": -1.0}])
 def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError, match="would not be a valid vessel: inertia") as caught:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
+from shipid.simulation.approach import Controls, acceleration
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform
 from shipid.vessel.dynamics import dynamics
@@ -83,7 +84,26 @@ def test_growth_is_that_of_a_small_yaw() -> None:
     assert np.log(left[1] / left[0]) / 60 == pytest.approx(proposal.growth, rel=0.1)
 
 
-@pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
+def test_two_screws_without_a_rudder_turn_the_ship_by_their_difference() -> None:
+    """Small craft drawn by seed: straight ahead at the service speed, to starboard where port pushes more."""
+    rng = np.random.default_rng(3)
+    for _ in range(4):
+        length = float(rng.uniform(2.0, 9.0))
+        beam = length / float(rng.uniform(3.0, 5.0))
+        given = Particulars(length, beam, beam / 3, float(rng.uniform(0.45, 0.65)), scale=1.0, propulsor="differential")
+        proposal = first_guess(given, "usv", "usv.toml")
+        controls = Controls(proposal.vessel)
+        assert controls.differential
+        n = proposal.n
+        assert acceleration(proposal.vessel, given.service, controls.ahead(n))[0] == pytest.approx(0.0, abs=1e-3)
+        for port, starboard in ((1.1, 0.9), (0.9, 1.1)):
+            orders = {"port.n": port * n, "starboard.n": starboard * n}
+            assert acceleration(proposal.vessel, given.service, orders)[2] * (port - starboard) > 0
+    with pytest.raises(ShipidError, match="--shafts: two screws steer by their difference"):
+        first_guess(replace(MARINER, propulsor="differential", shafts=1), "m", "m.toml")
+
+
+@pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth", "differential"])
 def test_every_number_says_where_it_comes_from(propulsor: str) -> None:
     text = first_guess(replace(MARINER, propulsor=propulsor), "ship", "ship.toml").text
     assert "FIRST GUESS" in text.splitlines()[0]

@@ -26,6 +26,7 @@ from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.words import parts_of, wind_kind
+from shipid.physics.signals import named
 
 LIKELY = 0.6
 
@@ -115,11 +116,12 @@ def _runs(state: State, source: Source) -> None:
 
 
 def _others(state: State) -> None:
-    """Choose roll, pitch and wind columns by their names alone."""
-    for meaning in ("phi", "theta"):
+    """Choose roll, pitch, wind and other environment columns by their names alone."""
+    further = [name for name, row in named("environment").items() if row.names and name not in ("V_w", "beta_w")]
+    for meaning in ("phi", "theta", *further):
         for name in state.called(meaning)[:1]:
-            unit = likely_unit(state, name, meaning)
-            state.suggest(meaning, name, unit, 0.5, "by its name; the log does not show its sign")
+            unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
+            state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
     if {"apparent_angle", "apparent_speed"} <= set(state.free()):
         why = "the sentence says that it is relative to the bow"
         state.suggest("V_w", "apparent_speed", "m/s", 0.9, why)

@@ -401,6 +401,8 @@ def fits(name: str) -> dict[str, float]:
     for meaning, row in SIGNALS.items():
         if row.names and meaning not in meanings and not order and re.fullmatch(row.names, "_".join(parts)):
             meanings[meaning] = 0.9
+            if meaning not in PHRASES:  # a row of the table that is new: `OTHERS` names it as no quantity
+                meanings.pop("", None)
     if "thruster" in parts and {"bow", "stern"} & set(parts):  # of a tunnel: nothing that moves with the ship
         if SHAFT_UNITS & {unit.strip().lower() for unit in units_in(name)}:
             meanings = {"n": 1.0}
