@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from shipid.errors import DataError, ShipidError
-from shipid.identification.collinearity import listed, short
+from shipid.identification.collinearity import digits, listed, short
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
@@ -51,8 +51,8 @@ def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str
     if not 0 < horizon < LONG * longest:
         return ""
     return (
-        f"the horizon of {horizon:g} s is short against residuals that are correlated over {longest:.2g} s: estimates "
-        "may be biased beyond any interval; fit whole runs (horizon 0)"
+        f"the horizon of {horizon:g} s is short against residuals that are correlated over {digits(longest)} s: "
+        "estimates may be biased beyond any interval; fit whole runs (horizon 0)"
     )
 
 

@@ -48,7 +48,7 @@ class Combination:
         """One sentence that names the parameters and the unidentified direction."""
         if len(self.names) == 1:
             return f"{self.names[0]} has no effect on these data"
-        moves = [f"{10 * w:+.2g} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
+        moves = [f"{digits(10 * w, 2, '+')} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
         return f"only {listed(self.names)} together; {' with '.join(moves)} has no effect on these data"
 
 
@@ -60,6 +60,11 @@ def short(paths: Sequence[str]) -> tuple[str, ...]:
     parts = [path.split(".") for path in paths]
     last = [".".join(part[-1 if len(part[-1]) > 1 else -2 :]) for part in parts]
     return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
+
+
+def digits(value: float, most: int = 3, sign: str = "") -> str:
+    """Format with so many significant digits, but never round digits before the decimal point."""
+    return f"{value:{sign}.0f}" if abs(value) >= 10**most else f"{value:{sign}.{most}g}"
 
 
 def listed(names: Sequence[str]) -> str:

@@ -20,7 +20,7 @@ from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
-from shipid.identification.collinearity import listed, short
+from shipid.identification.collinearity import digits, listed, short
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.plausible import verdict
@@ -564,11 +564,11 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
     if coloured:
         longest = max(coloured.values())
         warnings.append(
-            f"residuals of {listed(list(coloured))} are correlated over {_digits(longest)} s: the model, or "
+            f"residuals of {listed(list(coloured))} are correlated over {digits(longest)} s: the model, or "
             "the wind and current data, are incomplete"
         )
         if 0 < horizon < LONG * longest:
-            longer = f"{_digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
+            longer = f"{digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
             warnings.append(
                 f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals; "
                 f"compare with {longer}whole runs (horizon 0)"
@@ -590,11 +590,6 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         if worse and not diverged:
             warnings.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
     return warnings
-
-
-def _digits(value: float) -> str:
-    """Format with 3 significant digits, but never round digits before the decimal point."""
-    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _rounded(value: float) -> float:

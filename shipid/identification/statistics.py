@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Collinearity, collinearity, listed, short
+from shipid.identification.collinearity import Collinearity, collinearity, digits, listed, short
 from shipid.identification.covariance import inverted
 
 if TYPE_CHECKING:
@@ -471,7 +471,7 @@ def _sentences(
     free, sentences = _free_places(fit), list[str]()
     for j, (path, name) in enumerate(zip(fit.paths, short(fit.paths), strict=True)):
         together = next((combination for combination in seen.combinations if path in combination.paths), None)
-        known = f"{name} is known to +-{100 * half[j]:.2g} % of its base value"
+        known = f"{name} is known to +-{digits(100 * half[j], 2)} % of its base value"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
         elif fit.held is not None and fit.held[j]:
@@ -488,7 +488,9 @@ def _sentences(
         elif together is not None:
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
-            sentences.append(f"{name} is not identified: +-{100 * alone[j]:.2g} % of its base value, hardly excited")
+            sentences.append(
+                f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of its base value, hardly excited"
+            )
         else:
             sentences.append(f"{name} is not identified: no independent effect on these data")
     return tuple(sentences)

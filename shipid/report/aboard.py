@@ -74,6 +74,12 @@ def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
     return east.ravel(), north.ravel()
 
 
+def _worst(content: AboardContent) -> int:
+    """Index of the run with the largest error at the end of a path; 0 where none can be judged."""
+    errors = content.instants.groupby("run")["error"].max().reindex(content.runs).fillna(0.0)
+    return int(errors.to_numpy().argmax())
+
+
 def seen(content: AboardContent) -> Figure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
     drawn = [LOGGED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
@@ -87,7 +93,7 @@ def seen(content: AboardContent) -> Figure:
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",
         height=520,
         views={str(i): [Panel(_map(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("run", content.runs)],
+        controls=[Control("Run", content.runs, _worst(content))],
         chips=[Chip(name, name, COLOURS[name], DASHES.get(name, "solid")) for name in drawn],
     )
 
@@ -117,7 +123,8 @@ def _trace(name: str, x: Floats, y: Floats, width: float) -> Trace:
 def along(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error = content.instants["error"].median()
-    takeaway = f"The median error at the end of a path is {error:.2f} m."
+    takeaway = f"Over all runs, the median error at the end of a path is {error:.2f} m"
+    takeaway += f"; the largest, {content.instants['error'].max():.2f} m, is in {content.runs[_worst(content)]}."
     return Figure(
         id="along",
         title="Along the run",
@@ -128,7 +135,7 @@ def along(content: AboardContent) -> Figure:
         alternative="Error over time, with instants of alarm marked.",
         height=300,
         views={str(i): [Panel(_history(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("run", content.runs)],
+        controls=[Control("Run", content.runs, _worst(content))],
         chips=[
             Chip(PATH, "error", COLOURS[PATH]),
             *([Chip(BAND, "band along and across", COLOURS[BAND], "dot")] if content.banded else []),

@@ -232,7 +232,9 @@ def worst(content: ReportContent) -> Table | None:
     have = "has less than half of its" if half == 1 else "have less than half of their"
     takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
     columns = ["test run", "manoeuvre", "model", "paths in the band", "greatest error over the band [1]"]
-    return Table("coverage-runs", "Who pays", takeaway, columns, [False, False, False, True, True], rows)
+    return Table(
+        "coverage-runs", "Runs that bands hold least", takeaway, columns, [False, False, False, True, True], rows
+    )
 
 
 SECTION = Section(

@@ -98,7 +98,7 @@ def motion(series: pd.DataFrame) -> Figure | None:
         alternative="Lines over time; the table above has the results of the checks.",
         height=240,
         views=views,
-        controls=[Control("run", runs)],
+        controls=[Control("Run", runs, runs.index(str(worst.idxmax())))],
         chips=[
             Chip("psi", "rate of the heading", category(HEADING)),
             Chip("r", "yaw rate r", category(RATE)),
@@ -129,8 +129,8 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
         line(name, t, thin[name].to_numpy(), [name], "m/s", line={"color": category(colour), "width": 1.5})
         for name, colour in (("u", 3), ("v", 4))
     ]
-    shown = (("deg/s", rates), ("m", drift), ("m/s", speeds))
-    return [Panel(Plot(traces, layout(axis("time in the run [s]"), axis(f"[{unit}]")))) for unit, traces in shown]
+    shown = (("rate [deg/s]", rates), ("distance [m]", drift), ("velocity [m/s]", speeds))
+    return [Panel(Plot(traces, layout(axis("time in the run [s]"), axis(title)))) for title, traces in shown]
 
 
 SECTIONS: dict[str, Section] = {

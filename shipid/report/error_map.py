@@ -30,8 +30,8 @@ from shipid.report.figure import (
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import data_driven, families, spread, trained
-from shipid.report.wording import counted, metres, number
+from shipid.report.selection import data_driven, left_out, overview, spread, trained
+from shipid.report.wording import counted, metres, number, shortened
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
 MARGIN = {"l": 52, "r": 12, "t": 12, "b": 44}
@@ -64,7 +64,7 @@ def error_map(content: ReportContent) -> Figure | None:
     """H over A and N_D; None where there is a single N_D or fewer than two physics models."""
     rows = _rows(content)
     counts = sorted({int(size) for size in content.cells.N_D})
-    means = trained(content)
+    means = trained(content).merge(rows[["model"]])
     if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
         return None
     spots = _spots(content, means, rows)
@@ -84,6 +84,7 @@ def error_map(content: ReportContent) -> Figure | None:
         "seeds. Hatched: H is not below that of pure data-driven at the same N_D."
         + (lined if pieces else "")
         + " The bars show the same cells, models in the order of A; the front row is the largest N_D."
+        + left_out(content)
         + unplotted(content),
         alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
         "the table of cells.",
@@ -103,7 +104,7 @@ def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: s
     """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`."""
     rows = _rows(content)
     counts = sorted({int(size) for size in content.cells.N_D})
-    means = trained(content)
+    means = trained(content).merge(rows[["model"]])
     if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
         return None
     spots = [spot._replace(words=_plainly(spot)) for spot in _spots(content, means, rows)]
@@ -130,8 +131,7 @@ def _plainly(spot: Spot) -> str:
 
 def _rows(content: ReportContent) -> pd.DataFrame:
     """Return the models of the cells by A: model, family, A [m], y (square root of A; models without A above)."""
-    frame = families(content)
-    frame = frame[frame.model.isin(content.cells.model)].reset_index(drop=True)
+    frame = overview(content)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
     without = frame.A.isna()
     strips = top * (1.05 + 0.06 * without.cumsum())
@@ -144,7 +144,8 @@ def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> l
     learned = {size: H for (model, size), H in errors.items() if model == rival}
     place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
     spots = []
-    for (model, size), cells in content.cells.groupby(["model", "N_D"], sort=True):
+    shown = content.cells[content.cells.model.isin(rows.model)]
+    for (model, size), cells in shown.groupby(["model", "N_D"], sort=True):
         key = str(model), int(str(size))
         H, floor = errors.get(key, math.nan), learned.get(key[1], math.inf)
         worse = key[0] not in pure and floor <= H
@@ -285,7 +286,7 @@ def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
     heights = apart(known.y[shown].tolist(), LINE / high * top, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [
-        {**place, "y": height, "text": label(_shortened(name)), "font": {"size": 11, "color": INK}}
+        {**place, "y": height, "text": label(shortened(name, SHORT)), "font": {"size": 11, "color": INK}}
         for height, name in zip(heights, known.model[shown], strict=True)
     ]
 
@@ -300,15 +301,11 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
     strips = rows[rows.A.isna()]
     only = (strips.family == DATA_DRIVEN).sum() == 1
     named = ["no model" if only and row.family == DATA_DRIVEN else str(row.model) for row in strips.itertuples()]
-    names = [_shortened(name) for name in named]
+    names = [shortened(name, SHORT) for name in named]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
     }
-
-
-def _shortened(name: str) -> str:
-    return name if len(name) <= SHORT else name[: SHORT - 1] + "…"
 
 
 def _isolines(pieces: Pieces) -> tuple[list[Trace], list[dict[str, Any]]]:

@@ -16,7 +16,7 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, apar
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
-from shipid.report.wording import counted, listed, metres
+from shipid.report.wording import counted, listed, metres, shortened
 
 BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
@@ -89,10 +89,12 @@ def over_time(content: ReportContent) -> Figure | None:
         for (i, run), (j, size) in itertools.product(enumerate(runs), enumerate(counts))
     }
     left = content.over_time.run.nunique() - len(runs)
+    last = means[means.N_D.isin([0, counts[-1]])]
+    worst = _worst(content, last)
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(content, means[means.N_D.isin([0, counts[-1]])]),
+        takeaway=_takeaway_time(worst, last),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below."
         + _drawn(content)
@@ -100,7 +102,7 @@ def over_time(content: ReportContent) -> Figure | None:
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
         height=_height(content.commands),
         views=views,
-        controls=[Control("Test run", runs), _size_control(counts)],
+        controls=[Control("Test run", runs, 0 if worst is None else runs.index(worst.run)), _size_control(counts)],
         chips=[*model_chips(content, set(means.source)), *_command_chips(content.commands)],
     )
 
@@ -182,19 +184,21 @@ def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
 
 
 def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, Any]]:
-    """Names beside the ends of the compensated lines, moved apart where they would collide."""
+    """Names joined to the ends of the compensated lines, moved apart where they would collide."""
     ends = sorted(
         ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
         key=lambda end: end[:2],
     )
     heights = apart([height for height, _, _ in ends], 0.055 * most, math.inf)
     notes = []
-    for height, (_, place, trace) in zip(heights, ends, strict=True):
+    for height, (end, place, trace) in zip(heights, ends, strict=True):
         short = trace["name"].removesuffix(", compensated")
-        short = short if len(short) <= LONGEST else short[: LONGEST - 1] + "…"
-        font = {"size": 11, "color": trace["line"]["color"]}
-        notes.append({"x": place, "y": height, "text": short, "xanchor": "left", "xshift": 8, "font": font})
-    return [{**note, "showarrow": False, "align": "left"} for note in notes]
+        short = shortened(short, LONGEST)
+        colour = trace["line"]["color"]
+        text = {"text": short, "xanchor": "left", "align": "left", "font": {"size": 11, "color": colour}}
+        leader = {"axref": "x", "ayref": "y", "ax": 1.04 * place, "ay": height, "arrowhead": 0, "arrowwidth": 1}
+        notes.append({"x": place, "y": end, **text, **leader, "arrowcolor": colour, "showarrow": True})
+    return notes
 
 
 def _word(source: str) -> str:
@@ -276,15 +280,22 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     )
 
 
-def _takeaway_time(content: ReportContent, means: pd.DataFrame) -> str:
+def _worst(content: ReportContent, means: pd.DataFrame) -> Any | None:
+    """Row of the run and instant at which the best model, compensated, errs most; None without one."""
     together = means[means.source == "cooperative"]
     if together.empty:
+        return None
+    best = content.best if content.best in set(together.model) else str(together.model.iloc[0])
+    return together[together.model == best].nlargest(1, "error").iloc[0]
+
+
+def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:
+    if worst is None:
         return "No compensated model gave a prediction."
-    names = list(together.model)
-    best = content.best if content.best in names else str(names[0])
-    worst = together[together.model == best].nlargest(1, "error").iloc[0]
-    text = f"{best} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
-    same = means[means.model.eq(best) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)]
+    text = f"{worst.model} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    same = means[
+        means.model.eq(worst.model) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)
+    ]
     return f"{text} on average over the horizon" + (
         f", where its physics alone errs by {metres(float(same.error.iloc[0]))}." if len(same) else "."
     )

@@ -14,7 +14,7 @@ from shipid.report.figure import Chip, Figure, Panel, Plot, axis, label, layout,
 from shipid.report.palette import INK, MUTED, SYMBOLS, category
 from shipid.report.section import Section
 from shipid.report.selection import families
-from shipid.report.wording import counted, listed, metres, number
+from shipid.report.wording import counted, listed, metres, number, shortened
 
 ROW = 42  # height of a model [px]
 LONGEST = 30  # characters of a name that fit beside its A on a phone
@@ -85,7 +85,7 @@ def _rule(row: int, span: list[float]) -> dict[str, Any]:
 def _row_text(content: ReportContent, name: str, row: int) -> dict[str, Any]:
     """Name and accuracy of a row, written above its dots."""
     mine = content.models[content.models.model == name]
-    short = name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"
+    short = shortened(name, LONGEST)
     words = f"<b>{label(short)}</b>"
     if len(mine):
         record = mine.iloc[0]

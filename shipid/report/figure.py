@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 
 from shipid.report.content import Floats
 from shipid.report.palette import GRID, INK
+from shipid.report.wording import scientific
 
 
 @dataclass(frozen=True)
@@ -122,10 +123,10 @@ def axis(title: str, **options: Any) -> dict[str, Any]:
     return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
 
 
-def logarithmic(title: str, steps: Sequence[int] = (1, 2, 5), **options: Any) -> dict[str, Any]:
+def logarithmic(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
     """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
     ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
-    return axis(title, type="log", **{"tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks], **options})
+    return axis(title, type="log", **{"tickvals": ticks, "ticktext": [scientific(tick) for tick in ticks], **options})
 
 
 def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str, Any]:

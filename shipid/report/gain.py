@@ -25,8 +25,8 @@ from shipid.report.figure import (
     silent,
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
-from shipid.report.selection import data_driven, families, trained
-from shipid.report.wording import counted, listed, metres
+from shipid.report.selection import data_driven, left_out, overview, trained
+from shipid.report.wording import counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
 LONGEST = 28  # characters of a name that fit beside its numbers on a phone
@@ -55,7 +55,7 @@ HOW = (
 
 def gain(content: ReportContent) -> Figure:
     """H over N_D, or the dumbbell A -> H when the study has a single N_D."""
-    means = trained(content)
+    means = trained(content).merge(overview(content)[["model"]])
     return _over_size(content, means) if content.cells.N_D.nunique() > 1 else _dumbbell(content, means)
 
 
@@ -73,7 +73,7 @@ def unplotted(content: ReportContent) -> str:
 
 def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
     looks, span = styles(content), accuracy_range(content)
-    order = [str(name) for name in families(content).model if name in set(content.cells.model)]
+    order = [str(name) for name in overview(content).model]
     views = {
         f"{i}-{j}": [Panel(plot)]
         for i, statistic in enumerate(STATISTICS)
@@ -97,6 +97,7 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         how=HOW.format(seeds="the line joins their means and the pale points are the seeds")
         + (" Colour is A; the" if span else " The")
         + " marker is the family; N_D counts manoeuvres to train and to validate."
+        + left_out(content)
         + unplotted(content),
         alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
         "The numbers are in the table of cells.",
@@ -165,7 +166,7 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
 
 def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
     looks, sizes = styles(content), content.cells.N_D.unique()
-    names = [str(name) for name in families(content).model]
+    names = [str(name) for name in overview(content).model]
     ranked = means.set_index("model").H.reindex(names).sort_values(na_position="last")
     views = {
         str(i): [Panel(_dumbbells(content, means, statistic, looks, list(ranked.index)))]
@@ -177,6 +178,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
         takeaway=_takeaway_dumbbell(content, means),
         how=f"Open marker: the physics alone; filled: with the compensator trained on N_D = {sizes[0]} manoeuvres. "
         + HOW.format(seeds="the filled marker is their mean and the pale points are the seeds")
+        + left_out(content)
         + unplotted(content),
         alternative=f"Position error before and after compensation for {counted(len(names), 'model')}. "
         "The numbers are in the tables of models and cells.",
@@ -225,7 +227,7 @@ def _row_text(name: str, row: int, old: float, new: float) -> dict[str, Any]:
     numbers = " → ".join(metres(value) for value in (old, new) if np.isfinite(value))
     if not np.isfinite(new):
         numbers += " → no result"
-    short = name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"
+    short = shortened(name, LONGEST)
     return {
         "bgcolor": "var(--page)",
         "x": 0,

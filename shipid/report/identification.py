@@ -18,8 +18,8 @@ from shipid.report.page import page, write
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.structures import group_table
-from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted, listed, number, scientific, short
+from shipid.report.tables import Cell, Table, decimals, figure, text
+from shipid.report.wording import bound, counted, listed, number, scientific, short
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -203,7 +203,7 @@ def _interval(low: float, high: float) -> Cell:
 
 def unseen(content: IdentificationContent) -> Table | None:
     """Return the table of what is not identified, and why; None if everything is."""
-    rows = [[text(f"{sentence[0].upper()}{sentence[1:]}")] for sentence in content.unseen]
+    rows = [[text(bound(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
     return Table("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
 
@@ -260,7 +260,7 @@ def free_runs(content: IdentificationContent) -> Figure:
         alternative="Speeds, yaw rate and tracks, measured and predicted; the table below has the errors.",
         height=290,
         views=views,
-        controls=[Control("run", runs)],
+        controls=[Control("Run", runs)],
         chips=[Chip(name, name, INKS[name], DASHES[name]) for name in INKS],
     )
 
@@ -271,12 +271,16 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
 
 def errors(content: IdentificationContent) -> Table:
     """Root mean square errors of the free runs, run by run."""
-    words = {"fit": "fitted", "test": "held out"}
+    words, places = {"fit": "fitted", "test": "held out"}, decimals(content.errors["position"])
     factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
     rows = []
     for kind, run in _all_first(content.errors[["set", "run"]]):
         mine = content.errors[(content.errors["set"] == kind) & (content.errors["run"] == run)].set_index("model")
-        cells = [figure(factor * mine[name][model], 3) for name, factor in factors.items() for model in (BEFORE, AFTER)]
+        cells = [
+            figure(factor * mine[name][model], places if name == "position" else 3)
+            for name, factor in factors.items()
+            for model in (BEFORE, AFTER)
+        ]
         rows.append([text(f"all {words[kind]}" if run == "all" else run), text(kind), *cells])
     heads = [f"{name} {model}" for name in factors for model in (BEFORE, AFTER)]
     title = f"Root mean square errors of free runs {_length(content)}"

@@ -273,7 +273,7 @@ def _takeaway_gain(frame: pd.DataFrame) -> str:
     where = f"With N_D = {int(best.N_D)}" if best.N_D else "With physics alone"
     return (
         f"{where}, {gains} of {counted(len(last), 'comparison')} lower H and {losses} raise it with an interval free "
-        f"of 0; {best.model} changes most for the better, by {_interval(best.to_dict())} ({best.comparison})."
+        f"of 0; the lowest difference is that of {best.model}, {_interval(best.to_dict())} ({best.comparison})."
     )
 
 
@@ -284,14 +284,16 @@ def windows(content: ReportContent) -> Figure | None:
         return None
     shown = list(_extremes(sums[sums.N_D.isin(frame.N_D)]))
     runs = [str(run) for run in pd.unique(frame.run)]
+    mine = frame[frame.comparison.eq(shown[0][0]) & frame.model.eq(shown[0][1])].dropna(subset=["error_with"])
+    worst = mine.nlargest(1, "error_without").iloc[0]
     views = {}
     for (i, (comparison, model)), (j, run) in itertools.product(enumerate(shown), enumerate(runs)):
-        mine = frame[frame.comparison.eq(comparison) & frame.model.eq(model) & frame.run.eq(run)]
-        views[f"{i}-{j}"] = [Panel(_window_lines(mine, _moments(content, run)))]
+        here = frame[frame.comparison.eq(comparison) & frame.model.eq(model) & frame.run.eq(run)]
+        views[f"{i}-{j}"] = [Panel(_window_lines(here, _moments(content, run)))]
     return Figure(
         id="memory-windows",
         title="Window by window",
-        takeaway=_takeaway_windows(frame, *shown[0]),
+        takeaway=_takeaway_windows(mine, worst),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon, with "
         "and without what is compared, at the largest N_D, mean over seeds; below, the difference. Both are judged on "
         "the same windows, those with enough past before them. Of each comparison, the model that gains most and the "
@@ -300,7 +302,10 @@ def windows(content: ReportContent) -> Figure | None:
         "observer, and below a line of their difference.",
         height=460,
         views=views,
-        controls=[Control("Compared", [f"{model}, {one}" for one, model in shown]), Control("Test run", runs)],
+        controls=[
+            Control("Compared", [f"{model}, {one}" for one, model in shown]),
+            Control("Test run", runs, runs.index(str(worst.run))),
+        ],
         chips=[Chip("side:with", "with; difference", category(0)), Chip("side:without", "without", INK, "dot")],
     )
 
@@ -330,10 +335,8 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> Plot:
     return Plot(traces, layout(x, y, hovermode="x unified", yaxis2=below, shapes=_upright(inside)))
 
 
-def _takeaway_windows(frame: pd.DataFrame, comparison: str, model: str) -> str:
-    mine = frame[frame.comparison.eq(comparison) & frame.model.eq(model)].dropna(subset=["error_with"])
+def _takeaway_windows(mine: pd.DataFrame, worst: Any) -> str:
     share = 100 * float((mine.error_with < mine.error_without).mean())
-    worst = mine.nlargest(1, "error_without").iloc[0]
     return (
         f"{mine['with'].iloc[0]} errs less than {mine['without'].iloc[0]} in {share:.0f} % of the windows of "
         f"{counted(mine.run.nunique(), 'test run')}; where the latter errs most, in {worst.run} at t = {worst.t:g} s, "
@@ -433,12 +436,9 @@ def _takeaway_map(frame: pd.DataFrame) -> str:
     mine = frame[frame.comparison.eq(_comparisons(frame)[0])]
     means = mine.groupby("N_D").difference.mean()
     few, many = int(means.index.min()), int(means.index.max())
-    first = _comparisons(frame)[0]
-    text = f"{first[0].upper()}{first[1:]}: over {counted(mine.model.nunique(), 'model')}, H changes "
-    text += f"by {metres(means[few])}"
-    return text + (
-        f" at N_D = {few} and by {metres(means[many])} at {many}, in the mean." if few != many else " on average."
-    )
+    text = f"Over {counted(mine.model.nunique(), 'model')}, H changes by {metres(means[few])}"
+    text += f" at N_D = {few} and by {metres(means[many])} at {many}, in the mean" if few != many else " on average"
+    return f"{text} ({mine.comparison.iloc[0]})."
 
 
 def table(content: ReportContent) -> Table | None:

@@ -12,7 +12,7 @@ import pandas as pd
 
 from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, logarithmic
-from shipid.report.palette import INK, category
+from shipid.report.palette import INK, OKABE_ITO, SYMBOLS, Style, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number
@@ -58,7 +58,8 @@ def _verdict(mine: pd.DataFrame, condition: str, N_D: int) -> str:
     best = whole.iloc[0]
     text = f"{where}: {best.method} errs least over all cells with physics, {number(best.H)} m"
     if best.method != best.reference and math.isfinite(best.low):
-        text += f", {_bracket(best.difference, best.low, best.high)} from {best.reference}"
+        difference = _bracket(best.difference, best.low, best.high)
+        text += f"; its difference to {best.reference} is {difference}"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
     return text + (f"; without a result: {listed(failed)}." if failed else ".")
 
@@ -105,7 +106,8 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
         id="methods",
         title="Methods on the same cells",
         takeaway=" ".join(verdicts(frame)[:2]) or "No method has physics to improve.",
-        how="All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
+        how="Methods are in the order of their mean H over all that is compared. "
+        "All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
         f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
         f"{counted(max(worlds, 1), 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
         "all its windows and cells. An interval is for one comparison alone: of many, one in twenty excludes 0 by "
@@ -115,7 +117,11 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
         height=MARGIN + ROW * len(order),
         views=views,
         controls=controls,
-        chips=[Chip(f"family:{name}", name, category(k), "none", symbol="circle") for k, name in enumerate(families)],
+        chips=[
+            Chip(f"family:{name}", name, look.colour, "none", symbol=look.symbol)
+            for name in families
+            for look in [_look(name, families)]
+        ],
     )
 
 
@@ -124,6 +130,12 @@ def _order(frame: pd.DataFrame) -> list[str]:
     means = frame[frame.family.eq(EVERY)].groupby("method", sort=False).H.mean()
     names = [str(name) for name in pd.unique(frame.method)]
     return sorted(names, key=lambda name: -float(means.get(name, math.nan)) if name in means else -math.inf)
+
+
+def _look(family: str, families: Sequence[str]) -> Style:
+    """Colour and marker of a family: ink without physics, as in every figure; further markers beyond the colours."""
+    k = families.index(family)
+    return Style(INK if family == DATA_DRIVEN else category(k), SYMBOLS[k // len(OKABE_ITO)], 0.0)
 
 
 def _place(row: Mapping[str, Any], order: Sequence[str], families: Sequence[str]) -> float:
@@ -138,11 +150,12 @@ def _methods_axis(order: Sequence[str]) -> dict[str, Any]:
 
 def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> Plot:
     traces = []
-    for k, family in enumerate(families):
+    for family in families:
+        look = _look(family, families)
         rows = mine[mine.family.eq(family) & mine.H.notna()].to_dict("records")
         y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
         trace = line(family, [row["H"] for row in rows], y, [f"family:{family}"], mode="markers",
-                     marker={"color": category(k), "size": 8})  # fmt: skip
+                     marker={"color": look.colour, "symbol": look.symbol, "size": 8})  # fmt: skip
         trace.update(
             customdata=[f"{label(row['method'])}: {number(row['H'])} m, {row['seconds']:.1f} s" for row in rows]
         )
@@ -150,23 +163,25 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
         traces.append(trace)
     errors = mine.H[mine.H > 0]
     span = float(errors.max() / errors.min()) if len(errors) else 1.0
-    x = logarithmic("position error, H [m]", (1, 2, 3, 5) if span < 6 else (1, 2, 5) if span < 30 else (1,))
+    x = logarithmic("position error, H [m]", (1, 1.5, 2, 3, 4, 6, 8) if span < 6 else (1, 2, 5) if span < 30 else (1,))
     return Plot(traces, layout(x, _methods_axis(order), hovermode="closest"))
 
 
 def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> Plot:
     traces = []
-    for k, family in enumerate(families):
+    for family in families:
+        look = _look(family, families)
         rows = mine[mine.family.eq(family) & mine.difference.notna() & mine.method.ne(mine.reference)].to_dict(
             "records"
         )
         y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
         middle = [float(row["difference"]) for row in rows]
-        reach = {"type": "data", "symmetric": False, "color": category(k), "thickness": 1.5, "width": 3}
+        reach = {"type": "data", "symmetric": False, "color": look.colour, "thickness": 1.5, "width": 3}
         ends = [(row["difference"], row["low"], row["high"]) for row in rows]
         reach |= {"array": [_finite(high - value) for value, _, high in ends]}
         reach |= {"arrayminus": [_finite(value - low) for value, low, _ in ends]}
-        trace = line(family, middle, y, [f"family:{family}"], mode="markers", marker={"color": category(k), "size": 6})
+        marker = {"color": look.colour, "symbol": look.symbol, "size": 6}
+        trace = line(family, middle, y, [f"family:{family}"], mode="markers", marker=marker)
         trace.update(error_x=reach, customdata=[f"{label(row['method'])}: {_interval(row)}" for row in rows])
         trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
         traces.append(trace)

@@ -41,7 +41,9 @@ def panels(rows: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], framed: S
     ]
     shown = pd.concat([parts[name] for name in framed])
     bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
-    return [*result, Panel(Plot(tracks, plane("east [m]", "north [m]", _finite(bounds))))]
+    chart = plane("east [m]", "north [m]", _finite(bounds))
+    chart["xaxis"]["nticks"] = 4  # the panel is narrow
+    return [*result, Panel(Plot(tracks, chart))]
 
 
 def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -95,6 +95,8 @@ def page(
     parts = drawn(sections, content, say)
     anchors = {item.id for section in parts for item in section.items} | set(OF_EVERY_PAGE)
     _check_links(content.answer, anchors | declared(sections))
+    titles = {"findings": "Findings", "provenance": "Provenance"}
+    titles |= {item.id: item.title for section in parts for item in section.items}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
     template = environment.from_string(_resource("template.html.j2"))
@@ -103,6 +105,7 @@ def page(
         kicker=kicker,
         sections=parts,
         anchors=anchors,
+        titles=titles,
         numbers={item.id: i for i, item in enumerate(_figures(parts), start=1)},
         views={item.id: packed(_json(_views(item))) for item in _figures(parts)},
         fixed={
@@ -110,12 +113,12 @@ def page(
             for item in _figures(parts)
             if item.windows and windows
         },
-        sketches=_first_sketch(_figures(parts)),
+        sketches=_first_sketches(_figures(parts)),
         windows=packed(_json(windows)) if windows else "",
         palette={"light": Markup(palette.variables(dark=False)), "dark": Markup(palette.variables(dark=True))},
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
-        plotly=_plotly(),
+        plotly=_plotly() if any(_figures(parts)) else None,
     )
 
 
@@ -164,12 +167,11 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _first_sketch(figures: Sequence[Figure]) -> dict[str, Markup]:
-    """Sketch of the first figure, by its id; nothing where it has several panels or cannot be sketched."""
+def _first_sketches(figures: Sequence[Figure]) -> dict[str, list[Markup]]:
+    """Sketch of each panel of the first figure, by its id; empty where the page draws it from its windows."""
     for figure in figures[:1]:
         panels = figure.views.get("-".join(str(control.start) for control in figure.controls), ())
-        if len(panels) == 1:
-            return {figure.id: sketch(panels[0].figure, figure.height)}
+        return {figure.id: [sketch(panel.figure, figure.height) for panel in panels]}
     return {}
 
 

@@ -22,7 +22,8 @@ from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, 
 from shipid.report.wording import counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_WINDOWS = 600  # in all: with six models at three N_D this is about 3 MB of the page
+MOST_WINDOWS = 600  # in all
+MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 PIXELS = 1000  # a window is drawn about half as large
 HOW = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
@@ -31,11 +32,14 @@ HOW = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
-    """Sort windows by test run and time and thin them: `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` in all."""
+    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` and `MOST_PATHS`."""
     by_run: dict[str, list[Snapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
-    result, most = {}, min(MOST_INSTANTS, MOST_WINDOWS // max(1, min(FEW_RUNS, len(by_run))))
+    shown = set(exemplars(content))
+    paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
+    windows = min(MOST_WINDOWS, MOST_PATHS // max(1, paths))
+    result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
     for run in spread(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
         chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), most)).round().astype(int)
@@ -101,7 +105,8 @@ def snapshots(content: ReportContent) -> Figure | None:
         mine = runs[names[run]]
         instants = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
         windows = [FixedWindow(f"{names[run]}, t = {mine[i].t:g} s", run, i, 0) for i in instants]
-        title, chosen = "Three instants of a test run", "Instants at one, three and five sixths of the run."
+        title = "Instants of a test run"
+        chosen = "Instants at one, three and five sixths of the run." if len(instants) == 3 else ""
         takeaway = _takeaway_row(content, [mine[i] for i in instants], counts * len(instants))
     return Figure(
         id="snapshots",
@@ -332,7 +337,7 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
         means.append(_mean_end_error([window], keys))
     if not np.isfinite(means).any():
         return "No compensated path was recorded for these windows."
-    return f"In this order, the compensated paths end {', '.join(number(m) for m in means)} m from the true place."
+    return f"From panel to panel, the compensated paths end {listed([number(m) for m in means])} m from the true place."
 
 
 def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:

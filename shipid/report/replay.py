@@ -13,7 +13,7 @@ from shipid.report.motion import LOG, SIGNALS, panels
 from shipid.report.page import page, write
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
-from shipid.report.tables import Table, figure, text
+from shipid.report.tables import Table, decimals, figure, text
 from shipid.report.wording import number
 
 REPLAYED = "replayed"
@@ -70,7 +70,7 @@ def motion(content: ReplayContent) -> Figure:
         alternative="Speeds, yaw rate and tracks, measured and replayed; the table below has the errors.",
         height=290,
         views=views,
-        controls=[Control("run", runs)],
+        controls=[Control("Run", runs)],
         chips=[Chip(name, name, str(ink["color"]), str(ink["dash"])) for name, ink in LINES.items()],
     )
 
@@ -78,8 +78,12 @@ def motion(content: ReplayContent) -> Figure:
 def errors(content: ReplayContent) -> Table:
     """Root mean square errors, run by run."""
     factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
+    places = decimals(content.errors["position"])
     rows = [
-        [text(row["run"]), *(figure(factor * row[name], 3) for name, factor in factors.items())]
+        [
+            text(row["run"]),
+            *(figure(factor * row[name], places if name == "position" else 3) for name, factor in factors.items()),
+        ]
         for row in content.errors.to_dict("records")
     ]
     heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]

@@ -174,6 +174,9 @@ def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
             x |= {name: x[name][::2] for name in ("tickvals", "ticktext")}
     else:
         x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
+        counts = sorted(set(every.dropna()))
+        if len(counts) <= 6 and all(count == round(count) for count in counts):
+            x |= {"tickvals": counts}
     ticks: dict[str, Any] = {
         "tickvals": [1, 1.5, 2, 3, CEILING, FAILED],
         "ticktext": ["1", "1.5", "2", "3", f"≥{CEILING:g}", "div."],

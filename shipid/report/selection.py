@@ -11,6 +11,7 @@ import pandas as pd
 from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
+MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 
 
@@ -45,12 +46,29 @@ def data_driven(content: ReportContent) -> str | None:
 def middles(content: ReportContent) -> dict[str, str]:
     """Per family, the model of middle A; families of many members first, then by rising A."""
     frame = families(content)
-    kept = frame[frame.A.notna() | (frame.family == DATA_DRIVEN)]
+    judged = frame.model.isin(content.models.model)
+    kept = frame[frame.A.notna() & judged | (frame.family == DATA_DRIVEN)]
     groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
     # Of the rivals without physics the first is meant wherever one is named.
     return {
         str(family): str(group.model.iloc[0 if family == DATA_DRIVEN else len(group) // 2]) for family, group in groups
     }
+
+
+def overview(content: ReportContent) -> pd.DataFrame:
+    """Rows of `families` of the models in figures of all: of many methods the one judged, and all without physics."""
+    frame = families(content)
+    frame = frame[frame.model.isin(content.cells.model)]
+    if len(frame) > MOST_MODELS:
+        frame = frame[frame.model.isin(content.models.model) | (frame.family == DATA_DRIVEN)]
+    return frame.reset_index(drop=True)
+
+
+def left_out(content: ReportContent) -> str:
+    """Sentence on the models that `overview` leaves out; empty if there are none."""
+    shown, total = len(overview(content)), content.cells.model.nunique()
+    words = f" Of {total} models, the {shown} of the method that the study judges by and without physics are drawn."
+    return words if shown < total else ""
 
 
 @lru_cache(maxsize=4)

@@ -1,40 +1,84 @@
-"""A figure as plain SVG, which a page shows until Plotly has started, or where scripts do not run."""
+"""A plot as plain SVG, which a page shows until Plotly has started, or where scripts do not run."""
 
 from __future__ import annotations
 
 import html
+import math
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
+from shipid.report.content import Floats
 from shipid.report.palette import GRID, INK
+from shipid.report.selection import thinned
 
-UNITS = 1000  # side of the square in which bars and lines are drawn, stretched to the axes
+UNITS = 1000  # side of the square in which marks and lines are drawn, stretched to the axes
 CHARACTER, TITLE = 7.0, 30  # width of a character at the axis, and of its title [px]
+ROOM = 0.055  # share of what is drawn that an axis leaves free beyond it
+STEPS = 6  # most steps of an axis without given ticks
 DASHES = {"dash": "6 4", "dot": "2 3", "dashdot": "6 3 2 3"}
 
 
+@dataclass(frozen=True)
+class Axis:
+    """An axis with its ends and ticks; of a logarithmic one these are powers of ten."""
+
+    low: float
+    high: float
+    values: Sequence[float]
+    names: Sequence[object]
+    title: str
+    grid: bool
+    logarithmic: bool
+
+    def share(self, value: Any) -> Floats:
+        """Places of values between the ends of the axis, 0 to 1; NaN for what it cannot show."""
+        given = np.asarray(value, dtype=float)
+        if self.logarithmic:
+            given = np.log10(np.where(given > 0, given, np.nan))
+        return (given - self.low) / (self.high - self.low)
+
+    @property
+    def ticks(self) -> list[tuple[float, object]]:
+        """Place, 0 to 1, and name of each tick between the ends."""
+        places = [(value - self.low) / (self.high - self.low) for value in self.values]
+        return [(place, name) for place, name in zip(places, self.names, strict=True) if -1e-9 <= place <= 1 + 1e-9]
+
+
 def sketch(figure: go.Figure, height: int) -> Markup:
-    """Draw bars, lines and texts of a figure whose two axes are linear with given range and ticks; of others nothing.
+    """Draw bars, lines, points and texts of a figure with one pair of axes of numbers; of others nothing.
 
     Parameters
     ----------
-    figure : with colours as CSS variables; points without a line are left out.
+    figure : with colours as CSS variables.
     height : of the whole, with margins [px]; it is as wide as its place on the page.
     """
-    across, up = figure.layout.xaxis, figure.layout.yaxis
-    if any(axis.range is None or axis.tickvals is None or axis.type == "log" for axis in (across, up)):
+    traces = [trace for trace in figure.data if trace.type != "scatter" or (trace.x is not None and len(trace.x))]
+    if not traces or not all(map(_simple, traces)):
         return Markup("")
+    spread = any(trace.type == "bar" or "markers" in trace.mode for trace in traces)
+    across = _axis(figure.layout.xaxis, [_ends(trace, "x") for trace in traces], ROOM if spread else 0.0)
+    up = _axis(figure.layout.yaxis, [_ends(trace, "y") for trace in traces], ROOM)
     margin = figure.layout.margin
-    names = up.ticktext or up.tickvals
-    left = max(margin.l, TITLE + CHARACTER * max((len(_plain(name)) for name in names), default=0))
-    size = f"width: calc(100% - {left + margin.r:g}px); height: {height - margin.t - margin.b:g}px"
-    place = f"position: relative; left: {left:g}px; top: {margin.t:g}px; {size}; overflow: visible"
-    inside = [*_grid(up), *_rules(figure), *(mark for trace in figure.data for mark in _marks(trace, across, up))]
-    texts = [*_texts(figure), *_tick_names(across, up), *_titles(across, up, height - margin.t - margin.b, left)]
+    longest = max((len(_plain(name)) for _, name in up.ticks), default=0)
+    left = max(margin.l, TITLE * bool(up.title) + CHARACTER * longest)
+    tall = height - margin.t - margin.b
+    wide, from_left = f"100% - {left + margin.r:g}px", f"{left:g}px"
+    size = f"width: calc({wide}); height: {tall:g}px"
+    if figure.layout.xaxis.scaleanchor:
+        ratio = (across.high - across.low) / (up.high - up.low)
+        fitted = f"min({wide}, {tall * ratio:g}px)"
+        size = f"width: {fitted}; aspect-ratio: {ratio:g}"
+        from_left = f"calc({left:g}px + ({wide} - {fitted}) / 2)"  # in the middle of its place
+    place = f"display: block; position: relative; left: {from_left}; top: {margin.t:g}px; {size}; overflow: visible"
+    inside = [*_grid(across, up), *_rules(figure, across, up)]
+    inside += [mark for trace in traces for mark in _marks(trace, across, up)]
+    texts = [*_texts(figure, across, up), *_tick_names(across, up), *_titles(across, up, left)]
     stretched = f'viewBox="0 0 {UNITS} {UNITS}" width="100%" height="100%" preserveAspectRatio="none"'
     return Markup(
         f'<svg class="sketch" aria-hidden="true" style="{place}">'
@@ -42,64 +86,157 @@ def sketch(figure: go.Figure, height: int) -> Markup:
     )
 
 
+def _simple(trace: Any) -> bool:
+    """Whether a trace has numbers on the first pair of axes."""
+    if trace.type not in ("scatter", "bar") or {trace.xaxis or "x", trace.yaxis or "y"} != {"x", "y"}:
+        return False
+    return trace.orientation != "h" and all(np.asarray(column).dtype.kind in "fiu" for column in (trace.x, trace.y))
+
+
+def _ends(trace: Any, name: str) -> Floats:
+    """All values of a trace along an axis, with the reach of bars and intervals."""
+    values = np.asarray(trace[name], dtype=float)
+    if trace.type == "bar" and name == "x":
+        return np.concatenate([values - np.asarray(trace.width) / 2, values + np.asarray(trace.width) / 2])
+    if trace.type == "bar":
+        return np.concatenate([np.asarray(trace.base, dtype=float), values + np.asarray(trace.base)])
+    return np.concatenate([values, *_reach(trace, name)])
+
+
+def _reach(trace: Any, name: str) -> list[Floats]:
+    """Lower and upper ends of the intervals of a trace along an axis; empty without."""
+    values, interval = np.asarray(trace[name], dtype=float), trace[f"error_{name}"]
+    if interval.array is None:
+        return []
+    more = np.asarray(interval.array, dtype=float)
+    less = more if interval.arrayminus is None else np.asarray(interval.arrayminus, dtype=float)
+    return [values - less, values + more]
+
+
+def _axis(axis: Any, drawn: Sequence[Floats], room: float) -> Axis:
+    logarithmic = axis.type == "log"
+    values = np.concatenate(drawn)
+    if logarithmic:
+        values = np.log10(values[values > 0])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    free = room * (high - low) or (1.0 if high == low else 0.0)
+    zero = axis.rangemode == "tozero" and not logarithmic
+    low, high = (min(low, 0.0) if zero and low >= 0 else low - free), high + free
+    if axis.range is not None:
+        low, high = map(float, axis.range)
+    ticks = _steps(min(low, high), max(low, high)) if axis.tickvals is None else np.asarray(axis.tickvals, dtype=float)
+    names = axis.ticktext or [f"{tick:g}".replace("-", "−") for tick in ticks]
+    if axis.showticklabels is False:
+        names = [""] * len(names)
+    if logarithmic and axis.tickvals is not None:
+        ticks = np.log10(ticks)
+    elif logarithmic:
+        names = [f"{10**tick:g}" for tick in ticks]
+    return Axis(low, high, ticks.tolist(), names, axis.title.text or "", axis.showgrid is not False, logarithmic)
+
+
+def _steps(low: float, high: float) -> Floats:
+    """Round values between two ends, at most `STEPS` apart."""
+    decade = 10.0 ** math.floor(math.log10((high - low) / STEPS))
+    step = next(decade * factor for factor in (1, 2, 5, 10) if (high - low) / (decade * factor) <= STEPS)
+    ticks = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
+    return np.round(ticks, max(0, 1 - math.floor(math.log10(step))))
+
+
 def _plain(text: object) -> str:
-    """Text of a tick or a note, which Plotly has escaped."""
-    return html.unescape(str(text))
-
-
-def _share(value: Any, axis: Any) -> float:
-    """Place of a value between the ends of its axis, 0 to 1."""
-    low, high = axis.range
-    return (float(value) - float(low)) / (float(high) - float(low))
+    """Text of a tick or a note without the tags and escapes of Plotly."""
+    return html.unescape(re.sub(r"<[^>]*>", "", str(text)))
 
 
 def _style(**properties: Any) -> str:
     return f'style="{escape("; ".join(f"{name}: {value}" for name, value in properties.items()))}"'
 
 
-def _path(points: str, colour: str, width: float, dash: str | None = None) -> str:
-    ink = {"fill": "none", "stroke": colour, "stroke-width": width, "stroke-dasharray": DASHES.get(dash or "", "none")}
-    return f'<path d="{points}" vector-effect="non-scaling-stroke" {_style(**ink)}/>'
+def _path(points: str, colour: str, width: float | None, dash: str | None = None, **more: Any) -> str:
+    ink = {"fill": "none", "stroke": colour, "stroke-width": 2 if width is None else width}
+    if dash in DASHES:
+        ink["stroke-dasharray"] = DASHES[dash]
+    return f'<path d="{points}" vector-effect="non-scaling-stroke" {_style(**ink, **more)}/>'
 
 
-def _grid(up: Any) -> list[str]:
-    heights = [UNITS * (1 - _share(value, up)) for value in up.tickvals]
-    return [_path(f"M0 {y:.1f}H{UNITS}", GRID, 1) for y in heights if 0 <= y <= UNITS]
+def _grid(across: Axis, up: Axis) -> list[str]:
+    flat = [f"M0 {UNITS * (1 - place):.1f}H{UNITS}" for place, _ in up.ticks if up.grid]
+    upright = [f"M{UNITS * place:.1f} 0V{UNITS}" for place, _ in across.ticks if across.grid]
+    return [_path("".join([*flat, *upright]), GRID, 1)] if flat or upright else []
 
 
-def _rules(figure: go.Figure) -> list[str]:
-    """Lines across the whole plot."""
-    rules = [rule for rule in figure.layout.shapes if rule.type == "line" and rule.xref == "paper"]
-    heights = [UNITS * (1 - _share(rule.y0, figure.layout.yaxis)) for rule in rules]
-    return [
-        _path(f"M0 {y:.1f}H{UNITS}", rule.line.color, rule.line.width, rule.line.dash)
-        for y, rule in zip(heights, rules, strict=True)
-    ]
+def _rules(figure: go.Figure, across: Axis, up: Axis) -> list[str]:
+    """Lines across the whole plot, from side to side or from top to bottom."""
+    rules = []
+    for rule in figure.layout.shapes:
+        if rule.type == "line" and rule.xref == "paper":
+            rules.append((f"M0 {UNITS * (1 - up.share(rule.y0)):.1f}H{UNITS}", rule.line))
+        elif rule.type == "line" and rule.yref == "paper":
+            rules.append((f"M{UNITS * across.share(rule.x0):.1f} 0V{UNITS}", rule.line))
+    return [_path(points, ink.color, ink.width, ink.dash) for points, ink in rules]
 
 
-def _marks(trace: Any, across: Any, up: Any) -> Iterable[str]:
+def _marks(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
     if trace.type == "bar":
-        colours, edge = trace.marker.color, trace.marker.line
-        for i, (x, y, base, width) in enumerate(zip(trace.x, trace.y, trace.base, trace.width, strict=True)):
-            low, high = (UNITS * _share(end, across) for end in (x - width / 2, x + width / 2))
-            top, bottom = (UNITS * (1 - _share(end, up)) for end in (base + y, base))
-            box = f'x="{low:.1f}" y="{top:.1f}" width="{high - low:.1f}" height="{bottom - top:.1f}"'
-            colour = colours if isinstance(colours, str) else colours[i]
-            ink = _style(fill=colour, stroke=edge.color, **{"stroke-width": edge.width})
-            yield f'<rect {box} vector-effect="non-scaling-stroke" {ink}/>'
-    elif "lines" in trace.mode and len(trace.x):
-        x = [UNITS * _share(value, across) for value in trace.x]
-        y = [UNITS * (1 - _share(value, up)) for value in trace.y]
-        yield _path(_joined(x, y), trace.line.color, trace.line.width, trace.line.dash)
+        yield from _bars(trace, across, up)
+        return
+    points = UNITS * np.column_stack([across.share(trace.x), 1 - up.share(trace.y)])
+    for name, axis, side in (("x", across, 0), ("y", up, 1)):
+        ends = _reach(trace, name)
+        if ends:
+            low, high = (UNITS * (side + (1 - 2 * side) * axis.share(end)) for end in ends)
+            pairs = [points.copy(), points.copy(), np.full_like(points, np.nan)]
+            pairs[0][:, side], pairs[1][:, side] = low, high
+            yield _path(_joined(np.stack(pairs, axis=1).reshape(-1, 2)), trace[f"error_{name}"].color, 1.5)
+    shade = {} if trace.opacity is None else {"opacity": trace.opacity}
+    if "lines" in trace.mode:
+        if trace.line.shape == "hv":
+            points = np.column_stack([np.repeat(points[:, 0], 2)[1:], np.repeat(points[:, 1], 2)[:-1]])
+        filled = {"fill": trace.fillcolor} if trace.fill == "toself" else {}
+        yield _path(_joined(_thinned(points)), trace.line.color, trace.line.width, trace.line.dash, **filled, **shade)
+    if "markers" in trace.mode:
+        yield from _points(trace, points[np.isfinite(points).all(axis=1)], shade)
 
 
-def _joined(x: Sequence[float], y: Sequence[float]) -> str:
-    """Points as a path that begins anew after what is no number."""
+def _bars(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
+    colours, edge = trace.marker.color, trace.marker.line
+    for i, (x, y, base, width) in enumerate(zip(trace.x, trace.y, trace.base, trace.width, strict=True)):
+        low, high = (UNITS * across.share(end) for end in (x - width / 2, x + width / 2))
+        top, bottom = (UNITS * (1 - up.share(end)) for end in (base + y, base))
+        box = f'x="{low:.1f}" y="{top:.1f}" width="{high - low:.1f}" height="{bottom - top:.1f}"'
+        colour = colours if isinstance(colours, str) else colours[i]
+        ink = _style(fill=colour, stroke=edge.color, **{"stroke-width": edge.width})
+        yield f'<rect {box} vector-effect="non-scaling-stroke" {ink}/>'
+
+
+def _points(trace: Any, points: Floats, shade: dict[str, float]) -> Iterable[str]:
+    """Points of a trace as round or square dots: lines without length, whose caps no stretching distorts."""
+    marker = trace.marker
+    size, symbol = marker.size or 6, str(marker.symbol or "circle")
+    colour = marker.color if isinstance(marker.color, str) else marker.line.color or INK
+    cap = {"stroke-linecap": "square" if symbol.startswith("square") else "round"} | shade
+    places = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
+    yield _path(places, colour, size, **cap)
+    if symbol.endswith("open"):
+        yield _path(places, "var(--page)", size - 2 * (marker.line.width or 1), **cap)
+
+
+def _thinned(points: Floats) -> Floats:
+    """Points (n, 2) without those that no eye misses, piece by piece between what is no number."""
+    known = np.isfinite(points).all(axis=1)
+    pieces = np.split(points, np.flatnonzero(np.diff(known)) + 1)
+    return np.concatenate([piece[thinned(piece, 1.0)] if np.isfinite(piece[0]).all() else piece for piece in pieces])
+
+
+def _joined(points: Floats) -> str:
+    """Points (n, 2) as a path that begins anew after what is no number."""
     steps, command = [], "M"
-    for point in zip(x, y, strict=True):
-        if np.isfinite(point).all():
-            steps.append(f"{command}{point[0]:.1f} {point[1]:.1f}")
-        command = "L" if np.isfinite(point).all() else "M"
+    for x, y in points:
+        known = math.isfinite(x) and math.isfinite(y)
+        if known:
+            steps.append(f"{command}{x:.1f} {y:.1f}")
+        command = "L" if known else "M"
     return "".join(steps)
 
 
@@ -113,31 +250,28 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2f}%"
 
 
-def _texts(figure: go.Figure) -> list[str]:
-    """Notes in the plot, and those right of it."""
+def _texts(figure: go.Figure, across: Axis, up: Axis) -> list[str]:
+    """Notes in the plot, and those beside it."""
     shown = []
     for note in figure.layout.annotations:
-        aside = note.xref == "paper"
-        x = note.x if aside else _share(note.x, figure.layout.xaxis)
-        y = _percent(1 - _share(note.y, figure.layout.yaxis))
-        shift = f'dx="{note.xshift or 0}" dy="4"'
-        size = note.font.size or 12
-        shown.append(_text(note.text, _percent(x), y, "start" if note.xanchor == "left" else "middle", size, shift))
+        x = note.x if note.xref == "paper" else float(across.share(note.x))
+        y = _percent(1 - float(up.share(note.y)))
+        shift = f'dx="{note.xshift or 0}" dy="{4 - (note.yshift or 0):g}"'
+        anchor = "start" if note.xanchor == "left" else "middle"
+        shown.append(_text(note.text, _percent(x), y, anchor, note.font.size or 12, shift))
     return shown
 
 
-def _tick_names(across: Any, up: Any) -> list[str]:
-    below = zip(across.tickvals, across.ticktext or across.tickvals, strict=True)
-    beside = zip(up.tickvals, up.ticktext or up.tickvals, strict=True)
+def _tick_names(across: Axis, up: Axis) -> list[str]:
     return [
-        *(_text(name, _percent(_share(value, across)), "100%", "middle", 13, 'dy="17"') for value, name in below),
-        *(_text(name, "0", _percent(1 - _share(value, up)), "end", 13, 'dx="-4" dy="4"') for value, name in beside),
+        *(_text(name, _percent(place), "100%", "middle", 13, 'dy="17"') for place, name in across.ticks if name != ""),
+        *(_text(name, "0", _percent(1 - place), "end", 13, 'dx="-4" dy="4"') for place, name in up.ticks if name != ""),
     ]
 
 
-def _titles(across: Any, up: Any, height: float, left: float) -> list[str]:
-    turned = f'transform="rotate(-90 {16 - left:g} {height / 2:g})"'
-    return [
-        _text(across.title.text, "50%", "100%", "middle", 13, 'dy="38"'),
-        _text(up.title.text, f"{16 - left:g}", f"{height / 2:g}", "middle", 13, turned),
-    ]
+def _titles(across: Axis, up: Axis, left: float) -> list[str]:
+    beside = f"transform: translateX({16 - left:g}px) rotate(-90deg); transform-origin: 0 50%"
+    shown = [_text(across.title, "50%", "100%", "middle", 13, 'dy="38"')] if across.title else []
+    if up.title:
+        shown.append(f'<g style="{beside}">{_text(up.title, "0", "50%", "middle", 13)}</g>')
+    return shown

@@ -13,8 +13,8 @@ import pandas as pd
 from shipid.report.content import PageContent, Sentence
 from shipid.report.page import page, write
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted
+from shipid.report.tables import Cell, Table, decimals, figure, text
+from shipid.report.wording import counted, listed
 
 Row = dict[str, Any]
 
@@ -55,6 +55,7 @@ def write_structures(content: StructuresContent, file: Path) -> Path:
 
 def structures(content: StructuresContent) -> Table:
     """Mean errors on runs that the fit has not seen, best first, with paired intervals."""
+    places = decimals(content.table[["position", "test"]])
     rows = [
         [
             text(row["structure"]),
@@ -62,10 +63,10 @@ def structures(content: StructuresContent) -> Table:
             figure(row["u"], 3),
             figure(row["v"], 3),
             figure(degrees(row["r"]), 3),
-            figure(row["position"], 3),
-            figure(row["more"], 3),
+            figure(row["position"], places),
+            figure(row["more"], places),
             _between(row["low"], row["high"]),
-            figure(row["test"], 3),
+            figure(row["test"], places),
             Cell("yes" if row["equal"] else "no", "yes" if row["equal"] else "no"),
             text(row["note"]),
         ]
@@ -91,11 +92,12 @@ def runs(content: StructuresContent) -> Table:
     named = {row["structure"] for row in known}
     names = [str(name) for name in content.table["structure"] if name in named]
     by_run = {(row["set"], row["run"], row["structure"]): row["position"] for row in known}
+    places = decimals(content.errors["position"])
     rows = [
         [
             text(run),
             text("test" if of == "test" else "held out"),
-            *(figure(by_run.get((of, run, name)), 3) for name in names),
+            *(figure(by_run.get((of, run, name)), places) for name in names),
         ]
         for of, run in dict.fromkeys((row["set"], row["run"]) for row in known)
     ]
@@ -120,9 +122,12 @@ def manoeuvres(content: StructuresContent) -> Table:
     takeaway = "" if content.level is None else f"With {100 * content.level:g} % intervals. "
     takeaway += "Between: range over the structures not shown to be worse; "
     takeaway += "within: the widest interval of one of them."
-    cautions = [f"{name}: {why}" for name, why in content.cautions.items() if why]
+    alike: dict[str, list[str]] = {}
+    for name, why in content.cautions.items():
+        alike.setdefault(why, []).append(name)
+    cautions = [f"{listed(which, len(which))}: {why}" for why, which in alike.items() if why]
     if cautions:
-        takeaway += f" Intervals may be too narrow: {'; '.join(cautions)}."
+        takeaway += f" Intervals may be too narrow. {'; '.join(cautions)}."
     numeric = [False, False, *[True] * (len(names) + 2), False]
     return Table("manoeuvres", "Standard manoeuvres in calm deep water", takeaway, head, numeric, rows)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from shipid.report.content import PUBLISHED, ReportContent
@@ -45,6 +46,13 @@ def figure(value: object, decimals: int) -> Cell:
     if not math.isfinite(amount):
         return Cell("–", MISSING)
     return Cell(f"{amount:.{decimals}f}".replace("-", "−"), amount)
+
+
+def decimals(values: pd.DataFrame | pd.Series[float]) -> int:
+    """Decimals, three at most, that leave three digits to the median of some values."""
+    sizes = np.abs(np.asarray(values, dtype=float))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    return int(np.clip(2 - np.floor(np.log10(np.median(sizes))), 0, 3)) if len(sizes) else 2
 
 
 MISSING = 1e300  # sorts after every number (page.js knows it)

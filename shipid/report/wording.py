@@ -38,6 +38,11 @@ def scientific(value: float, digits: int = 4) -> str:
     return f"{front} × 10{raised.translate(RAISED)}" if raised else text
 
 
+def shortened(name: str, most: int) -> str:
+    """Name of at most so many characters, its middle left out: names that differ mostly do so at an end."""
+    return name if len(name) <= most else f"{name[: most // 2 - 1]}…{name[most // 2 - most :]}"
+
+
 def metres(value: float) -> str:
     """Write a length with its unit."""
     return f"{number(value)} m"
@@ -55,8 +60,10 @@ def listed(names: Sequence[str], limit: int = 4) -> str:
 
 
 def bound(text: str) -> str:
-    """Keep a number and its unit, or a symbol and its number, on one line: their spaces do not break."""
-    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm|%)\b)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
+    """Write a sentence as a page sets it: signs, a space before %, and none that breaks before a unit."""
+    text = text.replace("+-", "±")
+    text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
+    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 
 
 def counted(count: int, noun: str) -> str:

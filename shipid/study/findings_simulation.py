@@ -396,7 +396,7 @@ def _S7(results: Results, grid: Grid) -> Finding:
     judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
     if smooth_by_construction(judged, results.test.horizon):
         evidence = (
-            "the compensation is a polynomial of time, which is smooth whatever it learned; `path-trained` is not"
+            "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
         )
         return _finding("S7", "not testable", evidence)
     first = grid.amounts[0]

@@ -555,8 +555,8 @@ class Plan:
         return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
 
     def label(self, foundation: str, method: str) -> str:
-        """Name of a model for people: the foundation, with the method where that is not the only one that learns."""
-        return foundation if [method] == self.learning or len(self.methods) == 1 else f"{foundation} {WITH} {method}"
+        """Name of a model for people: the foundation, with the method where that is not the one judged."""
+        return foundation if method == self.judged else f"{foundation} {WITH} {method}"
 
     def text(self) -> str:
         """The resolved document as TOML."""

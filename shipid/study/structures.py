@@ -105,8 +105,8 @@ class Compared:
         rows = {str(row["structure"]): row for row in _records(self.table)}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         notes = [
-            f"{self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the fit has "
-            f"not seen: {rows[self.chosen]['position']:.3g} m"
+            f"structure {self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the "
+            f"fit has not seen: {rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")

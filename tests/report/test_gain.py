@@ -6,6 +6,8 @@ import pytest
 from shipid.report.figure import Figure
 from shipid.report.gain import gain
 
+LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
 
 def traces(figure: Figure, view: str) -> dict[str, list]:
     """Traces of a view by name."""
@@ -54,7 +56,8 @@ def test_a_logarithmic_axis_is_offered(simulation):
     kinds = [figure.views[view][0].figure.layout.yaxis.type for view in ("0-0", "0-1")]
     assert kinds == [None, "log"]
     ticks = figure.views["0-1"][0].figure.layout.yaxis
-    assert [float(word) for word in ticks.ticktext] == list(ticks.tickvals)
+    written = [float(word.replace(" × 10", "e").translate(LOWERED)) for word in ticks.ticktext]
+    assert written == list(ticks.tickvals)
 
 
 def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):

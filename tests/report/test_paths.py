@@ -106,7 +106,7 @@ def test_one_family_shows_all_its_models_in_one_row(simulation):
     cells = simulation.cells[simulation.cells.model.isin(names)]
     figure = snapshots(replace(simulation, models=simulation.models[kept], cells=cells, snapshots=shots))
     assert [(window.model, window.size) for window in figure.windows] == [("", 0), ("", 1), ("", 2)]
-    assert figure.takeaway.startswith("In this order")
+    assert figure.takeaway.startswith("From panel to panel")
 
 
 def test_one_size_gives_three_instants_of_one_run(full_scale):

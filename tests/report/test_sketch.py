@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as XML
 
+import numpy as np
 import plotly.graph_objects as go
-import pytest
 
 from shipid.report import ReportContent
 from shipid.report.error_map import error_map
-from shipid.report.figure import axis, layout, line
-from shipid.report.gain import gain
+from shipid.report.errors_over import over_time
+from shipid.report.figure import axis, label, layout, line, logarithmic, plane
+from shipid.report.page import render
 from shipid.report.sketch import sketch
 
 
@@ -27,24 +29,59 @@ def test_the_map_has_a_box_for_every_cell_and_every_name(simulation: ReportConte
     assert all(float(box.attrib["height"]) > 0 for box in boxes)
     words = {text.text for text in drawn.findall(".//text")}
     assert {*simulation.models.model[simulation.models.A.notna()], "10", "30", "100"} <= words
-    assert len(drawn.findall(".//path")) == len(plot.layout.yaxis.tickvals) + len(plot.layout.shapes) + sum(
-        "lines" in trace.mode and len(trace.x) > 0 for trace in plot.data if trace.type == "scatter"
-    )
+    points = [trace for trace in plot.data if trace.type == "scatter" and len(trace.x)]
+    marks = sum(("lines" in trace.mode) + ("markers" in trace.mode) for trace in points)
+    assert len(drawn.findall(".//path")) == 1 + len(plot.layout.shapes) + marks, "one path is the grid"
 
 
 def test_points_lie_where_the_axes_say_and_gaps_stay() -> None:
     ticks = {"range": [0.0, 10.0], "tickvals": [0, 10]}
     plot = go.Figure([line("a", [0, 5, 6, 10], [0, 5, float("nan"), 10], [], line={"color": "var(--ink)", "width": 1})])
-    plot.update_layout(layout(axis("t <s> [s]", **ticks), axis("x [m]", **ticks)))
+    plot.update_layout(layout(axis(label("t <s> [s]"), **ticks), axis("x [m]", **ticks)))
     drawn = XML.fromstring(sketch(plot, 300))
     assert drawn.findall(".//path")[-1].attrib["d"] == "M0.0 1000.0L500.0 500.0M1000.0 0.0"
     assert "t <s> [s]" in {text.text for text in drawn.findall(".//text")}
 
 
-@pytest.mark.parametrize("options", [{}, {"range": [0, 1], "tickvals": [1], "type": "log"}])
-def test_of_other_axes_nothing_is_drawn(simulation: ReportContent, options: dict[str, object]) -> None:
-    plot = go.Figure([], layout(axis("a [m]", **options), axis("b [m]", range=[0, 1], tickvals=[0])))
-    assert sketch(plot, 300) == ""
-    figure = gain(simulation)
+def test_an_axis_without_range_holds_all_and_has_few_round_ticks() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        values = rng.normal(rng.normal(scale=100), 10 ** rng.uniform(-3, 4), (2, 7))
+        plot = go.Figure([line("a", *values, [], mode="markers")], layout(axis("a [m]"), axis("b [m]")))
+        drawn = XML.fromstring(sketch(plot, 300))
+        dots = re.findall(r"M(\S+) (\S+)h0", drawn.findall(".//path")[-1].attrib["d"])
+        assert len(dots) == 7
+        assert all(0 < float(place) < 1000 for dot in dots for place in dot)
+        names = [text.text for text in drawn.findall(".//text")][:-2]
+        assert 4 <= len(names) <= 14, names
+        assert len({*names}) >= len(names) / 2
+
+
+def test_logarithmic_axes_equal_axes_and_intervals() -> None:
+    ends = {"range": [0.0, 2.0]}
+    dots = line("a", [1.0, 10.0, 100.0], [1.0, 2.0, 3.0], [], mode="markers", error_y={"array": [1.0, 1.0, 0.5]})
+    plot = go.Figure([dots], layout(logarithmic("a [m]", **ends), axis("b [m]", range=[0.0, 4.0], tickvals=[0, 2])))
+    bars, points = XML.fromstring(sketch(plot, 300)).findall(".//path")[-2:]
+    assert points.attrib["d"] == "M0.0 750.0h0M500.0 500.0h0M1000.0 250.0h0"
+    assert bars.attrib["d"] == "M0.0 1000.0L0.0 500.0M500.0 750.0L500.0 250.0M1000.0 375.0L1000.0 125.0"
+    plot = go.Figure([line("a", [0.0, 4.0], [0.0, 2.0], [])], plane("a [m]", "b [m]", [(0.0, 4.0), (0.0, 2.0)]))
+    assert "aspect-ratio: 1.86207" in sketch(plot, 300), "4.32 over 2.32: as wide as it is in metres"
+
+
+def test_of_what_has_no_numbers_or_two_axes_nothing_is_drawn(simulation: ReportContent) -> None:
+    axes = layout(axis("a [m]"), axis("b [m]"))
+    assert sketch(go.Figure([], axes), 300) == ""
+    assert sketch(go.Figure([{"type": "heatmap", "z": [[1.0]]}], axes), 300) == ""
+    assert sketch(go.Figure([{"type": "scatter", "x": ["one", "two"], "y": [1, 2], "mode": "lines"}], axes), 300) == ""
+    figure = over_time(simulation)
     assert figure is not None
-    assert sketch(figure.views["0-0"][0].figure, 300) == ""
+    assert sketch(figure.views["0-0"][0].figure, 300) == "", "commands lie on axes of their own"
+
+
+def test_the_first_figure_of_every_kind_of_page_is_sketched(
+    simulation: ReportContent, full_scale: ReportContent
+) -> None:
+    for content in (simulation, full_scale):
+        text = render(content)
+        first = text[text.index("<figure ") : text.index("</figure>")]
+        assert first.count('<svg class="sketch"') == first.count('class="plot"') > 0

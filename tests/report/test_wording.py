@@ -1,6 +1,6 @@
 import math
 
-from shipid.report.wording import bound, counted, distance, listed, metres, number, scientific, short
+from shipid.report.wording import bound, counted, distance, listed, metres, number, scientific, short, shortened
 
 
 def test_three_digits():
@@ -45,3 +45,13 @@ def test_lists():
 
 def test_units_stay_with_their_numbers():
     assert bound("H = 0.94 m, 5 models") == "H\u00a0=\u00a00.94\u00a0m, 5 models"
+
+
+def test_a_long_name_loses_its_middle() -> None:
+    assert shortened("moderate-observed-1", 12) == "moder…rved-1"
+    for most in range(4, 24):
+        assert len(shortened("moderate-observed-1", most)) == min(most, 19)
+
+
+def test_a_sentence_is_set_with_signs_and_spaces() -> None:
+    assert bound("90% of +-2 m [-0.2, 3-4], N-2") == "90\u00a0% of ±2\u00a0m [−0.2, 3-4], N-2"

@@ -80,7 +80,7 @@ def test_the_structure_that_made_the_data_is_chosen(comparison: Compared) -> Non
     assert comparison.test == ("35_15_627",)
     held = comparison.errors[(comparison.errors["set"] == "folds") & (comparison.errors["run"] != "all")]
     assert sorted(held["run"].unique()) == sorted(comparison.runs)  # each run once, and no test run
-    assert comparison.sentences[0].startswith("abkowitz has the least error")
+    assert comparison.sentences[0].startswith("structure abkowitz has the least error")
     assert set(comparison.manoeuvres["measure"]) == {"overshoot 1", "overshoot 2", "advance", "tactical diameter"}
     assert (comparison.spread["spread"] >= 0).all()
     assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in comparison.beyond)

@@ -38,7 +38,7 @@ def test_a_new_method_goes_through_a_whole_study(
     # four foundations with `drawn`, two with `toy`, three with `bare`: `alone` does not meet `none`
     assert plan.cells == 4 + 2 + 3
     assert plan.judged == "toy"
-    assert plan.label("right", "toy") == "right + toy"
+    assert plan.label("right", "toy") == "right"
     folder = tmp_path / "run"
     run_here(plan, folder)
     rows = store.read_rows(folder).set_index("cell")
@@ -53,7 +53,7 @@ def test_a_new_method_goes_through_a_whole_study(
     assert frame["cooperative_north"].notna().all()
     content = report_content(read_results(folder))
     assert "right+toy-N0004-s0" in set(content.trials["cell"])
-    assert {"right + toy", "right + drawn"} <= set(content.cells["model"])
+    assert {"right", "right + drawn"} <= set(content.cells["model"])
     # without a ridge what is left over the windows that train is orthogonal to every input: least squares
     prepared = prepare(plan, read_dataset(folder / store.DATASET))
     batch = plan.batches[0]
