@@ -217,9 +217,9 @@ def _points(trace: Any, points: Floats, shade: dict[str, float]) -> Iterable[str
     colour = marker.color if isinstance(marker.color, str) else marker.line.color or INK
     cap = {"stroke-linecap": "square" if symbol.startswith("square") else "round"} | shade
     places = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
-    yield _path(places, colour, size, **cap)
+    yield _path(places, colour, size, None, **cap)
     if symbol.endswith("open"):
-        yield _path(places, "var(--page)", size - 2 * (marker.line.width or 1), **cap)
+        yield _path(places, "var(--page)", size - 2 * (marker.line.width or 1), None, **cap)
 
 
 def _thinned(points: Floats) -> Floats:
