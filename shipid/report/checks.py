@@ -134,10 +134,10 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
 
 
 SECTIONS: dict[str, Section] = {
-    "checks": Section("The checks", lambda content: (_table(content.checks),), ("checks",), ("all-checks",)),
     "motion": Section(
         "What the checks compare", lambda content: (motion(content.series),), ("series",), ("motion-figure",)
     ),
+    "checks": Section("The checks", lambda content: (_table(content.checks),), ("checks",), ("all-checks",)),
     "data": Section(
         "The data",
         lambda content: (logs.manoeuvres(content), tables.repairs(content)),

@@ -394,7 +394,7 @@ def _S7(results: Results, grid: Grid) -> Finding:
     if results.test.horizon < 3:
         return _finding("S7", "undecided", "a second difference needs three steps ahead")
     judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
-    if smooth_by_construction(judged, results.test.horizon):
+    if smooth_by_construction(judged, results.plan.horizon):
         evidence = (
             "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
         )

@@ -452,6 +452,11 @@ class Plan:
         return self.study.bands.refits
 
     @property
+    def horizon(self) -> int:
+        """Number of steps ahead."""
+        return self.study.prediction.horizon
+
+    @property
     def commands(self) -> Commands:
         """Whether the commands of the horizon are `held` or `known`."""
         return self.study.prediction.commands
