@@ -83,12 +83,10 @@ class ErrorTable:
 
 def error_table(results: Results, models: Sequence[str], metric: Metric = "H") -> ErrorTable:
     """Errors of models, `none` and plain `none` that have a result in every cell; H_90 is taken in each manoeuvre."""
-    runs, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
+    _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
 
     def by_run(path: Array) -> Array:
-        error = position_error(path, results.test.future)
-        parts = [error[:, place == k] for k in range(len(runs))]
-        return np.array([part.mean() if metric == "H" else np.quantile(part, 0.9) for part in parts])
+        return _by_run(path, results.test.future, place, metric)
 
     cells = judged_cells(results)
     amounts, seeds = sorted(set(cells["N_D"])), sorted(set(cells["seed"]))
@@ -117,22 +115,24 @@ def intervals_frame(results: Results) -> pd.DataFrame:
     """
     _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
     cells = results.cells[results.cells["cell"].map(results.paths.__contains__)]
-    parts = []
+    parts, weights, true = [], counts / counts.sum(), results.test.future
     for N_D, mine in cells.groupby("N_D", sort=True):
         errors = {
-            str(model): np.stack([_by_run(results, str(cell), place) for cell in same["cell"]])  # (seeds, R)
+            str(model): np.stack(
+                [_by_run(results.paths[str(cell)], true, place) for cell in same["cell"]]
+            )  # (seeds, R)
             for model, same in mine.groupby("model", sort=False)
         }
         means = np.stack([each.mean(axis=0) for each in errors.values()])
-        noise = training_noise([each @ (counts / counts.sum()) for each in errors.values()])
+        noise = training_noise([each @ weights for each in errors.values()])
         seeds = np.array([len(each) for each in errors.values()])
-        judged = contrasts(means, counts.astype(float), noise * (means @ (counts / counts.sum())) / np.sqrt(seeds))
+        judged = contrasts(means, counts.astype(float), noise * (means @ weights) / np.sqrt(seeds))
         parts.append(pd.DataFrame({"model": list(errors), "N_D": N_D, "low": judged.low, "high": judged.high}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])
 
 
-def _by_run(results: Results, cell: str, place: NDArray[np.int64]) -> Array:
-    """(R,) mean error [m] of a cell in each test manoeuvre; place : (S,) manoeuvre of each window."""
-    error = position_error(results.paths[cell], results.test.future).mean(axis=0)
-    mean: Array = np.bincount(place, error) / np.bincount(place)
-    return mean
+def _by_run(path: Array, true: Array, place: NDArray[np.int64], metric: Metric = "H") -> Array:
+    """(R,) mean error, or 90th percentile, [m] of a path in each test manoeuvre; place : (S,) that of each window."""
+    error = position_error(path, true)
+    parts = [error[:, place == k] for k in range(place.max() + 1)]
+    return np.array([part.mean() if metric == "H" else np.quantile(part, 0.9) for part in parts])
