@@ -95,7 +95,7 @@ def motion(series: pd.DataFrame) -> Figure | None:
         takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {worst.max():.1f} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
-        alternative="Lines over time; the table above has the results of the checks.",
+        alternative="Lines over time; the table below has the results of the checks.",
         height=240,
         views=views,
         controls=[Control("Run", runs, runs.index(str(worst.idxmax())))],
