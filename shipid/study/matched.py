@@ -198,14 +198,15 @@ def _counterparts(here: pd.Series, there: pd.Series, pairs: Mapping[str, str]) -
 
 def _remedy(first: Results, other: Results, named: bool) -> str:
     """What would make cells of two runs match; `named`: whether families and methods have their counterparts."""
-    remedies = [] if named else ["name counterparts by --pair FIRST=OTHER"]
+    pair = "name counterparts by --pair FIRST=OTHER"
+    remedies = [] if named else [pair]
     for key, path in GRID.items():
         cells = [_cells(results) for results in (first, other)]
         wanted, there = (set(map(int, each.loc[each["N_D"] > 0, key])) for each in cells)
         if not wanted & there:
             values = ",".join(map(str, sorted(wanted)))
             remedies.append(f"they have no {key} in common, run the other study with --set {path}=[{values}]")
-    return "; ".join(remedies) or "name counterparts by --pair FIRST=OTHER"
+    return "; ".join(remedies) or pair
 
 
 def _spans(results: Results) -> str:

@@ -152,9 +152,9 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         force -= coriolis(M_RB, nu)
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
-    available |= _gives(terms, available, bound, value_of, behind=True)
+    available |= _gives(terms, available, bound, value_of, outputs=False)
     summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
-    shown = _gives(terms, available, bound, value_of, behind=False)
+    shown = _gives(terms, available, bound, value_of, outputs=True)
     inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
@@ -297,13 +297,13 @@ def _gives(
     bound: Mapping[str, Binding],
     value_of: Mapping[str, SX],
     *,
-    behind: bool,
+    outputs: bool,
 ) -> dict[str, SX]:
-    """What components give, by name: to the one `behind` them (`propeller.wash`), or outputs (`propeller.thrust`)."""
+    """What components give, by name: outputs (`propeller.thrust`), or signals to what is behind (`propeller.wash`)."""
     result = {}
     for path, key, block in terms:
         for name, function in TERMS[key].gives.items():
-            if (name in GIVEN) == behind:
+            if (name in GIVEN) != outputs:
                 here = {**available, **_of_component(path, TERMS[key], block, available)}
                 value = _called(TERMS[key], function, here, _values(bound[path], value_of))
                 if value is not None:  # an output whose parameters the block lacks
